@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// A compiled kernel, loaded and checked: shared object to function table.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/compile.hpp"
+#include "runtime/kernel_abi.h"
+
+namespace lobatto {
+
+template <class real>
+constexpr lobatto_real real_kind();
+template <>
+constexpr lobatto_real real_kind<float>() { return LOBATTO_FLOAT; }
+template <>
+constexpr lobatto_real real_kind<double>() { return LOBATTO_DOUBLE; }
+template <>
+constexpr lobatto_real real_kind<long double>() { return LOBATTO_LONG_DOUBLE; }
+template <>
+constexpr lobatto_real real_kind<__float128>() { return LOBATTO_FLOAT128; }
+
+// A loaded kernel; copies share the library, which is unloaded with the last of them. Thread-safe: the table is constant.
+class Kernel {
+public:
+    // dlopen, then the checks: ABI version, structure size, digest as expected. Throws MachineError.
+    static Kernel load(const std::string& object, const std::string& expected_digest);
+
+    const lobatto_kernel& table() const { return *table_; }
+    const lobatto_kernel* operator->() const { return table_; }
+
+private:
+    std::shared_ptr<void> library_;
+    const lobatto_kernel* table_ = nullptr;
+};
+
+// One trajectory's state inside a kernel. `real` must be the kernel's number type.
+// All functions that can fail return lobatto_status; shapes as in kernel_abi.h.
+template <class real>
+class Stepper {
+public:
+    explicit Stepper(Kernel kernel);  // MachineError when real is not the kernel's number type
+    Stepper(const Stepper& other);
+    Stepper& operator=(const Stepper& other);
+    Stepper(Stepper&&) noexcept = default;
+    Stepper& operator=(Stepper&&) noexcept = default;
+
+    lobatto_status prepare(const std::vector<real>& parameters, real step);
+    lobatto_status start(real time, const std::vector<real>& q, const std::vector<real>& p);
+    lobatto_status advance(lobatto_advance& call);
+    void state(real& time, std::vector<real>& q, std::vector<real>& p) const;
+
+    real energy(const std::vector<real>& q, const std::vector<real>& p) const;
+    std::vector<real> momentum(const std::vector<real>& q, const std::vector<real>& velocity) const;
+    std::vector<real> velocity(const std::vector<real>& q, const std::vector<real>& p) const;
+    // W = M^-1 grad V, n; S = M^-1 V'', n x n.
+    void acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const;
+    std::vector<real> residual(const std::vector<real>& q, const std::vector<real>& p, const std::vector<real>& Q) const;  // N
+    std::vector<real> jacobian(const std::vector<real>& Q) const;                                                         // N x N
+    // One step from (q, p) with its tangent map T, 2n x 2n; does not touch the trajectory.
+    lobatto_status tangent(const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1, std::vector<real>& p1, std::vector<real>& T) const;
+
+    const Kernel& kernel() const { return kernel_; }
+
+private:
+    Kernel kernel_;
+    std::unique_ptr<std::byte[]> memory_;  // holds table().stepper_bytes at the alignment asked for
+    void* stepper_ = nullptr;              // aligned, inside memory_
+};
+
+}  // namespace lobatto
