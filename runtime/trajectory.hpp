@@ -12,9 +12,10 @@
 
 namespace lobatto {
 
-// One kept state: t, q[n], p[n], row-major as the kernel writes them.
+// Kept states: rows of t, q[n], p[n], row-major as the kernel writes them, and the energy of each.
 struct Records {
-    const double* rows = nullptr;
+    const double* rows = nullptr;    // count x columns
+    const double* energy = nullptr;  // count: H(q, p)
     std::int64_t count = 0;
     int columns = 0;  // 1 + 2n
 };
@@ -43,8 +44,8 @@ struct TrajectoryResult {
     std::vector<double> q, p;        // the last good state
     double seconds = 0;              // inside the kernel
     double energy_start = 0;
-    double energy_error_largest = 0; // max over the kept states |H - H(0)|, absolute
-    double energy_error_final = 0;
+    double energy_error_largest = 0; // max over the kept states |H - H(0)|, absolute; H in double, so about |H| 2^-53 of it is rounding
+    double energy_error_final = 0;   // H - H(0) at the last good state
 };
 
 TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request);
