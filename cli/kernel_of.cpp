@@ -25,7 +25,8 @@ Translation translation_of(const KernelSource& source, Precision precision) {
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
-    for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text}) append_part(translation.text, part);
+    for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text})
+        append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
     return translation;
 }

@@ -11,7 +11,8 @@ namespace lobatto {
 // The whole translation unit of a kernel: the support headers, the emitted header, the export.
 Translation translation_of(const KernelSource& source, Precision precision);
 
-// Compiles it, or finds it in the cache, and loads it. `source` must have been emitted with this precision, without standalone support.
+// Compiles it, or finds it in the cache, and loads it. `source` must have been emitted with this precision, without
+// standalone support.
 Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled = nullptr);
 
 }  // namespace lobatto

@@ -20,7 +20,8 @@ std::string duration(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::int64_t total) : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()) {}
+Progress::Progress(std::int64_t total)
+    : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
     if (shown_) fmt::print(stderr, "\r\033[K");
@@ -33,8 +34,8 @@ void Progress::show(std::int64_t done) {
     constexpr int width = 40;
     const double fraction = static_cast<double>(done) / static_cast<double>(total_);
     const int filled = static_cast<int>(fraction * width);
-    fmt::print(stderr, "\r\033[K[{:#<{}}{:.<{}}] {:3.0f} %, {} left", "", filled, "", width - filled, std::floor(fraction * 100),
-               duration(elapsed * (1 - fraction) / fraction));
+    fmt::print(stderr, "\r\033[K[{:#<{}}{:.<{}}] {:3.0f} %, {} left", "", filled, "", width - filled,
+               std::floor(fraction * 100), duration(elapsed * (1 - fraction) / fraction));
     std::fflush(stderr);
 }
 

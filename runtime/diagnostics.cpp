@@ -13,14 +13,16 @@ template <class real>
 real symplectic_defect(const Stepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p) {
     const std::size_t n = q.size(), rows = 2 * n;
     std::vector<real> q1, p1, T;
-    if (stepper.tangent(q, p, q1, p1, T) != LOBATTO_OK) throw ComputationError("the symplectic defect cannot be measured: the step from this state fails");
+    if (stepper.tangent(q, p, q1, p1, T) != LOBATTO_OK)
+        throw ComputationError("the symplectic defect cannot be measured: the step from this state fails");
     const auto size = [](real x) { return x < real(0) ? -x : x; };
     real defect = 0, squares = 0;
     for (const real entry : T) squares += entry * entry;
     for (std::size_t a = 0; a < rows; ++a) {
-        for (std::size_t b = 0; b < a; ++b) {  // T^T J T - J is antisymmetric
+        for (std::size_t b = 0; b < a; ++b) {           // T^T J T - J is antisymmetric
             real sum = a == b + n ? real(1) : real(0);  // -J_ab
-            for (std::size_t i = 0; i < n; ++i) sum += T[i * rows + a] * T[(n + i) * rows + b] - T[(n + i) * rows + a] * T[i * rows + b];
+            for (std::size_t i = 0; i < n; ++i)
+                sum += T[i * rows + a] * T[(n + i) * rows + b] - T[(n + i) * rows + a] * T[i * rows + b];
             if (!(size(sum) <= defect)) defect = size(sum);
         }
     }
@@ -29,14 +31,17 @@ real symplectic_defect(const Stepper<real>& stepper, const std::vector<real>& q,
 
 template float symplectic_defect(const Stepper<float>&, const std::vector<float>&, const std::vector<float>&);
 template double symplectic_defect(const Stepper<double>&, const std::vector<double>&, const std::vector<double>&);
-template long double symplectic_defect(const Stepper<long double>&, const std::vector<long double>&, const std::vector<long double>&);
-template __float128 symplectic_defect(const Stepper<__float128>&, const std::vector<__float128>&, const std::vector<__float128>&);
+template long double symplectic_defect(const Stepper<long double>&, const std::vector<long double>&,
+                                       const std::vector<long double>&);
+template __float128 symplectic_defect(const Stepper<__float128>&, const std::vector<__float128>&,
+                                      const std::vector<__float128>&);
 
 double DiscreteEnergy::operator()(const double* q, const double* p) const {
     Eigen::VectorXd z(2 * n);
     z << Eigen::Map<const Eigen::VectorXd>(q, n), Eigen::Map<const Eigen::VectorXd>(p, n);
     z -= Eigen::Map<const Eigen::VectorXd>(centre.data(), 2 * n);
-    const Eigen::Map<const Eigen::MatrixXd> matrix(form.data(), 2 * n, 2 * n);  // symmetric: the order of storage does not matter
+    const Eigen::Map<const Eigen::MatrixXd> matrix(form.data(), 2 * n,
+                                                   2 * n);  // symmetric: the order of storage does not matter
     return z.dot(matrix * z);
 }
 

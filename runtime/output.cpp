@@ -23,10 +23,11 @@ namespace lobatto {
 namespace {
 
 [[noreturn]] void fail(const std::string& path, int error) {
-    const char* advice = error == ENOSPC || error == EDQUOT                                    ? ". Free some space, or choose another place with -o"
-                         : error == ENOENT                                                     ? ". Create its folder first, or choose another place with -o"
-                         : error == EACCES || error == EROFS || error == EPERM || error == ENOTDIR || error == EISDIR ? ". Choose another place with -o"
-                                                                                               : "";
+    const char* advice = error == ENOSPC || error == EDQUOT ? ". Free some space, or choose another place with -o"
+                         : error == ENOENT ? ". Create its folder first, or choose another place with -o"
+                         : error == EACCES || error == EROFS || error == EPERM || error == ENOTDIR || error == EISDIR
+                             ? ". Choose another place with -o"
+                             : "";
     throw MachineError(fmt::format("cannot write the trajectory to {}: {}{}", path, std::strerror(error), advice));
 }
 
@@ -44,10 +45,15 @@ int open_locked(const std::string& path) {
             const int error = errno;
             close(descriptor);
             if (error != EWOULDBLOCK) fail(path, error);
-            throw MachineError(fmt::format("cannot write the trajectory to {}: another run is writing it. Wait for it, or choose another place with -o", path));
+            throw MachineError(
+                fmt::format("cannot write the trajectory to {}: another run is writing it. Wait for it, or choose "
+                            "another place with -o",
+                            path));
         }
-        struct stat ours{}, named{};
-        const bool same = fstat(descriptor, &ours) == 0 && stat(path.c_str(), &named) == 0 && ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
+        struct stat ours {
+        }, named{};
+        const bool same = fstat(descriptor, &ours) == 0 && stat(path.c_str(), &named) == 0 &&
+                          ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
         if (same && ftruncate(descriptor, 0) == 0) return descriptor;
         const int error = errno;
         close(descriptor);
@@ -63,19 +69,22 @@ std::string exact_text(double value) {
     return text;
 }
 
-TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header) : path_(path), energy_(header.energy) {
-    struct stat status{};
+TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header)
+    : path_(path), energy_(header.energy) {
+    struct stat status {};
     if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
         partial_ = path_;
         descriptor_ = open(path.c_str(), O_WRONLY | O_CLOEXEC);
         if (descriptor_ < 0) fail(path_, errno);
     } else {
-        const std::unique_ptr<char, void (*)(void*)> target(realpath(path.c_str(), nullptr), std::free);  // through symbolic links
+        const std::unique_ptr<char, void (*)(void*)> target(realpath(path.c_str(), nullptr),
+                                                            std::free);  // through symbolic links
         if (target) path_ = target.get();
         partial_ = path_ + ".partial";
         descriptor_ = open_locked(partial_);
     }
-    text_ = fmt::format("# lobatto trajectory\n# scene: {}\n# method: {}\n# kernel: {}\n", header.scene, header.method, header.kernel);
+    text_ = fmt::format("# lobatto trajectory\n# scene: {}\n# method: {}\n# kernel: {}\n", header.scene, header.method,
+                        header.kernel);
     const char* separator = "# parameters: ";
     for (const auto& [name, value] : header.parameters) {
         text_ += fmt::format("{}{} = {}", separator, name, exact_text(value));
@@ -156,7 +165,8 @@ TrajectoryTable read_trajectory(const std::string& path) {
                 double value = 0;
                 const auto read = std::from_chars(line.data() + begin, line.data() + end, value);
                 if (read.ec != std::errc() || read.ptr != line.data() + end)
-                    throw MachineError(fmt::format("{} is not a trajectory file: '{}' is not a number", path, line.substr(begin, end - begin)));
+                    throw MachineError(fmt::format("{} is not a trajectory file: '{}' is not a number", path,
+                                                   line.substr(begin, end - begin)));
                 table.rows.back().push_back(value);
             }
             begin = end + 1;

@@ -16,13 +16,15 @@ struct TrajectoryHeader {
     std::string method;  // "Lobatto, 4 points, h = 0.05"
     std::string kernel;  // digest
     std::vector<std::pair<std::string, double>> parameters;
-    std::vector<std::pair<std::string, std::string>> columns;  // names and units ("" when unknown): t, q.., p.., and H when it is kept
-    bool energy = true;                                        // whether the last column is H
+    std::vector<std::pair<std::string, std::string>>
+        columns;         // names and units ("" when unknown): t, q.., p.., and H when it is kept
+    bool energy = true;  // whether the last column is H
 };
 
-// The file appears under its name only when `finish` is called. Until then its rows stand in NAME.partial beside it, whole lines written block by block, so
-// that a killed run leaves a readable NAME.partial and an earlier NAME untouched. Two runs cannot write the same file at once. A destination that
-// exists and is no regular file (a pipe, a device) is written to directly.
+// The file appears under its name only when `finish` is called. Until then its rows stand in NAME.partial beside it,
+// whole lines written block by block, so that a killed run leaves a readable NAME.partial and an earlier NAME
+// untouched. Two runs cannot write the same file at once. A destination that exists and is no regular file (a pipe, a
+// device) is written to directly.
 class TrajectoryFile {
 public:
     // All functions throw MachineError, which names the path, when the machine refuses.

@@ -35,8 +35,8 @@ real carlson(real x, real y) {
     X /= mean;
     Y /= mean;
     const real Z = -X - Y, e2 = X * Y - Z * Z, e3 = X * Y * Z;
-    const real series = 1 - e2 / 10 + e3 / 14 + e2 * e2 / 24 - 3 * e2 * e3 / 44 - 5 * e2 * e2 * e2 / 208 + 3 * e3 * e3 / 104 +
-                        e2 * e2 * e3 / 16;
+    const real series = 1 - e2 / 10 + e3 / 14 + e2 * e2 / 24 - 3 * e2 * e3 / 44 - 5 * e2 * e2 * e2 / 208 +
+                        3 * e3 * e3 / 104 + e2 * e2 * e3 / 16;
     return series / std::sqrt(mean);
 }
 
@@ -72,7 +72,9 @@ private:
 };
 
 // value - count * 2 pi, with pi to twice the precision.
-real without_turns(real value, real count) { return std::fma(-count, 2 * pi, value) - count * 2 * pi_rest; }
+real without_turns(real value, real count) {
+    return std::fma(-count, 2 * pi, value) - count * 2 * pi_rest;
+}
 
 // q between the dead points: sin(q/2) = k sn(w t + u0, k), q' = 2 w k cn. `sine` and `rate` are sin(q0/2) and q0'/(2w).
 PhasePoint libration(real omega, real sine, real rate, real complement_squared, real time) {
@@ -107,9 +109,11 @@ PhasePoint harmonic_solution(real omega_squared, real q0, real velocity0, real t
     if (omega_squared == 0) return {q0 + velocity0 * time, velocity0};
     const real omega = std::sqrt(std::fabs(omega_squared)), phase = omega * time;
     if (omega_squared < 0) {
-        return {q0 * std::cosh(phase) + velocity0 / omega * std::sinh(phase), q0 * omega * std::sinh(phase) + velocity0 * std::cosh(phase)};
+        return {q0 * std::cosh(phase) + velocity0 / omega * std::sinh(phase),
+                q0 * omega * std::sinh(phase) + velocity0 * std::cosh(phase)};
     }
-    return {q0 * std::cos(phase) + velocity0 / omega * std::sin(phase), velocity0 * std::cos(phase) - q0 * omega * std::sin(phase)};
+    return {q0 * std::cos(phase) + velocity0 / omega * std::sin(phase),
+            velocity0 * std::cos(phase) - q0 * omega * std::sin(phase)};
 }
 
 PhasePoint pendulum_solution(real omega_squared, real q0, real velocity0, real time) {

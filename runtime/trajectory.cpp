@@ -14,10 +14,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
-constexpr std::int64_t rows_at_once = 4096;   // the records in memory, however long the run
-constexpr double block_seconds = 0.02;        // of a block of steps: an interruption is noticed within about twice this
+constexpr std::int64_t rows_at_once = 4096;  // the records in memory, however long the run
+constexpr double block_seconds = 0.02;       // of a block of steps: an interruption is noticed within about twice this
 constexpr double progress_seconds = 0.1;
 
 // Watches the kept states go by: their energies, and the sink.
@@ -62,7 +64,9 @@ private:
     std::vector<double> q_, p_, energies_;
 };
 
-std::string list(const std::vector<double>& values) { return fmt::format("({:.6g})", fmt::join(values, ", ")); }
+std::string list(const std::vector<double>& values) {
+    return fmt::format("({:.6g})", fmt::join(values, ", "));
+}
 
 }  // namespace
 
@@ -124,32 +128,43 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
         case LOBATTO_OK:
             return {};
         case LOBATTO_NOT_CONVERGED:
-            why = fmt::format("Newton's iteration for the positions inside the step did not converge: its last increment was {:.2g} of the displacement "
-                              "within the step. The step is too long for the forces met there, or the motion runs into a singularity of the potential",
-                              result.increment_failed);
+            why = fmt::format(
+                "Newton's iteration for the positions inside the step did not converge: its last increment was {:.2g} "
+                "of the displacement "
+                "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
+                "of the potential",
+                result.increment_failed);
             advice = smaller + ", or start elsewhere";
             break;
         case LOBATTO_NOT_FINITE:
-            why = "a position or momentum became infinite or not a number. The motion runs into a singularity of the potential or away to infinity, or the "
-                  "step is too long for the method to be stable";
+            why =
+                "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
+                "potential or away to infinity, or the "
+                "step is too long for the method to be stable";
             advice = smaller + ", an earlier end, or start elsewhere";
             break;
         case LOBATTO_SINGULAR_JACOBIAN:
-            why = "the equations for the positions inside the step have no unique solution: their Jacobian is singular. This h meets a resonance of the forces there";
+            why =
+                "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
+                "This h meets a resonance of the forces there";
             advice = smaller + ", or a slightly different one";
             break;
         case LOBATTO_SINGULAR_MASS:
             why = "the mass matrix has no inverse for these parameters, so that momenta do not determine velocities";
-            advice = "other values of the parameters that stand before the squared velocities; none of the masses may vanish";
+            advice =
+                "other values of the parameters that stand before the squared velocities; none of the masses may "
+                "vanish";
             break;
         case LOBATTO_TIME_STANDS_STILL:
-            why = fmt::format("t + h equals t in double precision: h = {:.6g} is below the rounding of t", request.step);
+            why =
+                fmt::format("t + h equals t in double precision: h = {:.6g} is below the rounding of t", request.step);
             advice = "a larger step, or a start time nearer to zero";
             break;
     }
-    const std::string where = result.steps_done == 0
-                                  ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
-                                  : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);
+    const std::string where =
+        result.steps_done == 0
+            ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
+            : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);
     return fmt::format("{}, from q = {}, p = {}: {}. Try {}.", where, list(result.q), list(result.p), why, advice);
 }
 
