@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The variational integrator of a system: discrete Lagrangian, discrete Euler-Lagrange equations, momenta, Jacobian (docs/derivation.md).
+// The variational integrator of a system: discrete Lagrangian, discrete Euler-Lagrange equations, momenta, Jacobian
+// (docs/derivation.md).
 //
-// Assembled from one node's V, grad V and V'' by the sums of the derivation; generator/check differentiates L_d itself and compares.
+// Assembled from one node's V, grad V and V'' by the sums of the derivation; generator/check differentiates L_d itself
+// and compares.
 #include "generator/discretisation.hpp"
 
 #include <string>
@@ -21,7 +23,8 @@ std::string node_name(const System& system, std::size_t k, std::size_t i, const 
 
 Discretisation discretise(const System& system, const Quadrature& quadrature) {
     Discretisation d;
-    const std::size_t n = static_cast<std::size_t>(system.n), s = static_cast<std::size_t>(quadrature.points), m = s - 2;
+    const std::size_t n = static_cast<std::size_t>(system.n), s = static_cast<std::size_t>(quadrature.points),
+                      m = s - 2;
     const auto& [c, b] = std::tie(quadrature.c, quadrature.b);
     const ex h = d.h;
 
@@ -46,16 +49,25 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
         return expression.subs(move, GiNaC::subs_options::no_pattern);
     };
     const auto gradient = [&](std::size_t i, std::size_t k) { return at(system.gradient[k], d.Q[i]); };
-    const auto M = [&](std::size_t k, std::size_t l) { return system.mass(static_cast<unsigned>(k), static_cast<unsigned>(l)); };
+    const auto M = [&](std::size_t k, std::size_t l) {
+        return system.mass(static_cast<unsigned>(k), static_cast<unsigned>(l));
+    };
     const GiNaC::matrix inverse_mass = system.mass.inverse();
     const auto W = [&](std::size_t i, std::size_t k) {  // (M^-1 grad V)_k at node i
         ex sum = 0;
-        for (std::size_t l = 0; l < n; ++l) sum += inverse_mass(static_cast<unsigned>(k), static_cast<unsigned>(l)) * gradient(i, l);
+        for (std::size_t l = 0; l < n; ++l)
+            sum += inverse_mass(static_cast<unsigned>(k), static_cast<unsigned>(l)) * gradient(i, l);
         return sum;
     };
-    const auto K = [&](std::size_t i, std::size_t j) { return quadrature.K(static_cast<unsigned>(i), static_cast<unsigned>(j)); };
-    const auto A = [&](std::size_t i, std::size_t j) { return quadrature.A(static_cast<unsigned>(i), static_cast<unsigned>(j)); };
-    const auto G = [&](std::size_t i, std::size_t j) { return quadrature.G(static_cast<unsigned>(i), static_cast<unsigned>(j)); };
+    const auto K = [&](std::size_t i, std::size_t j) {
+        return quadrature.K(static_cast<unsigned>(i), static_cast<unsigned>(j));
+    };
+    const auto A = [&](std::size_t i, std::size_t j) {
+        return quadrature.A(static_cast<unsigned>(i), static_cast<unsigned>(j));
+    };
+    const auto G = [&](std::size_t i, std::size_t j) {
+        return quadrature.G(static_cast<unsigned>(i), static_cast<unsigned>(j));
+    };
 
     // (D4) L_d = 1/(2h) sum_ij K_ij Q_i^T M Q_j - h sum_i b_i V(Q_i)
     d.L_d = 0;
@@ -77,9 +89,9 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
         for (std::size_t k = 0; k < n; ++k) d.interior.back().push_back(slope(j, k, d.Q));
     }
     for (std::size_t k = 0; k < n; ++k) {
-        d.left_momentum.push_back(-slope(0, k, d.Q));                           // (D6)
-        d.right_momentum.push_back(slope(s - 1, k, d.Q));                       // (D7)
-        d.border.push_back(slope(s - 1, k, d.Q_before) + slope(0, k, d.Q));     // (D8)
+        d.left_momentum.push_back(-slope(0, k, d.Q));                        // (D6)
+        d.right_momentum.push_back(slope(s - 1, k, d.Q));                    // (D7)
+        d.border.push_back(slope(s - 1, k, d.Q_before) + slope(0, k, d.Q));  // (D8)
     }
 
     // (D9) the full system in solved form, and (D10) its Jacobian.
@@ -98,7 +110,8 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
     }
     for (std::size_t k = 0; k < n; ++k) {
         ex equation = d.Q[s - 1][k] - d.Q[0][k];
-        for (std::size_t l = 0; l < n; ++l) equation -= h / 2 * inverse_mass(static_cast<unsigned>(k), static_cast<unsigned>(l)) * (d.p0[l] + d.p1[l]);
+        for (std::size_t l = 0; l < n; ++l)
+            equation -= h / 2 * inverse_mass(static_cast<unsigned>(k), static_cast<unsigned>(l)) * (d.p0[l] + d.p1[l]);
         for (std::size_t i = 0; i < s; ++i) equation -= h * h * b[i] * (c[i] - GiNaC::numeric(1, 2)) * W(i, k);
         d.full_system.push_back(equation);
         d.full_unknowns.push_back(d.Q[s - 1][k]);
@@ -115,7 +128,8 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
     std::vector<GiNaC::symbol> interior_unknowns;
     for (std::size_t k = 0; k < n; ++k) {
         ex v = -h * b[0] * W(0, k);
-        for (std::size_t l = 0; l < n; ++l) v += inverse_mass(static_cast<unsigned>(k), static_cast<unsigned>(l)) * d.p0[l];
+        for (std::size_t l = 0; l < n; ++l)
+            v += inverse_mass(static_cast<unsigned>(k), static_cast<unsigned>(l)) * d.p0[l];
         d.drift_velocity.push_back(v);
     }
     for (std::size_t i = 0; i < m; ++i)

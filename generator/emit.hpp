@@ -14,15 +14,18 @@ struct Derivation;
 
 struct EmitOptions {
     Precision precision = Precision::double_;
-    std::string standalone_support;  // text of runtime/kernel.hpp to carry inside; empty: the header includes "kernel.hpp"
+    std::string
+        standalone_support;  // text of runtime/kernel.hpp to carry inside; empty: the header includes "kernel.hpp"
 };
 
 struct KernelSource {
-    std::string name;      // struct lobatto::kernels::NAME, a C identifier
-    std::string header;    // the whole text of NAME.hpp
-    std::string digest;    // 16 hexadecimal digits of the header's formulas
-    std::string manifest;  // JSON: scene, method, shapes, parameters, structure, operation counts
+    std::string name;                // struct lobatto::kernels::NAME, a C identifier
+    std::string header;              // the whole text of NAME.hpp
+    std::string digest;              // 16 hexadecimal digits of the header's formulas
     std::vector<PassReport> report;  // first row: as derived
 };
+
+// Optimises the programs and writes them out. Throws DomainError when the formulas are real nowhere.
+KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options);
 
 }  // namespace lobatto

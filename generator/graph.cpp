@@ -9,7 +9,9 @@
 
 namespace lobatto {
 
-bool is_rational(const cln::cl_R& value) { return cln::instanceof(value, cln::cl_RA_ring); }
+bool is_rational(const cln::cl_R& value) {
+    return cln:: instanceof (value, cln::cl_RA_ring);
+}
 
 namespace {
 
@@ -54,9 +56,13 @@ Id Graph::input(const Input& input) {
     return place->second;
 }
 
-Id Graph::raw(Op op, std::vector<Id> operands, int index) { return intern({op, Stage::constant, index, std::move(operands)}); }
+Id Graph::raw(Op op, std::vector<Id> operands, int index) {
+    return intern({op, Stage::constant, index, std::move(operands)});
+}
 
-bool Graph::is_number(Id id, long value) const { return is_constant(id) && constant_of(id).value == cln::cl_I(value); }
+bool Graph::is_number(Id id, long value) const {
+    return is_constant(id) && constant_of(id).value == cln::cl_I(value);
+}
 
 bool Graph::is_negative(Id id) const {
     if (is_constant(id)) return cln::minusp(constant_of(id).value);
@@ -86,17 +92,21 @@ Id Graph::add(std::vector<Id> terms) {
         cln::cl_RA coefficient = 1;
         Id rest = term;
         const Node& node = (*this)[term];
-        if (node.op == Op::multiply && is_constant(node.operands.front()) && is_rational(constant_of(node.operands.front()).value)) {
+        if (node.op == Op::multiply && is_constant(node.operands.front()) &&
+            is_rational(constant_of(node.operands.front()).value)) {
             coefficient = cln::the<cln::cl_RA>(constant_of(node.operands.front()).value);
             std::vector<Id> others(node.operands.begin() + 1, node.operands.end());
             rest = others.size() == 1 ? others.front() : intern({Op::multiply, Stage::constant, 0, std::move(others)});
         }
         const auto [known, is_new] = place.emplace(rest, collected.size());
-        if (is_new) collected.emplace_back(rest, coefficient);
-        else collected[known->second].second = collected[known->second].second + coefficient;
+        if (is_new)
+            collected.emplace_back(rest, coefficient);
+        else
+            collected[known->second].second = collected[known->second].second + coefficient;
     }
     std::erase_if(collected, [](const auto& item) { return cln::zerop(item.second); });
-    std::sort(collected.begin(), collected.end(), [this](const auto& x, const auto& y) { return compare(x.first, y.first) < 0; });
+    std::sort(collected.begin(), collected.end(),
+              [this](const auto& x, const auto& y) { return compare(x.first, y.first) < 0; });
     std::vector<Id> operands;
     for (const auto& [rest, coefficient] : collected)
         operands.push_back(coefficient == 1 ? rest : multiply({constant(coefficient), rest}));
@@ -129,18 +139,22 @@ Id Graph::multiply(std::vector<Id> factors) {
         const Id base = node.op == Op::power ? node.operands.front() : factor;
         const int exponent = node.op == Op::power ? node.index : 1;
         const auto [known, is_new] = place.emplace(base, collected.size());
-        if (is_new) collected.emplace_back(base, exponent);
-        else collected[known->second].second += exponent;
+        if (is_new)
+            collected.emplace_back(base, exponent);
+        else
+            collected[known->second].second += exponent;
     }
     if (cln::zerop(coefficient)) return number(0);
     std::erase_if(collected, [](const auto& item) { return item.second == 0; });
-    std::sort(collected.begin(), collected.end(), [this](const auto& x, const auto& y) { return compare(x.first, y.first) < 0; });
+    std::sort(collected.begin(), collected.end(),
+              [this](const auto& x, const auto& y) { return compare(x.first, y.first) < 0; });
     std::vector<Id> operands;
     bool simpler = false;  // sqrt(5)^2 became 5: collect once more
     for (const auto& [base, exponent] : collected) {
         operands.push_back(power(base, exponent));
         const Node& result = (*this)[operands.back()];
-        simpler = simpler || result.op == Op::multiply || (is_constant(operands.back()) && is_rational(constant_of(operands.back()).value));
+        simpler = simpler || result.op == Op::multiply ||
+                  (is_constant(operands.back()) && is_rational(constant_of(operands.back()).value));
     }
     if (simpler) {
         operands.push_back(constant(coefficient));
@@ -180,9 +194,13 @@ Id Graph::power(Id base, int exponent) {
     return intern({Op::power, Stage::constant, exponent, {base}});
 }
 
-Id Graph::function(Op op, Id argument) { return intern({op, Stage::constant, 0, {argument}}); }
+Id Graph::function(Op op, Id argument) {
+    return intern({op, Stage::constant, 0, {argument}});
+}
 
-Id Graph::raise(Id base, Id exponent) { return intern({Op::raise, Stage::constant, 0, {base, exponent}}); }
+Id Graph::raise(Id base, Id exponent) {
+    return intern({Op::raise, Stage::constant, 0, {base, exponent}});
+}
 
 int Graph::compare(Id a, Id b) const {
     if (a == b) return 0;

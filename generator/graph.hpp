@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Hash-consed expression graph in an order of its own: what GiNaC derives, ready for passes and printing.
 //
-// GiNaC orders terms by address, differently in every process. Here every sum and product is sorted by structure (inputs by their declared
-// order), so the same scene gives the same graph, the same text and the same rounding, always.
+// GiNaC orders terms by address, differently in every process. Here every sum and product is sorted by structure
+// (inputs by their declared order), so the same scene gives the same graph, the same text and the same rounding,
+// always.
 #pragma once
 
 #include <cln/real.h>
@@ -20,13 +21,27 @@ namespace lobatto {
 using Id = std::int32_t;
 
 enum class Op : std::uint8_t {
-    constant, input,
+    constant,
+    input,
     power,  // operand ^ integer exponent
-    sqrt, sin, cos, tan, exp, log, sinh, cosh, tanh, asin, acos, atan,
-    sincos_pair,            // sine and cosine of one argument, computed together
-    pair_sine, pair_cosine, // the two halves of a sincos_pair
-    raise,                  // first operand ^ second operand, any real exponent
-    multiply, add           // n-ary
+    sqrt,
+    sin,
+    cos,
+    tan,
+    exp,
+    log,
+    sinh,
+    cosh,
+    tanh,
+    asin,
+    acos,
+    atan,
+    sincos_pair,  // sine and cosine of one argument, computed together
+    pair_sine,
+    pair_cosine,  // the two halves of a sincos_pair
+    raise,        // first operand ^ second operand, any real exponent
+    multiply,
+    add  // n-ary
 };
 
 // When a value is known; of an operation, the maximum over its operands. Hoisting is a partition by stage.
@@ -39,13 +54,15 @@ struct Node {
     std::vector<Id> operands;  // add, multiply: sorted
 };
 
-// A constant: rational when known exactly, else a float of number_digits; how it reads ("sqrt(5)/10") when it is not rational.
+// A constant: rational when known exactly, else a float of number_digits; how it reads ("sqrt(5)/10") when it is not
+// rational.
 struct Constant {
     cln::cl_R value;
     std::string label;
 };
 
-// An input: how C++ reaches it, and how a person names it (in text, and as local name in emitted code when it is an identifier).
+// An input: how C++ reaches it, and how a person names it (in text, and as local name in emitted code when it is an
+// identifier).
 struct Input {
     std::string code;  // q[0]
     std::string name;  // theta
@@ -68,8 +85,8 @@ public:
     Id number(long numerator, long denominator = 1);
     Id input(const Input& input);
 
-    // Operations in canonical form: nested sums and products are flattened, rational constants combined, equal terms and factors
-    // collected, operands sorted.
+    // Operations in canonical form: nested sums and products are flattened, rational constants combined, equal terms
+    // and factors collected, operands sorted.
     Id add(std::vector<Id> terms);
     Id multiply(std::vector<Id> factors);
     Id power(Id base, int exponent);
@@ -79,7 +96,8 @@ public:
     Id subtract(Id x, Id y) { return add({x, negate(y)}); }
     Id divide(Id x, Id y) { return multiply({x, power(y, -1)}); }
 
-    // A node exactly as given, for passes that choose the shape themselves (x * x instead of x^2). Operands keep their order.
+    // A node exactly as given, for passes that choose the shape themselves (x * x instead of x^2). Operands keep their
+    // order.
     Id raw(Op op, std::vector<Id> operands, int index = 0);
 
     // A GiNaC expression, with the inputs that its symbols stand for.
@@ -97,7 +115,8 @@ public:
     // Total order by structure: constants, inputs in order, powers, functions, products, sums. Independent of ids.
     int compare(Id a, Id b) const;
 
-    // Values of all nodes that `roots` need, at inputs (by input index), to number_digits. DomainError when one is not real.
+    // Values of all nodes that `roots` need, at inputs (by input index), to number_digits. DomainError when one is not
+    // real.
     std::vector<cln::cl_R> evaluate(const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots) const;
 
     // The nodes that the roots need, every operand before its user, in an order that depends on structure only.

@@ -12,7 +12,9 @@ namespace {
 
 const cln::float_format_t format = cln::float_format(number_digits);
 
-cln::cl_F real(const cln::cl_R& x) { return cln::cl_float(x, format); }
+cln::cl_F real(const cln::cl_R& x) {
+    return cln::cl_float(x, format);
+}
 
 cln::cl_R real_part_of(const cln::cl_N& z, const char* what) {
     if (!cln::zerop(cln::imagpart(z))) throw DomainError(std::string(what) + " of a value outside its domain");
@@ -20,9 +22,10 @@ cln::cl_R real_part_of(const cln::cl_N& z, const char* what) {
 }
 
 std::optional<Op> function_op(const std::string& name) {
-    static const std::map<std::string, Op> ops = {{"sin", Op::sin},   {"cos", Op::cos},   {"tan", Op::tan},   {"exp", Op::exp},
-                                                  {"log", Op::log},   {"sinh", Op::sinh}, {"cosh", Op::cosh}, {"tanh", Op::tanh},
-                                                  {"asin", Op::asin}, {"acos", Op::acos}, {"atan", Op::atan}};
+    static const std::map<std::string, Op> ops = {{"sin", Op::sin},   {"cos", Op::cos},   {"tan", Op::tan},
+                                                  {"exp", Op::exp},   {"log", Op::log},   {"sinh", Op::sinh},
+                                                  {"cosh", Op::cosh}, {"tanh", Op::tanh}, {"asin", Op::asin},
+                                                  {"acos", Op::acos}, {"atan", Op::atan}};
     const auto found = ops.find(name);
     return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
 }
@@ -50,24 +53,39 @@ cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
             if (is_rational(x[0]) && cln::sqrtp(cln::the<cln::cl_RA>(x[0]), &root)) return root;
             return cln::sqrt(real(x[0]));
         }
-        case Op::sin: case Op::pair_sine: return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sin(real(x[0])));
-        case Op::cos: case Op::pair_cosine: return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cos(real(x[0])));
-        case Op::sincos_pair: return x[0];  // carries its argument; the halves above evaluate it
-        case Op::tan: return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tan(real(x[0])));
-        case Op::exp: return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::exp(real(x[0])));
+        case Op::sin:
+        case Op::pair_sine:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sin(real(x[0])));
+        case Op::cos:
+        case Op::pair_cosine:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cos(real(x[0])));
+        case Op::sincos_pair:
+            return x[0];  // carries its argument; the halves above evaluate it
+        case Op::tan:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tan(real(x[0])));
+        case Op::exp:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::exp(real(x[0])));
         case Op::log:
             if (!cln::plusp(x[0])) throw DomainError("logarithm of a number that is not positive");
             return x[0] == 1 ? cln::cl_R(0) : cln::cl_R(cln::ln(real(x[0])));
-        case Op::sinh: return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sinh(real(x[0])));
-        case Op::cosh: return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cosh(real(x[0])));
-        case Op::tanh: return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tanh(real(x[0])));
-        case Op::asin: return cln::zerop(x[0]) ? cln::cl_R(0) : real_part_of(cln::asin(real(x[0])), "asin");
-        case Op::acos: return real_part_of(cln::acos(real(x[0])), "acos");
-        case Op::atan: return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
+        case Op::sinh:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sinh(real(x[0])));
+        case Op::cosh:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cosh(real(x[0])));
+        case Op::tanh:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tanh(real(x[0])));
+        case Op::asin:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : real_part_of(cln::asin(real(x[0])), "asin");
+        case Op::acos:
+            return real_part_of(cln::acos(real(x[0])), "acos");
+        case Op::atan:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
         case Op::raise:
             if (!cln::plusp(x[0])) throw DomainError("real power of a number that is not positive");
             return cln::exp(real(x[1]) * cln::ln(real(x[0])));
-        case Op::constant: case Op::input: break;
+        case Op::constant:
+        case Op::input:
+            break;
     }
     throw std::logic_error("apply: not an operation");
 }
@@ -102,7 +120,8 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
             id = constant(cln::the<cln::cl_R>(value.to_cl_N()));
         } else if (GiNaC::is_a<GiNaC::symbol>(e)) {
             const auto place = inputs.find(e);
-            if (place == inputs.end()) throw std::logic_error("a symbol without input: " + GiNaC::ex_to<GiNaC::symbol>(e).get_name());
+            if (place == inputs.end())
+                throw std::logic_error("a symbol without input: " + GiNaC::ex_to<GiNaC::symbol>(e).get_name());
             id = static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(place->second).to_int());
         } else if (e.is_equal(GiNaC::Pi)) {
             id = constant(cln::pi(format), "pi");

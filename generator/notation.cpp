@@ -29,19 +29,34 @@ std::string integer_text(const cln::cl_I& value) {
 
 std::string_view function_name(Op op) {
     switch (op) {
-        case Op::sqrt: return "sqrt";
-        case Op::sin: case Op::pair_sine: return "sin";
-        case Op::cos: case Op::pair_cosine: return "cos";
-        case Op::tan: return "tan";
-        case Op::exp: return "exp";
-        case Op::log: return "log";
-        case Op::sinh: return "sinh";
-        case Op::cosh: return "cosh";
-        case Op::tanh: return "tanh";
-        case Op::asin: return "asin";
-        case Op::acos: return "acos";
-        case Op::atan: return "atan";
-        default: return "";
+        case Op::sqrt:
+            return "sqrt";
+        case Op::sin:
+        case Op::pair_sine:
+            return "sin";
+        case Op::cos:
+        case Op::pair_cosine:
+            return "cos";
+        case Op::tan:
+            return "tan";
+        case Op::exp:
+            return "exp";
+        case Op::log:
+            return "log";
+        case Op::sinh:
+            return "sinh";
+        case Op::cosh:
+            return "cosh";
+        case Op::tanh:
+            return "tanh";
+        case Op::asin:
+            return "asin";
+        case Op::acos:
+            return "acos";
+        case Op::atan:
+            return "atan";
+        default:
+            return "";
     }
 }
 
@@ -57,16 +72,23 @@ public:
         }
         const Node& node = graph_[id];
         switch (node.op) {
-            case Op::constant: return constant(id);
+            case Op::constant:
+                return constant(id);
             case Op::input: {
                 const Input& input = graph_.input_of(id);
-                return {notation_ == Notation::cpp ? input.code : notation_ == Notation::latex ? latex_name(input.name) : input.name, atom};
+                return {notation_ == Notation::cpp     ? input.code
+                        : notation_ == Notation::latex ? latex_name(input.name)
+                                                       : input.name,
+                        atom};
             }
-            case Op::add: return addition(node);
-            case Op::multiply: return fraction(node.operands);
+            case Op::add:
+                return addition(node);
+            case Op::multiply:
+                return fraction(node.operands);
             case Op::power:
                 if (node.index < 0) return fraction({id});
-                if (notation_ == Notation::cpp) throw std::logic_error("C++ has no power operator: expand powers first");
+                if (notation_ == Notation::cpp)
+                    throw std::logic_error("C++ has no power operator: expand powers first");
                 return raised(node.operands[0], std::to_string(node.index));
             case Op::raise:
                 if (notation_ == Notation::cpp) return {call("pow", node.operands), atom};
@@ -74,18 +96,25 @@ public:
             case Op::sqrt:
                 if (notation_ == Notation::latex) return {"\\sqrt{" + print(node.operands[0]).text + "}", atom};
                 return {call("sqrt", node.operands), atom};
-            case Op::sincos_pair: return print(node.operands[0]);
-            case Op::pair_sine: case Op::pair_cosine:
+            case Op::sincos_pair:
+                return print(node.operands[0]);
+            case Op::pair_sine:
+            case Op::pair_cosine:
                 return {call(function_name(node.op), graph_[node.operands[0]].operands), atom};
-            default: return {call(function_name(node.op), node.operands), atom};
+            default:
+                return {call(function_name(node.op), node.operands), atom};
         }
     }
 
 private:
     std::string call(std::string_view name, const std::vector<Id>& operands) const {
         if (notation_ == Notation::latex)
-            return "\\" + std::string(name == "asin" ? "arcsin" : name == "acos" ? "arccos" : name == "atan" ? "arctan" : name) + "\\left(" +
-                   print(operands[0]).text + "\\right)";
+            return "\\" +
+                   std::string(name == "asin"   ? "arcsin"
+                               : name == "acos" ? "arccos"
+                               : name == "atan" ? "arctan"
+                                                : name) +
+                   "\\left(" + print(operands[0]).text + "\\right)";
         std::string text(name);
         if (notation_ == Notation::cpp) text.insert(0, "lobatto::");
         text += "(" + print(operands[0]).text;
@@ -124,7 +153,8 @@ private:
         if (notation_ == Notation::cpp) return {literal(c.value), cln::minusp(c.value) ? sign : atom};
         if (is_rational(c.value)) return fraction({id});
         if (c.label == "pi") return {notation_ == Notation::latex ? "\\pi" : "pi", atom};
-        return {c.label.empty() ? decimal(c.value, 17) : c.label, c.label.find_first_of("+- ") == std::string::npos ? power : sum};
+        return {c.label.empty() ? decimal(c.value, 17) : c.label,
+                c.label.find_first_of("+- ") == std::string::npos ? power : sum};
     }
 
     Printed addition(const Node& node) const {
@@ -132,8 +162,10 @@ private:
         for (const Id term : node.operands) {
             const bool named = naming_ && !naming_(term).empty();
             std::string printed = enclosed(print(term), product);
-            if (!text.empty() && !named && printed.front() == '-') text += " - " + printed.substr(1);
-            else text += (text.empty() ? "" : " + ") + printed;
+            if (!text.empty() && !named && printed.front() == '-')
+                text += " - " + printed.substr(1);
+            else
+                text += (text.empty() ? "" : " + ") + printed;
         }
         return {text, sum};
     }
@@ -146,7 +178,8 @@ private:
         for (const Id factor : factors) {
             const Node& node = graph_[factor];
             const bool named = naming_ && factors.size() > 1 && !naming_(factor).empty();
-            if (!named && node.op == Op::constant && (notation_ == Notation::cpp || is_rational(graph_.constant_of(factor).value))) {
+            if (!named && node.op == Op::constant &&
+                (notation_ == Notation::cpp || is_rational(graph_.constant_of(factor).value))) {
                 cln::cl_R value = graph_.constant_of(factor).value;
                 if (cln::minusp(value)) {
                     negative = !negative;
@@ -156,21 +189,30 @@ private:
                     if (value != 1 || factors.size() == 1) above.push_back(literal(value));
                 } else {
                     const cln::cl_RA rational = cln::the<cln::cl_RA>(value);
-                    if (cln::numerator(rational) != 1 || factors.size() == 1) above.push_back(integer_text(cln::numerator(rational)));
+                    if (cln::numerator(rational) != 1 || factors.size() == 1)
+                        above.push_back(integer_text(cln::numerator(rational)));
                     if (cln::denominator(rational) != 1) below.push_back(integer_text(cln::denominator(rational)));
                 }
             } else if (!named && node.op == Op::power && node.index < 0) {
-                if (notation_ == Notation::cpp) below.push_back(enclosed(print(node.operands[0]), atom));
-                else below.push_back(node.index == -1 ? enclosed(print(node.operands[0]), power) : raised(node.operands[0], std::to_string(-node.index)).text);
+                if (notation_ == Notation::cpp)
+                    below.push_back(enclosed(print(node.operands[0]), atom));
+                else
+                    below.push_back(node.index == -1 ? enclosed(print(node.operands[0]), power)
+                                                     : raised(node.operands[0], std::to_string(-node.index)).text);
             } else {
                 above.push_back(enclosed(print(factor), factors.size() == 1 ? sum : power));
             }
         }
         if (above.size() == 1 && above.front() == "1" && !below.empty()) above.clear();
         const std::string minus = negative ? "-" : "";
-        if (below.empty()) return {minus + joined(above), negative ? (above.size() > 1 ? product : sign) : above.size() > 1 ? product : notation_ == Notation::cpp || factors.size() == 1 ? atom : power};
+        if (below.empty())
+            return {minus + joined(above), negative           ? (above.size() > 1 ? product : sign)
+                                           : above.size() > 1 ? product
+                                           : notation_ == Notation::cpp || factors.size() == 1 ? atom
+                                                                                               : power};
         const std::string one = notation_ == Notation::cpp ? literal(1) : "1";
-        if (notation_ == Notation::latex) return {minus + "\\frac{" + (above.empty() ? one : joined(above)) + "}{" + joined(below) + "}", product};
+        if (notation_ == Notation::latex)
+            return {minus + "\\frac{" + (above.empty() ? one : joined(above)) + "}{" + joined(below) + "}", product};
         return {minus + (above.empty() ? one : joined(above)) + (notation_ == Notation::cpp ? " / " : "/") +
                     (below.size() == 1 ? below.front() : "(" + joined(below) + ")"),
                 product};
@@ -179,7 +221,8 @@ private:
     std::string joined(const std::vector<std::string>& factors) const {
         std::string text;
         for (const auto& factor : factors) {
-            if (!text.empty()) text += notation_ == Notation::cpp ? " * " : notation_ == Notation::latex ? " \\, " : "*";
+            if (!text.empty())
+                text += notation_ == Notation::cpp ? " * " : notation_ == Notation::latex ? " \\, " : "*";
             text += factor;
         }
         return text.empty() ? "1" : text;
@@ -206,18 +249,26 @@ std::string decimal(const cln::cl_R& value, int digits) {
     if (cln::zerop(value)) return "0";
     const cln::cl_RA magnitude = cln::rational(cln::abs(value));
     // value = integer * 10^scale with `digits` digits: the exponent is guessed from the logarithm, then corrected.
-    int scale = static_cast<int>(cln::cl_I_to_long(cln::floor1(cln::ln(cln::cl_float(magnitude, cln::float_format(20))) / cln::ln(cln::cl_float(10, cln::float_format(20)))))) - digits + 1;
+    int scale =
+        static_cast<int>(cln::cl_I_to_long(cln::floor1(cln::ln(cln::cl_float(magnitude, cln::float_format(20))) /
+                                                       cln::ln(cln::cl_float(10, cln::float_format(20)))))) -
+        digits + 1;
     cln::cl_I integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -scale));
-    while (integer >= cln::expt_pos(cln::cl_I(10), digits)) integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -(++scale)));
-    while (integer < cln::expt_pos(cln::cl_I(10), digits - 1)) integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -(--scale)));
+    while (integer >= cln::expt_pos(cln::cl_I(10), digits))
+        integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -(++scale)));
+    while (integer < cln::expt_pos(cln::cl_I(10), digits - 1))
+        integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -(--scale)));
     std::string text = integer_text(integer);
     const int exponent = scale + digits - 1;
     text.erase(text.find_last_not_of('0') + 1);
     const int count = static_cast<int>(text.size());
     if (exponent >= -4 && exponent < digits) {
-        if (exponent < 0) text = "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + text;
-        else if (count <= exponent + 1) text += std::string(static_cast<std::size_t>(exponent + 1 - count), '0');
-        else text.insert(static_cast<std::size_t>(exponent) + 1, ".");
+        if (exponent < 0)
+            text = "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + text;
+        else if (count <= exponent + 1)
+            text += std::string(static_cast<std::size_t>(exponent + 1 - count), '0');
+        else
+            text.insert(static_cast<std::size_t>(exponent) + 1, ".");
     } else {
         if (count > 1) text.insert(1, ".");
         text += "e" + std::to_string(exponent);
@@ -237,8 +288,10 @@ std::string canonical_text(const GiNaC::ex& expression, Notation notation) {
 std::string latex_name(const std::string& name) {
     static const std::map<std::string, std::string> greek = [] {
         std::map<std::string, std::string> names;
-        for (const char* letter : {"alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu", "xi", "rho",
-                                   "sigma", "tau", "phi", "chi", "psi", "omega", "Gamma", "Delta", "Theta", "Lambda", "Xi", "Pi", "Sigma", "Phi", "Psi", "Omega"})
+        for (const char* letter :
+             {"alpha", "beta",  "gamma",  "delta", "epsilon", "zeta",  "eta", "theta", "iota", "kappa", "lambda",
+              "mu",    "nu",    "xi",     "rho",   "sigma",   "tau",   "phi", "chi",   "psi",  "omega", "Gamma",
+              "Delta", "Theta", "Lambda", "Xi",    "Pi",      "Sigma", "Phi", "Psi",   "Omega"})
             names.emplace(letter, std::string("\\") + letter);
         return names;
     }();
@@ -255,8 +308,10 @@ std::string latex_name(const std::string& name) {
             stem.erase(digits);
         }
     }
-    if (const auto letter = greek.find(stem); letter != greek.end()) stem = letter->second;
-    else if (stem.size() > 1) stem = "\\mathrm{" + stem + "}";
+    if (const auto letter = greek.find(stem); letter != greek.end())
+        stem = letter->second;
+    else if (stem.size() > 1)
+        stem = "\\mathrm{" + stem + "}";
     if (velocity) stem = "\\dot{" + stem + "}";
     if (!subscript.empty()) {
         std::string safe;

@@ -36,9 +36,12 @@ Programs rewrite(const Programs& before, const Rule& rule) {
         std::vector<Id> operands;
         for (const Id operand : node.operands) operands.push_back(image[static_cast<std::size_t>(operand)]);
         Id& result = image[static_cast<std::size_t>(id)];
-        if (node.op == Op::constant) result = after.graph.constant(before.graph.constant_of(id).value, before.graph.constant_of(id).label);
-        else if (node.op == Op::input) result = after.graph.input(before.graph.input_of(id));
-        else result = rule(after.graph, before.graph, id, std::move(operands));
+        if (node.op == Op::constant)
+            result = after.graph.constant(before.graph.constant_of(id).value, before.graph.constant_of(id).label);
+        else if (node.op == Op::input)
+            result = after.graph.input(before.graph.input_of(id));
+        else
+            result = rule(after.graph, before.graph, id, std::move(operands));
     }
     after.programs = before.programs;
     for (Program& program : after.programs)
@@ -47,9 +50,12 @@ Programs rewrite(const Programs& before, const Rule& rule) {
     return after;
 }
 
-Id same(Graph& graph, const Node& node, std::vector<Id> operands) { return graph.raw(node.op, std::move(operands), node.index); }
+Id same(Graph& graph, const Node& node, std::vector<Id> operands) {
+    return graph.raw(node.op, std::move(operands), node.index);
+}
 
-// ---- fold constants: whatever depends on numbers only becomes a number of 60 digits; its formula stays as label -----------------------
+// ---- fold constants: whatever depends on numbers only becomes a number of 60 digits; its formula stays as label
+// -----------------------
 
 Programs fold_constants(const Programs& programs) {
     Graph scratch = programs.graph;  // to print the formulas that vanish
@@ -66,23 +72,32 @@ Programs fold_constants(const Programs& programs) {
         }
         const bool n_ary = node.op == Op::add || node.op == Op::multiply;
         if (numbers.empty() || (!n_ary && !others.empty())) return same(graph, node, std::move(operands));
-        if (n_ary && numbers.size() == 1) return node.op == Op::add ? graph.add(std::move(operands)) : graph.multiply(std::move(operands));
+        if (n_ary && numbers.size() == 1)
+            return node.op == Op::add ? graph.add(std::move(operands)) : graph.multiply(std::move(operands));
         std::vector<cln::cl_R> values;
         for (const Id number : numbers) values.push_back(graph.constant_of(number).value);
         const cln::cl_R value = apply(node.op, node.index, values);
         std::string label;
         if (!is_rational(value)) label = formula(scratch, scratch.raw(node.op, printed, node.index), Notation::text);
         others.push_back(graph.constant(value, label));
-        return node.op == Op::add ? graph.add(std::move(others)) : node.op == Op::multiply ? graph.multiply(std::move(others)) : others.front();
+        return node.op == Op::add        ? graph.add(std::move(others))
+               : node.op == Op::multiply ? graph.multiply(std::move(others))
+                                         : others.front();
     });
 }
 
-// ---- factor sums (Horner): a x^3 + b x^2 + c x = x (c + x (b + a x)) -----------------------------------------------------------------
+// ---- factor sums (Horner): a x^3 + b x^2 + c x = x (c + x (b + a x))
+// -----------------------------------------------------------------
 
-// A factor is taken out only of terms that are known no earlier than the factor itself: coefficients of an earlier stage are hoisted for free.
+// A factor is taken out only of terms that are known no earlier than the factor itself: coefficients of an earlier
+// stage are hoisted for free.
 Id horner(Graph& graph, const std::vector<Id>& terms) {
-    const auto factors_of = [&graph](Id term) { return graph[term].op == Op::multiply ? graph[term].operands : std::vector<Id>{term}; };
-    const auto base_of = [&graph](Id factor) { return graph[factor].op == Op::power && graph[factor].index > 0 ? graph[factor].operands[0] : factor; };
+    const auto factors_of = [&graph](Id term) {
+        return graph[term].op == Op::multiply ? graph[term].operands : std::vector<Id>{term};
+    };
+    const auto base_of = [&graph](Id factor) {
+        return graph[factor].op == Op::power && graph[factor].index > 0 ? graph[factor].operands[0] : factor;
+    };
     std::vector<std::pair<Id, std::vector<std::size_t>>> uses;  // base -> terms, in order of first appearance
     for (std::size_t t = 0; t < terms.size(); ++t)
         for (const Id factor : factors_of(terms[t])) {
@@ -93,7 +108,8 @@ Id horner(Graph& graph, const std::vector<Id>& terms) {
             if (use == uses.end()) use = uses.insert(uses.end(), {base, {}});
             use->second.push_back(t);
         }
-    const auto best = std::max_element(uses.begin(), uses.end(), [](const auto& x, const auto& y) { return x.second.size() < y.second.size(); });
+    const auto best = std::max_element(uses.begin(), uses.end(),
+                                       [](const auto& x, const auto& y) { return x.second.size() < y.second.size(); });
     if (best == uses.end() || best->second.size() < 2) return graph.add(terms);
     std::vector<Id> inside, outside;
     for (std::size_t t = 0, next = 0; t < terms.size(); ++t) {
@@ -108,8 +124,10 @@ Id horner(Graph& graph, const std::vector<Id>& terms) {
     if (outside.empty()) return product;
     const Id rest = outside.size() == 1 ? outside.front() : horner(graph, outside);
     std::vector<Id> sum{product};
-    if (graph[rest].op == Op::add) sum.insert(sum.end(), graph[rest].operands.begin(), graph[rest].operands.end());
-    else sum.push_back(rest);
+    if (graph[rest].op == Op::add)
+        sum.insert(sum.end(), graph[rest].operands.begin(), graph[rest].operands.end());
+    else
+        sum.push_back(rest);
     return graph.raw(Op::add, std::move(sum));
 }
 
@@ -119,7 +137,8 @@ Programs factor_sums(const Programs& programs) {
     });
 }
 
-// ---- powers by multiplication -----------------------------------------------------------------------------------------------------------
+// ---- powers by multiplication
+// -----------------------------------------------------------------------------------------------------------
 
 Id raised(Graph& graph, Id base, int exponent) {
     if (exponent == 1) return base;
@@ -134,11 +153,13 @@ Id raised(Graph& graph, Id base, int exponent) {
 Programs multiply_powers(const Programs& programs) {
     return rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
-        return node.op == Op::power ? raised(graph, operands.front(), node.index) : same(graph, node, std::move(operands));
+        return node.op == Op::power ? raised(graph, operands.front(), node.index)
+                                    : same(graph, node, std::move(operands));
     });
 }
 
-// ---- stages: the operands known first are combined first, so that their part can be hoisted ---------------------------------------------
+// ---- stages: the operands known first are combined first, so that their part can be hoisted
+// ---------------------------------------------
 
 Programs group_by_stage(const Programs& programs) {
     return rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
@@ -158,11 +179,14 @@ Programs group_by_stage(const Programs& programs) {
     });
 }
 
-// ---- share: operand pairs that several sums or products contain are computed once --------------------------------------------------------
+// ---- share: operand pairs that several sums or products contain are computed once
+// --------------------------------------------------------
 
 Programs share_pairs(const Programs& programs) {
     // Sums and products of the graph as operand lists, rewritten in place; extracted pairs become new nodes of `graph`.
-    Programs work = rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) { return same(graph, before[id], std::move(operands)); });
+    Programs work = rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        return same(graph, before[id], std::move(operands));
+    });
     Graph& graph = work.graph;
     const std::vector<Id> order = graph.topological(roots_of(work));
     std::map<Id, std::vector<Id>> lists;
@@ -189,7 +213,8 @@ Programs share_pairs(const Programs& programs) {
         std::size_t most = 1;
         for (const auto& [pair, ids] : users) {
             // A pair that is a whole node already gains nothing unless a longer list contains it.
-            const bool in_longer = std::any_of(ids.begin(), ids.end(), [&lists](Id id) { return lists[id].size() > 2; });
+            const bool in_longer =
+                std::any_of(ids.begin(), ids.end(), [&lists](Id id) { return lists[id].size() > 2; });
             if (in_longer && ids.size() > most) {
                 most = ids.size();
                 best = &pair;
@@ -206,13 +231,15 @@ Programs share_pairs(const Programs& programs) {
         const Id shared = graph.raw(op, pair);
         for (const Id id : ids) {
             std::vector<Id>& operands = lists[id];
-            if (operands.size() == 2) continue;  // is the pair itself, in this order or the other: merged below by rewriting
+            if (operands.size() == 2)
+                continue;  // is the pair itself, in this order or the other: merged below by rewriting
             operands.erase(std::find(operands.begin(), operands.end(), low));
             operands.erase(std::find(operands.begin(), operands.end(), high));
             operands.insert(operands.begin(), shared);
         }
         for (const Id id : ids)
-            if (lists[id].size() == 2 && id != shared && lists[id] != std::vector<Id>{shared} && std::minmax(lists[id][0], lists[id][1]) == std::minmax(low, high))
+            if (lists[id].size() == 2 && id != shared && lists[id] != std::vector<Id>{shared} &&
+                std::minmax(lists[id][0], lists[id][1]) == std::minmax(low, high))
                 lists[id] = {shared};
         lists[shared] = pair;
     }
@@ -233,7 +260,8 @@ Programs share_pairs(const Programs& programs) {
             const std::vector<Id> sources = list == lists.end() ? node.operands : list->second;
             std::vector<Id> operands;
             for (const Id source : sources) operands.push_back(build(source));
-            built = list != lists.end() && operands.size() == 1 ? operands.front() : result.graph.raw(node.op, operands, node.index);
+            built = list != lists.end() && operands.size() == 1 ? operands.front()
+                                                                : result.graph.raw(node.op, operands, node.index);
         }
         return image[id] = built;
     };
@@ -244,7 +272,8 @@ Programs share_pairs(const Programs& programs) {
     return result;
 }
 
-// ---- sine and cosine of one argument as a pair -------------------------------------------------------------------------------------------
+// ---- sine and cosine of one argument as a pair
+// -------------------------------------------------------------------------------------------
 
 Programs pair_sines(const Programs& programs) {
     std::set<Id> sines, cosines;  // arguments, in the graph before
@@ -255,13 +284,15 @@ Programs pair_sines(const Programs& programs) {
     return rewrite(programs, [&](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
         const bool trigonometric = node.op == Op::sin || node.op == Op::cos;
-        if (!trigonometric || !sines.contains(node.operands[0]) || !cosines.contains(node.operands[0])) return same(graph, node, std::move(operands));
+        if (!trigonometric || !sines.contains(node.operands[0]) || !cosines.contains(node.operands[0]))
+            return same(graph, node, std::move(operands));
         const Id pair = graph.raw(Op::sincos_pair, std::move(operands));
         return graph.raw(node.op == Op::sin ? Op::pair_sine : Op::pair_cosine, {pair});
     });
 }
 
-// ---- the check ---------------------------------------------------------------------------------------------------------------------------
+// ---- the check
+// ---------------------------------------------------------------------------------------------------------------------------
 
 // Seeded sample values: the same on every machine.
 class Samples {
@@ -270,7 +301,9 @@ public:
     cln::cl_R next() {
         state_ = state_ * 6364136223846793005u + 1442695040888963407u;
         const auto bits = static_cast<unsigned long>(state_ >> 34);  // 30 bits
-        return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 7 + 1) / cln::cl_I(1ul << 33), cln::float_format(number_digits)) + cln::cl_RA("1/16");
+        return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 7 + 1) / cln::cl_I(1ul << 33),
+                             cln::float_format(number_digits)) +
+               cln::cl_RA("1/16");
     }
 
 private:
@@ -285,7 +318,8 @@ std::optional<std::vector<cln::cl_R>> outputs_at(const Programs& programs, std::
     try {
         std::vector<cln::cl_R> values = programs.graph.evaluate(inputs, roots_of(programs)), outputs;
         for (const Program& program : programs.programs)
-            for (const Output& output : program.outputs) outputs.push_back(values[static_cast<std::size_t>(output.value)]);
+            for (const Output& output : program.outputs)
+                outputs.push_back(values[static_cast<std::size_t>(output.value)]);
         return outputs;
     } catch (const DomainError&) {
         return std::nullopt;
@@ -315,14 +349,23 @@ Operations count(const Graph& graph, const std::vector<Id>& nodes) {
             return graph[operand].op == Op::power && graph[operand].index < 0 && graph[operand].stage == node.stage;
         };
         switch (node.op) {
-            case Op::constant: case Op::input: case Op::pair_sine: case Op::pair_cosine: break;
-            case Op::add: operations.additions += static_cast<long>(node.operands.size()) - 1; break;
+            case Op::constant:
+            case Op::input:
+            case Op::pair_sine:
+            case Op::pair_cosine:
+                break;
+            case Op::add:
+                operations.additions += static_cast<long>(node.operands.size()) - 1;
+                break;
             case Op::multiply: {
-                // Numerator and denominator are products of their own; a reciprocal turns its multiplication into the division counted with it.
+                // Numerator and denominator are products of their own; a reciprocal turns its multiplication into the
+                // division counted with it.
                 long factors = 0, reciprocals = 0;
                 for (const Id operand : node.operands) {
-                    if (is_reciprocal(operand)) ++reciprocals;
-                    else if (!graph.is_number(operand, 1) && !graph.is_number(operand, -1)) ++factors;
+                    if (is_reciprocal(operand))
+                        ++reciprocals;
+                    else if (!graph.is_number(operand, 1) && !graph.is_number(operand, -1))
+                        ++factors;
                 }
                 operations.multiplications += std::max(factors - 1, 0L) + std::max(reciprocals - 1, 0L);
                 operations.divisions += reciprocals > 0 ? 1 - reciprocals : 0;
@@ -332,7 +375,9 @@ Operations count(const Graph& graph, const std::vector<Id>& nodes) {
                 operations.multiplications += std::abs(node.index) - 1;
                 operations.divisions += node.index < 0 ? 1 : 0;
                 break;
-            default: ++operations.functions; break;
+            default:
+                ++operations.functions;
+                break;
         }
     }
     return operations;
@@ -352,8 +397,10 @@ Operations count(const Programs& programs) {
         std::vector<Id> roots, here;
         for (const Output& output : program.outputs) roots.push_back(output.value);
         for (const Id id : programs.graph.topological(roots)) {
-            if (programs.graph[id].stage <= Stage::step_size) hoisted.insert(id);
-            else here.push_back(id);
+            if (programs.graph[id].stage <= Stage::step_size)
+                hoisted.insert(id);
+            else
+                here.push_back(id);
         }
         accumulate(here);
     }
@@ -377,7 +424,8 @@ std::vector<PassReport> optimise(Programs& programs) {
     std::vector<std::pair<std::uint64_t, std::vector<cln::cl_R>>> expected;
     for (std::uint64_t seed = 1; seed <= 100 && expected.size() < 2; ++seed)
         if (auto values = outputs_at(programs, seed)) expected.emplace_back(seed, std::move(*values));
-    if (expected.empty()) throw DomainError("the formulas of this scene have no real value at any of a hundred sample points");
+    if (expected.empty())
+        throw DomainError("the formulas of this scene have no real value at any of a hundred sample points");
 
     std::vector<PassReport> reports{{"as derived", count(programs), 0}};
     for (const Pass& pass : passes) {
@@ -388,8 +436,10 @@ std::vector<PassReport> optimise(Programs& programs) {
             report.disagreement = std::max(report.disagreement, now ? disagreement(values, *now) : 1.0);
         }
         if (!(report.disagreement < 1e-40)) throw std::logic_error("the pass '" + report.pass + "' changed a value");
-        if (pass.only_if_cheaper && report.after.total() >= reports.back().after.total()) report.after = reports.back().after;
-        else programs = std::move(result);
+        if (pass.only_if_cheaper && report.after.total() >= reports.back().after.total())
+            report.after = reports.back().after;
+        else
+            programs = std::move(result);
         reports.push_back(report);
     }
     return reports;

@@ -21,15 +21,16 @@ struct Program {
     std::vector<Output> outputs;
 };
 
-// All programs of a kernel over one graph, so that what they hoist is shared; and names for values that deserve one when hoisted.
+// All programs of a kernel over one graph, so that what they hoist is shared; and names for values that deserve one
+// when hoisted.
 struct Programs {
     Graph graph;
     std::vector<Program> programs;
     std::vector<std::pair<Id, std::string>> names;  // value -> identifier
 };
 
-// Operations of one evaluation of every program (a value that two programs need counts in both; values of stage constant are free,
-// values hoisted to parameters and step size count once).
+// Operations of one evaluation of every program (a value that two programs need counts in both; values of stage
+// constant are free, values hoisted to parameters and step size count once).
 struct Operations {
     long additions = 0, multiplications = 0, divisions = 0, functions = 0;
     long total() const { return additions + multiplications + divisions + functions; }
@@ -38,7 +39,7 @@ Operations count(const Programs& programs);
 Operations count(const Graph& graph, const std::vector<Id>& nodes);
 
 struct PassReport {
-    std::string pass;         // "fold constants"
+    std::string pass;  // "fold constants"
     Operations after;
     double disagreement = 0;  // largest relative difference to the graph before the pass, at seeded points
 };

@@ -17,11 +17,16 @@ std::vector<Surd> nodes(int points) {
     const Surd half(numeric(1, 2));
     const Surd sqrt5(0, numeric(1, 10), 5), sqrt21(0, numeric(1, 14), 21);
     switch (points) {
-        case 2: return {Surd(0), Surd(1)};
-        case 3: return {Surd(0), half, Surd(1)};
-        case 4: return {Surd(0), half - sqrt5, half + sqrt5, Surd(1)};
-        case 5: return {Surd(0), half - sqrt21, half, half + sqrt21, Surd(1)};
-        default: throw std::invalid_argument("Lobatto quadrature is exact here with 2 to 5 points");
+        case 2:
+            return {Surd(0), Surd(1)};
+        case 3:
+            return {Surd(0), half, Surd(1)};
+        case 4:
+            return {Surd(0), half - sqrt5, half + sqrt5, Surd(1)};
+        case 5:
+            return {Surd(0), half - sqrt21, half, half + sqrt21, Surd(1)};
+        default:
+            throw std::invalid_argument("Lobatto quadrature is exact here with 2 to 5 points");
     }
 }
 
@@ -62,7 +67,8 @@ Surd integral(const std::vector<Surd>& polynomial) {
 GiNaC::matrix matrix_of(const SurdMatrix& rows, std::size_t columns) {
     GiNaC::matrix result(static_cast<unsigned>(rows.size()), static_cast<unsigned>(columns));
     for (std::size_t i = 0; i < rows.size(); ++i)
-        for (std::size_t j = 0; j < columns; ++j) result(static_cast<unsigned>(i), static_cast<unsigned>(j)) = rows[i][j].expression();
+        for (std::size_t j = 0; j < columns; ++j)
+            result(static_cast<unsigned>(i), static_cast<unsigned>(j)) = rows[i][j].expression();
     return result;
 }
 
@@ -100,7 +106,8 @@ Quadrature lobatto_quadrature(int points) {
         result.c.push_back(c[j].expression());
         result.b.push_back(b[j].expression());
         GiNaC::ex basis = 0;
-        for (std::size_t k = 0; k < s; ++k) basis += l[j][k].expression() * GiNaC::pow(result.theta, static_cast<int>(k));
+        for (std::size_t k = 0; k < s; ++k)
+            basis += l[j][k].expression() * GiNaC::pow(result.theta, static_cast<int>(k));
         result.basis.push_back(basis);
     }
     result.D = matrix_of(D, s);
@@ -111,6 +118,8 @@ Quadrature lobatto_quadrature(int points) {
     return result;
 }
 
-GiNaC::ex expand_exactly(const GiNaC::ex& expression) { return expression.expand(GiNaC::expand_options::expand_function_args); }
+GiNaC::ex expand_exactly(const GiNaC::ex& expression) {
+    return expression.expand(GiNaC::expand_options::expand_function_args);
+}
 
 }  // namespace lobatto

@@ -44,8 +44,11 @@ void require_regular(const Scene& scene, const System& system) {
             direction += system.v[i].get_name() + " = " + canonical_text(component);
         }
     }
-    refuse(scene, "it is degenerate: the matrix of its second derivatives in the velocities is singular, so the velocities do not follow from the "
-                  "momenta. No kinetic energy opposes the direction (" + direction + "). Add the missing mass, or remove a coordinate.");
+    refuse(scene,
+           "it is degenerate: the matrix of its second derivatives in the velocities is singular, so the velocities do "
+           "not follow from the "
+           "momenta. No kinetic energy opposes the direction (" +
+               direction + "). Add the missing mass, or remove a coordinate.");
 }
 
 }  // namespace
@@ -69,15 +72,18 @@ System build_system(const Scene& scene) {
         const ex at_zero = momentum.subs(at_rest).expand();
         if (!at_zero.is_zero())
             refuse(scene, "it has the term (" + canonical_text(at_zero) + ")*" + system.v[i].get_name() +
-                              ", linear in a velocity (a magnetic or gyroscopic term); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
+                              ", linear in a velocity (a magnetic or gyroscopic term); this version treats L = 1/2 "
+                              "q'^T M q' - V(q) with a constant mass matrix M.");
         for (unsigned j = 0; j <= i; ++j) {
             const ex entry = momentum.diff(system.v[j]).expand();
             if (depends_on(entry, system.v))
-                refuse(scene, "it is not quadratic in the velocities (d2L/d" + system.v[i].get_name() + " d" + system.v[j].get_name() + " = " +
-                                  canonical_text(entry) + "); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
+                refuse(scene, "it is not quadratic in the velocities (d2L/d" + system.v[i].get_name() + " d" +
+                                  system.v[j].get_name() + " = " + canonical_text(entry) +
+                                  "); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
             if (depends_on(entry, system.q))
-                refuse(scene, "its mass matrix depends on the position (d2L/d" + system.v[i].get_name() + " d" + system.v[j].get_name() + " = " +
-                                  canonical_text(entry) + "); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
+                refuse(scene, "its mass matrix depends on the position (d2L/d" + system.v[i].get_name() + " d" +
+                                  system.v[j].get_name() + " = " + canonical_text(entry) +
+                                  "); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
             system.mass(i, j) = entry;
             system.mass(j, i) = entry;
         }
@@ -90,7 +96,8 @@ System build_system(const Scene& scene) {
         system.gradient.push_back(system.potential.diff(system.q[i]));
         for (unsigned j = 0; j <= i; ++j) {
             const ex entry = system.gradient[i].diff(system.q[j]);
-            system.hessian(i, j) = entry.expand().is_zero() ? ex(0) : entry;  // kept as derived: expanding may lose a short form
+            system.hessian(i, j) =
+                entry.expand().is_zero() ? ex(0) : entry;  // kept as derived: expanding may lose a short form
             system.hessian(j, i) = system.hessian(i, j);
         }
     }
