@@ -141,25 +141,24 @@ inline void sincos(double x, double& sine, double& cosine) {
     const double t = k * 6.07710050630396597660e-11;       // exact: the next 33 bits
     const double r2 = r1 - t;
     const double back = r1 - r2;
-    const double lost = (back - t) + (r1 - (r2 + back));  // what r1 - t lost
-    const double w = k * 2.02226624879595063154e-21;      // the last 53 bits
-    const double high = r2 + (lost - w);
-    const double low = (r2 - high) + (lost - w);
-    const double z = high * high;
+    const double lost = (back - t) + (r1 - (r2 + back));       // what r1 - t lost
+    const double low = lost - k * 2.02226624879595063154e-21;  // the last 53 bits; the reduced argument is r2 + low
+    // Polynomials in Estrin's order: their latency is what a step waits for, and `low` is ready before they are.
+    const double z = r2 * r2;
+    const double z2 = z * z;
+    const double z4 = z2 * z2;
     const double s =
-        8.33333333332248946124e-03 +
-        z * (-1.98412698298579493134e-04 +
-             z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
-    const double cube = z * high;
-    const double sine_reduced = high - ((z * (0.5 * low - cube * s) - low) + cube * 1.66666666666666657415e-01);
-    const double c = z * (4.16666666666666019037e-02 +
-                          z * (-1.38888888888741095749e-03 +
-                               z * (2.48015872894767294178e-05 +
-                                    z * (-2.75573143513906633035e-07 +
-                                         z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+        (8.33333333332248946124e-03 + z * -1.98412698298579493134e-04) +
+        (z2 * (2.75573137070700676789e-06 + z * -2.50507602534068634195e-08) + z4 * 1.58969099521155010221e-10);
+    const double cube = z * r2;
+    const double sixth = cube * 1.66666666666666324348e-01;
+    const double sine_reduced = r2 - (sixth - (cube * (z * s) + (low - 0.5 * (z * low))));
+    const double c = (4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
+                     (z2 * (2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
+                      z4 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11));
     const double half = 0.5 * z;
     const double rest = 1.0 - half;
-    const double cosine_reduced = rest + (((1.0 - rest) - half) + (z * c - high * low));
+    const double cosine_reduced = rest + (((1.0 - rest) - half) + (z2 * c - low * (r2 - sixth)));
     const bool swap = (quadrant & 1) != 0;
     const double a = swap ? cosine_reduced : sine_reduced;
     const double b = swap ? sine_reduced : cosine_reduced;
