@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The program: its commands, and what each kind of error means for the exit code.
 #include <fmt/color.h>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -13,7 +13,9 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "cli/commands.hpp"
 #include "generator/source.hpp"
@@ -35,10 +37,25 @@ int complain(Exit code, std::string_view message) {
     return code;
 }
 
+std::vector<std::string> command_names(const CLI::App& program) {
+    std::vector<std::string> names;
+    for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
+        names.push_back(command->get_name());
+    return names;
+}
+
 int complain_of_arguments(const CLI::App& program, const CLI::ParseError& error) {
     const auto chosen = program.get_subcommands();
-    const std::string command = chosen.empty() ? "lobatto" : "lobatto " + chosen.front()->get_name();
-    return complain(wrong_input, fmt::format("{}\n`{} --help` shows what can be given.", error.what(), command));
+    if (!chosen.empty())
+        return complain(wrong_input, fmt::format("{}\n`lobatto {} --help` shows what can be given.", error.what(),
+                                                 chosen.front()->get_name()));
+    const auto extras = program.remaining();
+    if (extras.empty() || extras.front().starts_with('-'))
+        return complain(wrong_input, fmt::format("{}\n`lobatto --help` shows what can be given.", error.what()));
+    const std::string& word = extras.front();
+    const std::string hint = word.ends_with(".toml") ? fmt::format(" Did you mean `lobatto run {}`?", word) : "";
+    return complain(wrong_input, fmt::format("unknown command '{}'; the commands are: {}.{}", word,
+                                             fmt::join(command_names(program), ", "), hint));
 }
 
 // What was printed must have arrived: a full disk behind `> file` is an error, although every write was only buffered.
@@ -77,8 +94,9 @@ int main(int argc, char** argv) {
     } catch (const CLI::RuntimeError& end) {
         return end.get_exit_code();
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == success) return program.exit(error);  // help or version
-        return complain_of_arguments(program, error);
+        if (error.get_exit_code() != success) return complain_of_arguments(program, error);
+        program.exit(error);  // prints the help or the version
+        return success;
     } catch (const InputError& error) {
         return complain(wrong_input, error.what());
     } catch (const ComputationError& error) {
