@@ -8,6 +8,7 @@
 #include <csignal>
 #include <filesystem>
 
+#include "cli/commands.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
