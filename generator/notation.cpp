@@ -160,7 +160,8 @@ private:
     Printed addition(const Node& node) const {
         std::vector<Id> terms = node.operands;
         if (notation_ != Notation::cpp) {  // for people: a positive term first
-            const auto first = std::find_if(terms.begin(), terms.end(), [this](Id term) { return !graph_.is_negative(term); });
+            const auto first =
+                std::find_if(terms.begin(), terms.end(), [this](Id term) { return !graph_.is_negative(term); });
             if (first != terms.end()) std::rotate(terms.begin(), first, first + 1);
         }
         std::string text;
