@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The compiler and its cache: what is compiled when, what is trusted, what survives, what people are told.
+#include <dlfcn.h>
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 #include <signal.h>
@@ -7,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "runtime/compile.hpp"
@@ -129,6 +131,20 @@ TEST_CASE("the command names the compiler that CXX names and all flags, and fuse
                                          "-fvisibility=hidden -std=c++17 answer.cpp -o answer.so");
     const EnvironmentVariable words("CXX", compiler + "  -DLOBATTO_UNUSED='a' ");
     CHECK(compile(answer).command.starts_with(compiler + " '-DLOBATTO_UNUSED='\\''a'\\''' -O3 "));
+}
+
+TEST_CASE("a product is rounded before it is added to, on every processor") {
+    const Workshop workshop;
+    const Compiled compiled =
+        compile({"sum",
+                 "extern \"C\" __attribute__((visibility(\"default\"))) double sum(double a, double b, double c) "
+                 "{ return a * b + c; }\n"});
+    void* const library = ::dlopen(compiled.object.c_str(), RTLD_NOW | RTLD_LOCAL);
+    REQUIRE(library != nullptr);
+    const auto sum = reinterpret_cast<double (*)(double, double, double)>(::dlsym(library, "sum"));
+    const double small = std::ldexp(1.0, -30);
+    CHECK(sum(1 + small, 1 - small, -1) == 0);  // a fused multiply-add gives -2^-60
+    ::dlclose(library);
 }
 
 TEST_CASE("an entry whose key text is forged is built again") {
