@@ -305,6 +305,24 @@ TEST_CASE("a folder that cannot be made is named with the reason") {
             "LOBATTO_CACHE_DIR");
 }
 
+TEST_CASE("a folder without permission to write is named with the reason, but what is in it is used") {
+    TemporaryFolder folder;
+    fs::permissions(folder.string(), fs::perms::all);  // for another user, too
+    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
+    const pid_t pid = start_process([&] {
+        if (::geteuid() == 0 && ::setuid(65534) != 0) return false;  // root may write everywhere
+        compile(answer);
+        fs::permissions(folder / "cache", fs::perms::owner_read | fs::perms::owner_exec);
+        const std::string message = message_of<MachineError>([] { compile({"other", answer.text}); });
+        return compile(answer).from_cache &&
+               message.starts_with("cannot create " + (folder / "cache/other-").string()) &&
+               message.ends_with(
+                   ".lock: Permission denied; make room or give permission there, or name another folder in the "
+                   "environment variable LOBATTO_CACHE_DIR");
+    });
+    CHECK(exit_code_of(pid) == 0);
+}
+
 TEST_CASE("a compiler that fails is quoted, and source, command and output are kept") {
     const Workshop workshop;
     workshop.set_compiler("echo \"$0: fatal error: no room on the couch\" >&2\nseq 100\nexit 3\n");
