@@ -26,11 +26,10 @@ std::size_t escape_length(char letter) {
     return letter == 'u' ? 5 : letter == 'U' ? 9 : 1;
 }
 
-// The places of all bytes of a string value: walks through quotes, escapes, folded line ends and CRLF beside the
-// decoded value.
-Text locate_string(Cursor& cursor, const std::string& value) {
-    Text text{value, {}};
-    text.at.reserve(value.size() + 1);
+// A string value and the places of all its bytes: walks through quotes, escapes, folded line ends and CRLF beside the
+// value as toml++ decoded it from the guarded text, one byte a character there unless it was an escape.
+Text locate_string(Cursor& cursor, std::string_view decoded) {
+    Text text;
     const char quote = cursor.front();
     assert(quote == '"' || quote == '\'');
     const bool multiline = cursor.rest().starts_with(std::string(3, quote));
@@ -39,9 +38,9 @@ Text locate_string(Cursor& cursor, const std::string& value) {
         cursor.skip("\r");
         if (cursor.front() == '\n') cursor.advance();
     }
-    while (text.at.size() < value.size()) {
+    while (!decoded.empty()) {
         const Position here = cursor.position();
-        const std::string_view rest = std::string_view(value).substr(text.at.size());
+        std::size_t length = 1;
         if (quote == '"' && cursor.front() == '\\') {
             cursor.advance();
             if (cursor.is_any_of(" \t\r\n")) {
@@ -49,12 +48,17 @@ Text locate_string(Cursor& cursor, const std::string& value) {
                 continue;
             }
             cursor.advance(escape_length(cursor.front()));
+            length = character_length(decoded);
+            text.value += decoded.substr(0, length);
         } else {
             if (cursor.front() == '\r') cursor.advance();
-            assert(cursor.front() == rest.front());
+            const std::string_view written = cursor.rest().substr(0, character_length(cursor.rest()));
+            assert(written.size() > 1 || written.front() == decoded.front());
+            text.value += written;
             cursor.advance();
         }
-        text.at.insert(text.at.end(), character_length(rest), here);
+        text.at.resize(text.value.size(), here);
+        decoded.remove_prefix(length);
     }
     text.at.push_back(cursor.position());
     return text;
@@ -133,6 +137,15 @@ Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
     return value;
 }
 
+// toml++ says "Error while parsing X: Y"; the most likely reason of some is a formula without quotes.
+std::string explanation(std::string_view description) {
+    constexpr std::string_view prefix = "Error while parsing ";
+    if (description.starts_with(prefix)) description.remove_prefix(prefix.size());
+    const bool formula = description.find("could not determine value type") != std::string_view::npos ||
+                         description.find("expected digit") != std::string_view::npos;
+    return fmt::format("not valid TOML: {}{}", description, formula ? "; a formula must stand in quotes" : "");
+}
+
 }  // namespace
 
 std::string Value::kind_name() const {
@@ -150,19 +163,19 @@ std::string Value::kind_name() const {
         case Kind::other:
             break;
     }
-    return "a list, a date or a time";
+    return "a date or a time";
 }
 
 Value read_document(const Source& source) {
-    refuse_hostile_toml(source);
+    const std::string guarded = guarded_toml(source);
     try {
-        const toml::table root = toml::parse(std::string_view(source.content()));
+        const toml::table root = toml::parse(std::string_view(guarded));
         Cursor cursor(source.content());
         Value document;
         document.entries = convert_entries(source, cursor, root);
         return document;
     } catch (const toml::parse_error& error) {
-        source.fail(position_of(error.source()), fmt::format("not valid TOML: {}", error.description()));
+        source.fail(position_of(error.source()), explanation(error.description()));
     }
 }
 

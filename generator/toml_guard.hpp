@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Refuses, with InputError, the few texts that toml++ 3.3 does not survive.
+// Stands between a file and toml++ 3.3, which does not survive every text.
 #pragma once
+
+#include <string>
 
 #include "generator/source.hpp"
 
 namespace lobatto {
 
-void refuse_hostile_toml(const Source& source);
+// The text with every character beyond ASCII replaced by '?', so that lines and columns stay. Throws InputError for
+// what toml++ must not see.
+std::string guarded_toml(const Source& source);
 
 }  // namespace lobatto
