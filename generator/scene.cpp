@@ -40,6 +40,7 @@ public:
           root_(source, document_.entries, {1, 1}, "a scene",
                 {"title", "lagrangian", "coordinates", "parameters", "method", "run", "output"}) {}
 
+    // Parameters before coordinates before formulas: each formula needs the names in it.
     Scene run() {
         scene_.path = source_.path();
         scene_.name = identifier_of_file(source_.path());
@@ -265,11 +266,14 @@ private:
 
     Scope of_parameters(const std::string& formula) const { return {names_, formula, false, false}; }
 
-    // A formula whose value with the parameters of the scene must be a finite real number.
+    // A formula whose value with the parameters of the scene must be a real number that a double can hold.
     GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr) {
+        static const GiNaC::numeric largest_value = GiNaC::pow(GiNaC::numeric(10), GiNaC::numeric(300));
         const GiNaC::ex expression = parse_expression(source_, formula_of(source_, entry), scope, &used_);
         try {
             const GiNaC::numeric number = real_value(expression, parameter_values_);
+            if (!number.is_zero() && (abs(number) > largest_value || abs(number) < 1 / largest_value))
+                fail(entry.value.at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", scope.formula));
             if (value != nullptr) *value = number;
         } catch (const NoValue& error) {
             fail(entry.value.at, fmt::format("{} has no finite real value: {}", scope.formula, error.what()));
