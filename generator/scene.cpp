@@ -42,6 +42,7 @@ public:
 
     // Parameters before coordinates before formulas: each formula needs the names in it.
     Scene run() {
+        scene_.source = source_;
         scene_.path = source_.path();
         scene_.name = identifier_of_file(source_.path());
         scene_.title = scene_.name;
@@ -166,6 +167,7 @@ private:
         if (entry.value.kind != Value::Kind::text)
             fail(entry.value.at,
                  fmt::format("the Lagrangian must be a formula in quotes, not {}", entry.value.kind_name()));
+        scene_.lagrangian_at = entry.value.text.at.front();
         scene_.lagrangian = parse_expression(source_, entry.value.text, {names_, "the Lagrangian", true, true}, &used_);
         scene_.lagrangian_text = collapsed(entry.value.text.value);
         for (const Coordinate& coordinate : scene_.coordinates)
