@@ -135,11 +135,8 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
             if (exponent.info(GiNaC::info_flags::integer)) {
                 id = power(base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
             } else if ((2 * exponent).info(GiNaC::info_flags::integer)) {
-                // x^(k/2) with k odd: one root for all such powers, divided by when k is negative.
-                const int k = GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int();
-                const Id root = function(Op::sqrt, base);
-                id = k > 0 ? multiply({root, power(base, (k - 1) / 2)})
-                           : multiply({power(root, -1), power(base, (k + 1) / 2)});
+                // x^(k/2) with k odd is sqrt(x)^k: one root for all such powers.
+                id = power(function(Op::sqrt, base), GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int());
             } else {
                 id = raise(base, self(self, exponent));
             }
