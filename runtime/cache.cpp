@@ -179,9 +179,8 @@ CacheEntry::CacheEntry(const std::string& name, std::string key)
 
 bool CacheEntry::is_valid() const {
     const auto sealed_key = read_private_file(stem_ + ".key");
-    if (!sealed_key || !sealed_key->ends_with("\n" + key_)) return false;
     const auto object = read_private_file(object_path());
-    return object && seal_of(*object) + key_ == *sealed_key;
+    return sealed_key && object && *sealed_key == seal_of(*object) + key_;
 }
 
 void CacheEntry::publish(const std::string& file) const {
