@@ -227,9 +227,13 @@ TEST_CASE("a process killed at any time of a compilation leaves nothing broken")
                   .starts_with("\x7f"
                                "ELF"));
         CHECK(compile(answer).from_cache);
-        // What the killed process left of another entry goes too, when something is built.
-        compile({"other", answer.text});
-        CHECK(workshop.endings() == std::vector<std::string>{".key", ".key", ".so", ".so"});
+        // What is left goes as soon as something is built after the last part of the killed compiler has ended.
+        const auto is_rest = [](const std::string& ending) { return ending != ".so" && ending != ".key"; };
+        for (int i = 0; i < 50 && std::ranges::count_if(workshop.endings(), is_rest) > 0; ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            compile({"other", answer.text + std::string(i, '\n')});
+        }
+        CHECK(std::ranges::count_if(workshop.endings(), is_rest) == 0);
     }
 }
 
