@@ -127,11 +127,9 @@ Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
             value.kind = Value::Kind::boolean;
             value.boolean = **node.as_boolean();
             break;
-        case toml::node_type::table:
+        default:  // the guard leaves only tables
+            assert(node.is_table());
             value.entries = convert_entries(source, cursor, *node.as_table());
-            break;
-        default:
-            value.kind = Value::Kind::other;
             break;
     }
     return value;
@@ -159,11 +157,9 @@ std::string Value::kind_name() const {
         case Kind::boolean:
             return "true or false";
         case Kind::table:
-            return "a table";
-        case Kind::other:
             break;
     }
-    return "a date or a time";
+    return "a table";
 }
 
 Value read_document(const Source& source) {

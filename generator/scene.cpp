@@ -229,8 +229,7 @@ private:
         if (!h.is_positive())
             fail(length.value.at, fmt::format("{} is {}; it must be positive", scope.formula, shown(h)));
         if (per_period != nullptr) {
-            const long long count =
-                integer_of(source_, *per_period, 1, most_steps, "steps_per_period must be at least 1 and at most 9e15");
+            const long long count = integer_of(source_, *per_period, 1, most_steps, "at least 1 and at most 9e15");
             scene_.run.step = scene_.run.step / GiNaC::numeric(static_cast<long>(count));
             h = h / GiNaC::numeric(static_cast<long>(count));
         }
@@ -252,9 +251,9 @@ private:
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
                           "[output]", {"every", "energy"});
         if (const Entry* every = table.find("every"))
-            scene_.outputs.every = static_cast<long>(integer_of(
-                source_, *every, 1, most_steps,
-                "every must be at least 1 and at most 9e15: each state whose step is a multiple of it is kept"));
+            scene_.outputs.every = static_cast<long>(
+                integer_of(source_, *every, 1, most_steps,
+                           "at least 1 and at most 9e15: states whose step is a multiple of it are kept"));
         if (const Entry* energy = table.find("energy")) scene_.outputs.energy = boolean_of(source_, *energy);
     }
 

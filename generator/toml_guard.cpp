@@ -3,6 +3,7 @@
 // - a dotted key of very many parts: toml++ nests a table for each, and destroys them recursively;
 // - anything but a key after the [ of a table's header, and some signs in a list: assumed not to happen, undefined
 // behaviour;
+// - a date followed by two blanks: assumed not to happen;
 // - some characters beyond ASCII where white space might stand: the test for white space runs into unreachable code.
 #include "generator/toml_guard.hpp"
 
@@ -16,7 +17,8 @@
 namespace lobatto {
 namespace {
 
-constexpr int most_parts = 16;  // of a dotted key
+constexpr int most_parts = 16;             // of a dotted key
+constexpr std::size_t longest_word = 200;  // beyond what toml++ looks at before it decides what a value is
 
 bool is_ascii(char c) {
     return static_cast<unsigned char>(c) < 0x80;
@@ -30,6 +32,7 @@ public:
         while (!cursor_.at_end()) {
             const char c = cursor_.front();
             if (c == '[') check_bracket();
+            if (c == '=') check_value();
             first_of_line_ = c == '\n' || (first_of_line_ && (c == ' ' || c == '\t' || c == '\r'));
             count_dots(c);
             if (!is_ascii(c)) fail_character();
@@ -54,6 +57,19 @@ private:
             source_.fail(cursor_.position(), "a list of tables: each table of a scene occurs once; write [name]");
         if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-' && c != '"' && c != '\'')
             source_.fail(cursor_.position(), "not valid TOML: the name of a table must follow [, for example [run]");
+    }
+
+    // A date or time after =: it has a colon, or the form 1979-05-27 once underscores are left out, as toml++ does.
+    void check_value() const {
+        const std::string_view rest = cursor_.rest();
+        const std::size_t begin = std::min(rest.find_first_not_of(" \t", 1), rest.size());
+        std::string word(
+            rest.substr(begin, std::min(rest.find_first_of(" \t\r\n,}#\"'{", begin), begin + longest_word) - begin));
+        std::erase(word, '_');
+        const bool date = word.size() >= 10 && word[4] == '-' && word[7] == '-';
+        if (date || word.find(':') != std::string::npos)
+            source_.fail({cursor_.position().line, cursor_.position().column + static_cast<int>(begin)},
+                         "a date or time: no value of a scene is one");
     }
 
     void count_dots(char c) {
