@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The one place that calls the stages in order: scene -> system -> quadrature -> discretisation -> structure -> graph -> passes -> kernel source.
+// The one place that calls the stages in order: scene -> system -> quadrature -> discretisation -> structure -> graph
+// -> passes -> kernel source.
 #pragma once
 
 #include <string>

@@ -13,7 +13,7 @@
 namespace lobatto {
 
 struct Finding {
-    std::string name;    // "linear system"
+    std::string name;  // "linear system"
     bool holds = false;
     std::string reason;  // "every second derivative of V is free of q"
 };
@@ -26,7 +26,7 @@ struct ClosedSolution {
 };
 
 struct Structure {
-    bool linear = false;         // V at most quadratic: the step is an affine map
+    bool linear = false;  // V at most quadratic: the step is an affine map
     bool diagonal_mass = false;
     std::vector<std::pair<int, int>> entries;  // where M^-1 V'' is not identically zero, row by row
     std::optional<ClosedSolution> closed_solution;

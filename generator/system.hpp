@@ -11,18 +11,18 @@
 namespace lobatto {
 
 struct System {
-    int n = 0;                             // coordinates
-    std::vector<GiNaC::symbol> q, v;       // n each: positions, velocities
-    std::vector<GiNaC::symbol> parameters; // run-time parameters, scene order
-    GiNaC::ex lagrangian;                  // L(q, v)
-    GiNaC::matrix mass;                    // n x n, symmetric: M = d2L/dv dv, free of q and v
-    GiNaC::ex potential;                   // V(q) = -L(q, 0), constant terms kept
-    std::vector<GiNaC::ex> gradient;       // n: dV/dq_k
-    GiNaC::matrix hessian;                 // n x n: d2V/dq_k dq_l
+    int n = 0;                              // coordinates
+    std::vector<GiNaC::symbol> q, v;        // n each: positions, velocities
+    std::vector<GiNaC::symbol> parameters;  // run-time parameters, scene order
+    GiNaC::ex lagrangian;                   // L(q, v)
+    GiNaC::matrix mass;                     // n x n, symmetric: M = d2L/dv dv, free of q and v
+    GiNaC::ex potential;                    // V(q) = -L(q, 0), constant terms kept
+    std::vector<GiNaC::ex> gradient;        // n: dV/dq_k
+    GiNaC::matrix hessian;                  // n x n: d2V/dq_k dq_l
 };
 
-// Throws InputError when L is outside the class treated (mass matrix that depends on q, terms linear or of higher degree in the velocity) or degenerate
-// (M singular), naming the offending term or direction.
+// Throws InputError when L is outside the class treated (mass matrix that depends on q, terms linear or of higher
+// degree in the velocity) or degenerate (M singular), naming the offending term or direction.
 System build_system(const Scene& scene);
 
 }  // namespace lobatto

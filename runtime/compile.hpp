@@ -9,19 +9,21 @@ namespace lobatto {
 
 // What is compiled: one self-contained translation unit.
 struct Translation {
-    std::string name;     // C identifier, for file names
-    std::string text;     // the whole C++ source: kernel_abi.h, kernel.hpp, the emitted header, kernel_export.hpp, LOBATTO_EXPORT_KERNEL
+    std::string name;        // C identifier, for file names
+    std::string text;        // the whole C++ source: kernel_abi.h, kernel.hpp, the emitted header, kernel_export.hpp,
+                             // LOBATTO_EXPORT_KERNEL
     bool quadruple = false;  // links libquadmath (g++ only)
 };
 
 struct Compiled {
-    std::string object;    // path of the shared object in the cache
-    std::string command;   // the command that made it
+    std::string object;   // path of the shared object in the cache
+    std::string command;  // the command that made it
     bool from_cache = false;
-    double seconds = 0;    // spent compiling; 0 on a hit
+    double seconds = 0;  // spent compiling; 0 on a hit
 };
 
-// Compiles, or finds in the cache. Safe with any number of processes and threads at once. Throws MachineError with the compiler's own output.
+// Compiles, or finds in the cache. Safe with any number of processes and threads at once. Throws MachineError with the
+// compiler's own output.
 Compiled compile(const Translation& translation);
 
 // The cache folder: $LOBATTO_CACHE_DIR, else $XDG_CACHE_HOME/lobatto, else ~/.cache/lobatto; created with mode 0700;

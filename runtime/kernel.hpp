@@ -33,21 +33,19 @@ struct Limits {
     static constexpr real epsilon = std::numeric_limits<real>::epsilon();
     static constexpr real smallest = std::numeric_limits<real>::min();
     static constexpr real largest = std::numeric_limits<real>::max();
-    static constexpr real root_epsilon = sizeof(real) == 4 ? real(1.0 / 4096)                   // 2^-12
-                                         : sizeof(real) == 8 ? real(1.0 / 134217728)            // 2^-27
-                                                             : real(1.0 / 8589934592.0);        // 2^-33
+    static constexpr real root_epsilon = sizeof(real) == 4   ? real(1.0 / 4096)           // 2^-12
+                                         : sizeof(real) == 8 ? real(1.0 / 134217728)      // 2^-27
+                                                             : real(1.0 / 8589934592.0);  // 2^-33
 };
 
 using std::acos;
 using std::asin;
 using std::atan;
-using std::cos;
 using std::cosh;
 using std::exp;
 using std::fabs;
 using std::log;
 using std::pow;
-using std::sin;
 using std::sinh;
 using std::sqrt;
 using std::tan;
@@ -61,21 +59,62 @@ struct Limits<__float128> {
     static constexpr __float128 largest = __float128(std::numeric_limits<long double>::max());
     static constexpr __float128 root_epsilon = __float128(1) / __float128(1ull << 57);
 };
-inline __float128 acos(__float128 x) { return acosq(x); }
-inline __float128 asin(__float128 x) { return asinq(x); }
-inline __float128 atan(__float128 x) { return atanq(x); }
-inline __float128 cos(__float128 x) { return cosq(x); }
-inline __float128 cosh(__float128 x) { return coshq(x); }
-inline __float128 exp(__float128 x) { return expq(x); }
-inline __float128 fabs(__float128 x) { return fabsq(x); }
-inline __float128 log(__float128 x) { return logq(x); }
-inline __float128 pow(__float128 x, __float128 y) { return powq(x, y); }
-inline __float128 sin(__float128 x) { return sinq(x); }
-inline __float128 sinh(__float128 x) { return sinhq(x); }
-inline __float128 sqrt(__float128 x) { return sqrtq(x); }
-inline __float128 tan(__float128 x) { return tanq(x); }
-inline __float128 tanh(__float128 x) { return tanhq(x); }
+inline __float128 acos(__float128 x) {
+    return acosq(x);
+}
+inline __float128 asin(__float128 x) {
+    return asinq(x);
+}
+inline __float128 atan(__float128 x) {
+    return atanq(x);
+}
+inline __float128 cos(__float128 x) {
+    return cosq(x);
+}
+inline __float128 cosh(__float128 x) {
+    return coshq(x);
+}
+inline __float128 exp(__float128 x) {
+    return expq(x);
+}
+inline __float128 fabs(__float128 x) {
+    return fabsq(x);
+}
+inline __float128 log(__float128 x) {
+    return logq(x);
+}
+inline __float128 pow(__float128 x, __float128 y) {
+    return powq(x, y);
+}
+inline __float128 sin(__float128 x) {
+    return sinq(x);
+}
+inline __float128 sinh(__float128 x) {
+    return sinhq(x);
+}
+inline __float128 sqrt(__float128 x) {
+    return sqrtq(x);
+}
+inline __float128 tan(__float128 x) {
+    return tanq(x);
+}
+inline __float128 tanh(__float128 x) {
+    return tanhq(x);
+}
 #endif
+
+inline float sin(float x) {
+    return std::sin(x);
+}
+inline float cos(float x) {
+    return std::cos(x);
+}
+inline long double sin(long double x) {
+    return std::sin(x);
+}
+inline long double cos(long double x) {
+    return std::cos(x);
+}
 
 // Sine and cosine of one argument together.
 template <class real>
@@ -85,9 +124,9 @@ inline void sincos(real x, real& sine, real& cosine) {
 }
 
 // The same for double, branch-free up to |x| < 2^19 pi/2: reduction by pi/2 in three parts (33 + 33 + 53 bits, so that
-// k * part is exact for |k| < 2^20), kept as a sum of two doubles, then the Taylor-minimax polynomials of degree 13 and 14
-// on [-pi/4, pi/4] (coefficients: Cody & Waite type, as published with FDLIBM). Below 1 ulp, tested. Uses no FMA, so that every
-// processor and compiler gives the same bits.
+// k * part is exact for |k| < 2^20), kept as a sum of two doubles, then the Taylor-minimax polynomials of degree 13 and
+// 14 on [-pi/4, pi/4] (coefficients: Cody & Waite type, as published with FDLIBM). Below 1 ulp, tested. Uses no FMA, so
+// that every processor and compiler gives the same bits.
 inline void sincos(double x, double& sine, double& cosine) {
     if (!(fabs(x) < 823549.0)) {
         sine = std::sin(x);
@@ -102,29 +141,41 @@ inline void sincos(double x, double& sine, double& cosine) {
     const double t = k * 6.07710050630396597660e-11;       // exact: the next 33 bits
     const double r2 = r1 - t;
     const double back = r1 - r2;
-    const double lost = (back - t) + (r1 - (r2 + back));  // what r1 - t lost
-    const double w = k * 2.02226624879595063154e-21;      // the last 53 bits
-    const double high = r2 + (lost - w);
-    const double low = (r2 - high) + (lost - w);
-    const double z = high * high;
-    const double s = 8.33333333332248946124e-03 +
-                     z * (-1.98412698298579493134e-04 +
-                          z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
-    const double cube = z * high;
-    const double sine_reduced = high - ((z * (0.5 * low - cube * s) - low) + cube * 1.66666666666666657415e-01);
-    const double c = z * (4.16666666666666019037e-02 +
-                          z * (-1.38888888888741095749e-03 +
-                               z * (2.48015872894767294178e-05 +
-                                    z * (-2.75573143513906633035e-07 +
-                                         z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+    const double lost = (back - t) + (r1 - (r2 + back));       // what r1 - t lost
+    const double low = lost - k * 2.02226624879595063154e-21;  // the last 53 bits; the reduced argument is r2 + low
+    // Polynomials in Estrin's order: their latency is what a step waits for, and `low` is ready before they are.
+    const double z = r2 * r2;
+    const double z2 = z * z;
+    const double z4 = z2 * z2;
+    const double s =
+        (8.33333333332248946124e-03 + z * -1.98412698298579493134e-04) +
+        (z2 * (2.75573137070700676789e-06 + z * -2.50507602534068634195e-08) + z4 * 1.58969099521155010221e-10);
+    const double cube = z * r2;
+    const double sixth = cube * 1.66666666666666324348e-01;
+    const double sine_reduced = r2 - (sixth - (cube * (z * s) + (low - 0.5 * (z * low))));
+    const double c = (4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
+                     (z2 * (2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
+                      z4 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11));
     const double half = 0.5 * z;
     const double rest = 1.0 - half;
-    const double cosine_reduced = rest + (((1.0 - rest) - half) + (z * c - high * low));
+    const double cosine_reduced = rest + (((1.0 - rest) - half) + (z2 * c - low * (r2 - sixth)));
     const bool swap = (quadrant & 1) != 0;
     const double a = swap ? cosine_reduced : sine_reduced;
     const double b = swap ? sine_reduced : cosine_reduced;
     sine = (quadrant & 2) != 0 ? -a : a;
     cosine = ((quadrant + 1) & 2) != 0 ? -b : b;
+}
+
+// Sine and cosine alone; for double half of the pair above, so that a lone sine has the same bits.
+inline double sin(double x) {
+    double sine, cosine;
+    sincos(x, sine, cosine);
+    return sine;
+}
+inline double cos(double x) {
+    double sine, cosine;
+    sincos(x, sine, cosine);
+    return cosine;
 }
 
 template <class real>
@@ -133,8 +184,8 @@ inline bool is_finite(real x) {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Small dense systems: A X = B with A of size x size and B of size x columns, both row-major and overwritten; X ends in B.
-// Gaussian elimination with partial pivoting. False when a pivot is zero or not finite.
+// Small dense systems: A X = B with A of size x size and B of size x columns, both row-major and overwritten; X ends in
+// B. Gaussian elimination with partial pivoting. False when a pivot is zero or not finite.
 // ---------------------------------------------------------------------------------------------------------------------
 template <int size, int columns, class real>
 inline bool solve(real* A, real* B) {
@@ -181,10 +232,11 @@ inline void expand_entries(const typename K::real* entries, typename K::real* S)
     for (int e = 0; e < K::entries; ++e) S[K::entry_row[e] * K::coordinates + K::entry_column[e]] = entries[e];
 }
 
-// The tangent of one step in (q, u), from the S of the s nodes (D24). T: 2n x (2n + 1); its last column is the image of the
-// constant acceleration W0 when S does not depend on q, that is, the shift of a linear system with forces at q = 0.
+// The tangent of one step in (q, u), from the S of the s nodes (D24). T: 2n x (2n + 1); its last column is the image of
+// the constant acceleration W0 when S does not depend on q, that is, the shift of a linear system with forces at q = 0.
 template <class K>
-inline bool tangent_of_step(typename K::real h, const typename K::real* S, const typename K::real* W0, typename K::real* T) {
+inline bool tangent_of_step(typename K::real h, const typename K::real* S, const typename K::real* W0,
+                            typename K::real* T) {
     using real = typename K::real;
     constexpr int n = K::coordinates, s = K::points, m = s - 2, N = n * m, columns = 2 * n + 1;
     real v[n * columns], X[(N > 0 ? N : 1) * columns], J[N > 0 ? N * N : 1];
@@ -212,7 +264,8 @@ inline bool tangent_of_step(typename K::real h, const typename K::real* S, const
         for (int j = 0; j < m; ++j)
             for (int k = 0; k < n; ++k)
                 for (int l = 0; l < n; ++l)
-                    J[(i * n + k) * N + j * n + l] = (i == j && k == l ? real(1) : real(0)) + h * h * K::A[i * m + j] * S[((j + 1) * n + k) * n + l];
+                    J[(i * n + k) * N + j * n + l] =
+                        (i == j && k == l ? real(1) : real(0)) + h * h * K::A[i * m + j] * S[((j + 1) * n + k) * n + l];
     if constexpr (N > 0) {
         if (!solve<N, columns>(J, X)) return false;
     }
@@ -254,6 +307,34 @@ inline void to_momentum(const typename K::Coefficients& k, typename K::real* T) 
     }
 }
 
+// The affine map of one step of a linear system, in (q, p), from the constant S = M^-1 V'' and W(0) (D20, n > 1).
+template <class K>
+inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, s = K::points;
+    const real origin[n] = {};
+    real W0[n], entries[K::entries > 0 ? K::entries : 1], S[s * n * n];
+    K::node(k, origin, W0, entries);
+    for (int i = 0; i < s; ++i) expand_entries<K>(entries, S + i * n * n);
+    if (!tangent_of_step<K>(h, S, W0, k.Phi)) return Status::singular_jacobian;
+    to_momentum<K>(k, k.Phi);
+    real sum = real(0);
+    for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi[i] - k.Phi[i];
+    return sum == real(0) ? Status::ok : Status::not_finite;
+}
+
+// (q1, p1) = Phi (q, p) + shift; Phi: 2n x (2n + 1).
+template <int n, class real>
+inline void apply_map(const real* Phi, const real* q, const real* p, real* q1, real* p1) {
+    for (int r = 0; r < 2 * n; ++r) {
+        const real* const row = Phi + r * (2 * n + 1);
+        real sum = row[2 * n];
+        for (int k = 0; k < n; ++k) sum += row[k] * q[k];
+        for (int k = 0; k < n; ++k) sum += row[n + k] * p[k];
+        (r < n ? q1[r] : p1[r - n]) = sum;
+    }
+}
+
 // ---------------------------------------------------------------------------------------------------------------------
 // The step loop
 // ---------------------------------------------------------------------------------------------------------------------
@@ -271,14 +352,14 @@ struct Stepper {
     typename K::Coefficients coefficients{};  // values of stage parameter and step size
     real step_size{};                         // h
     real start_time{};
-    std::int64_t steps{};                     // since start: the time is start_time + steps * h
-    real q[n]{};                              // position
-    real u[n]{};                              // M^-1 p; for a linear system p itself
-    real W[s * n]{};                          // accelerations M^-1 grad V at the nodes of the last step; the last n at q
-    bool has_history{};                       // W holds a whole step
-    std::int32_t iterations{};                // of the last step
-    real increment{};                         // last Newton increment of the last step, relative to its displacement
-    real Q[room]{};                           // interior positions of the last step
+    std::int64_t steps{};       // since start: the time is start_time + steps * h
+    real q[n]{};                // position
+    real u[n]{};                // M^-1 p; for a linear system p itself
+    real W[s * n]{};            // accelerations M^-1 grad V at the nodes of the last step; the last n at q
+    bool has_history{};         // W holds a whole step
+    std::int32_t iterations{};  // of the last step
+    real increment{};           // last Newton increment of the last step, relative to its displacement
+    real Q[room]{};             // interior positions of the last step
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         step_size = h;
@@ -367,12 +448,14 @@ private:
         return Status::ok;
     }
 
-    // Whether increments that no longer shrink are the rounding of what they are computed from: positions and accelerations.
+    // Whether increments that no longer shrink are the rounding of what they are computed from: positions and
+    // accelerations.
     bool is_rounding(const real* base, const real* nodes, const real* W_nodes, const real* S, const real* delta) const {
         for (int i = 0; i < s - 2; ++i) {
             real size[n];
             for (int k = 0; k < n; ++k) size[k] = fabs(W_nodes[i * n + k]);
-            for (int e = 0; e < K::entries; ++e) size[K::entry_row[e]] += fabs(S[i * K::entries + e] * nodes[i * n + K::entry_column[e]]);
+            for (int e = 0; e < K::entries; ++e)
+                size[K::entry_row[e]] += fabs(S[i * K::entries + e] * nodes[i * n + K::entry_column[e]]);
             for (int k = 0; k < n; ++k) {
                 const real sum = fabs(nodes[i * n + k]) + fabs(base[i * n + k]) + step_size * step_size * size[k];
                 if (!(fabs(delta[i * n + k]) <= real(64) * Limits<real>::epsilon * sum)) return false;
@@ -381,9 +464,10 @@ private:
         return true;
     }
 
-    // Newton's iteration for the interior positions (D14). Increments are measured against the displacement within the step,
-    // with the rounding of the position as floor. Convergence is quadratic, e_next = C e^2, so the iteration stops as soon as the NEXT
-    // increment would be below rounding; the accelerations are then carried to the final positions to first order, which errs by the same e^2.
+    // Newton's iteration for the interior positions (D14). Increments are measured against the displacement within the
+    // step, with the rounding of the position as floor. Convergence is quadratic, e_next = C e^2, so the iteration
+    // stops as soon as the NEXT increment would be below rounding; the accelerations are then carried to the final
+    // positions to first order, which errs by the same e^2.
     Status newton(const real* v, const real* W0, const real* base, real* nodes, real* W_nodes) {
         if constexpr (N > 0) {
             constexpr real tolerance = Limits<real>::root_epsilon;
@@ -395,7 +479,8 @@ private:
             }
             real previous = Limits<real>::largest;
             for (int iteration = 1; iteration <= iteration_limit; ++iteration) {
-                for (int i = 0; i < s - 2; ++i) K::node(coefficients, nodes + i * n, W_nodes + i * n, S + i * K::entries);
+                for (int i = 0; i < s - 2; ++i)
+                    K::node(coefficients, nodes + i * n, W_nodes + i * n, S + i * K::entries);
                 iterations = iteration;
                 if (!K::correction(coefficients, base, nodes, W_nodes, S, delta)) return Status::singular_jacobian;
                 real e = real(0), sum = real(0);
@@ -411,8 +496,11 @@ private:
                 for (int i = 0; i < N; ++i) nodes[i] += delta[i];
                 increment = e;
                 if (!is_finite(sum)) return Status::not_finite;
-                const bool next_is_rounding = e <= tolerance || (iteration > 1 && e < previous && (e / previous) * (e / previous) * e <= Limits<real>::epsilon);
-                if (next_is_rounding || (iteration > 2 && e >= real(0.5) * previous && is_rounding(base, nodes, W_nodes, S, delta))) {
+                const bool next_is_rounding =
+                    e <= tolerance ||
+                    (iteration > 1 && e < previous && (e / previous) * (e / previous) * e <= Limits<real>::epsilon);
+                if (next_is_rounding ||
+                    (iteration > 2 && e >= real(0.5) * previous && is_rounding(base, nodes, W_nodes, S, delta))) {
                     K::carry(coefficients, S, delta, W_nodes);
                     return Status::ok;
                 }

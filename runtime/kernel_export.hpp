@@ -48,7 +48,8 @@ struct Export {
             if constexpr (K::unknowns > 0 && !K::linear) {
                 call->iterations += local.iterations;
                 if (local.iterations > call->iterations_most) call->iterations_most = local.iterations;
-                if (static_cast<double>(local.increment) > call->increment_largest) call->increment_largest = static_cast<double>(local.increment);
+                if (static_cast<double>(local.increment) > call->increment_largest)
+                    call->increment_largest = static_cast<double>(local.increment);
             }
             if (--until_record == 0) {
                 real* row = out(call->records) + call->records_written * (1 + 2 * n);
@@ -133,20 +134,42 @@ struct Export {
     }
 
     static constexpr lobatto_real kind() {
-        return sizeof(real) == 4                                                     ? LOBATTO_FLOAT
-               : sizeof(real) == 8                                                   ? LOBATTO_DOUBLE
-               : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE : LOBATTO_FLOAT128;
+        return sizeof(real) == 4                      ? LOBATTO_FLOAT
+               : sizeof(real) == 8                    ? LOBATTO_DOUBLE
+               : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE
+                                                      : LOBATTO_FLOAT128;
     }
 
-    static constexpr lobatto_kernel table = {
-        LOBATTO_ABI_VERSION, sizeof(lobatto_kernel), K::name, K::digest, kind(), sizeof(real), n, K::parameter_count, K::points, K::order,
-        K::linear ? 0 : K::unknowns, K::linear ? 1 : 0, sizeof(S), alignof(S), prepare, start, advance, state, energy, momentum, velocity, acceleration,
-        residual, jacobian, tangent};
+    static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
+                                             sizeof(lobatto_kernel),
+                                             K::name,
+                                             K::digest,
+                                             kind(),
+                                             sizeof(real),
+                                             n,
+                                             K::parameter_count,
+                                             K::points,
+                                             K::order,
+                                             K::linear ? 0 : K::unknowns,
+                                             K::linear ? 1 : 0,
+                                             sizeof(S),
+                                             alignof(S),
+                                             prepare,
+                                             start,
+                                             advance,
+                                             state,
+                                             energy,
+                                             momentum,
+                                             velocity,
+                                             acceleration,
+                                             residual,
+                                             jacobian,
+                                             tangent};
 };
 
 }  // namespace lobatto
 
-#define LOBATTO_EXPORT_KERNEL(K)                                                                        \
+#define LOBATTO_EXPORT_KERNEL(K)                                                                         \
     extern "C" __attribute__((visibility("default"))) const lobatto_kernel* lobatto_kernel_table(void) { \
-        return &lobatto::Export<K>::table;                                                              \
+        return &lobatto::Export<K>::table;                                                               \
     }

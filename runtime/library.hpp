@@ -15,15 +15,24 @@ namespace lobatto {
 template <class real>
 constexpr lobatto_real real_kind();
 template <>
-constexpr lobatto_real real_kind<float>() { return LOBATTO_FLOAT; }
+constexpr lobatto_real real_kind<float>() {
+    return LOBATTO_FLOAT;
+}
 template <>
-constexpr lobatto_real real_kind<double>() { return LOBATTO_DOUBLE; }
+constexpr lobatto_real real_kind<double>() {
+    return LOBATTO_DOUBLE;
+}
 template <>
-constexpr lobatto_real real_kind<long double>() { return LOBATTO_LONG_DOUBLE; }
+constexpr lobatto_real real_kind<long double>() {
+    return LOBATTO_LONG_DOUBLE;
+}
 template <>
-constexpr lobatto_real real_kind<__float128>() { return LOBATTO_FLOAT128; }
+constexpr lobatto_real real_kind<__float128>() {
+    return LOBATTO_FLOAT128;
+}
 
-// A loaded kernel; copies share the library, which is unloaded with the last of them. Thread-safe: the table is constant.
+// A loaded kernel; copies share the library, which is unloaded with the last of them. Thread-safe: the table is
+// constant.
 class Kernel {
 public:
     // dlopen, then the checks: ABI version, structure size, digest as expected. Throws MachineError.
@@ -58,10 +67,12 @@ public:
     std::vector<real> velocity(const std::vector<real>& q, const std::vector<real>& p) const;
     // W = M^-1 grad V, n; S = M^-1 V'', n x n.
     void acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const;
-    std::vector<real> residual(const std::vector<real>& q, const std::vector<real>& p, const std::vector<real>& Q) const;  // N
-    std::vector<real> jacobian(const std::vector<real>& Q) const;                                                         // N x N
+    std::vector<real> residual(const std::vector<real>& q, const std::vector<real>& p,
+                               const std::vector<real>& Q) const;  // N
+    std::vector<real> jacobian(const std::vector<real>& Q) const;  // N x N
     // One step from (q, p) with its tangent map T, 2n x 2n; does not touch the trajectory.
-    lobatto_status tangent(const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1, std::vector<real>& p1, std::vector<real>& T) const;
+    lobatto_status tangent(const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1,
+                           std::vector<real>& p1, std::vector<real>& T) const;
 
     const Kernel& kernel() const { return kernel_; }
 

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The body of one emitted function: which values get a name, in which order, on which line.
+#include "generator/function_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
+namespace lobatto {
+
+namespace {
+
+bool is_identifier(const std::string& text) {
+    return !text.empty() && (std::isalpha(static_cast<unsigned char>(text[0])) != 0 || text[0] == '_') &&
+           std::all_of(text.begin(), text.end(),
+                       [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; });
+}
+
+}  // namespace
+
+Hoisted::Hoisted(const Programs& programs) {
+    const Graph& graph = programs.graph;
+    const auto is_early = [&graph](Id id) {
+        return graph[id].stage == Stage::parameter || graph[id].stage == Stage::step_size;
+    };
+    std::set<Id> wanted;
+    std::vector<Id> roots;
+    for (const Program& program : programs.programs) {
+        if (program.name == "prepare" || program.name == "prepare_map") continue;
+        for (const Output& output : program.outputs) {
+            roots.push_back(output.value);
+            if (is_early(output.value)) wanted.insert(output.value);
+        }
+    }
+    for (const Id id : graph.topological(roots))
+        if (graph[id].stage > Stage::step_size)
+            for (const Id operand : graph[id].operands)
+                if (is_early(operand)) wanted.insert(operand);
+    std::vector<Id> all = graph.topological(roots);
+    std::stable_partition(all.begin(), all.end(), [&graph](Id id) { return graph[id].op == Op::input; });
+    std::set<std::string> taken{"Phi"};
+    std::map<Id, std::string> suggested;
+    for (const auto& [id, name] : programs.names) suggested.emplace(id, name);
+    int counter = 0;
+    for (const Id id : all) {
+        if (!wanted.contains(id)) continue;
+        std::string name;
+        if (graph[id].op == Op::input)
+            name = graph.input_of(id).code;
+        else if (const auto known = suggested.find(id); known != suggested.end())
+            name = known->second;
+        while (name.empty() || taken.contains(name)) name = fmt::format("k{}", ++counter);
+        taken.insert(name);
+        names[id] = name;
+        order.push_back(id);
+    }
+}
+
+FunctionText::FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
+                           Precision precision, Stage given) {
+    const Graph& graph = programs.graph;
+    std::vector<Id> roots;
+    for (const Statement& statement : statements) roots.push_back(statement.value);
+    // What this function computes: everything below the roots that is not given.
+    std::vector<Id> computed;
+    std::map<Id, int> uses;
+    {
+        std::set<Id> seen;
+        const std::function<void(Id)> visit = [&](Id id) {
+            ++uses[id];
+            if (!seen.insert(id).second) return;
+            if (graph.is_constant(id) || graph[id].op == Op::input ||
+                (graph[id].stage <= given && !external(id).empty()))
+                return;
+            for (const Id operand : graph[id].operands) visit(operand);
+            computed.push_back(id);
+        };
+        for (const Id root : roots) visit(root);
+    }
+    std::map<Id, std::vector<Id>> pairs;
+    for (const Id id : computed)
+        if (graph[id].op == Op::pair_sine || graph[id].op == Op::pair_cosine)
+            pairs[graph[id].operands[0]].push_back(id);
+
+    // Local names: scene names for inputs such as q[0], then temporaries.
+    std::set<std::string> taken;
+    for (const Input& input : graph.inputs()) taken.insert(input.code.substr(0, input.code.find('[')));
+    for (const char* name : {"k",
+                             "p",
+                             "h",
+                             "q",
+                             "u",
+                             "v",
+                             "W",
+                             "S",
+                             "Q",
+                             "F",
+                             "J",
+                             "W0",
+                             "W1",
+                             "q1",
+                             "p1",
+                             "u1",
+                             "W_before",
+                             "base",
+                             "delta",
+                             "velocity",
+                             "real",
+                             "name",
+                             "digest",
+                             "coordinates",
+                             "points",
+                             "order",
+                             "unknowns",
+                             "linear",
+                             "parameter_count",
+                             "entries",
+                             "entry_row",
+                             "entry_column",
+                             "c",
+                             "b",
+                             "A",
+                             "parameter",
+                             "prepare",
+                             "energy",
+                             "momentum",
+                             "node",
+                             "acceleration",
+                             "drift",
+                             "simple_start",
+                             "extrapolated_start",
+                             "residual",
+                             "jacobian",
+                             "correction",
+                             "carry",
+                             "arrive",
+                             "finish",
+                             "propagate",
+                             "not_finite",
+                             "Status"})
+        taken.insert(name);
+    std::map<Id, std::string> local;
+    std::string aliases;
+    for (const auto& [id, count] : uses) {
+        if (graph[id].op != Op::input || graph[id].stage <= Stage::step_size) continue;
+        const Input& input = graph.input_of(id);
+        if (input.name == input.code || !is_identifier(input.name) || taken.contains(input.name)) continue;
+        local[id] = input.name;
+        aliases += fmt::format("        const real {} = {};\n", input.name, input.code);
+        taken.insert(input.name);
+    }
+    std::map<Id, std::string> suggested;
+    for (const auto& [id, name] : programs.names) suggested.emplace(id, name);
+    int counter = 0;
+    const auto fresh = [&](const std::string& wish) {
+        std::string name = wish;
+        while (name.empty() || taken.contains(name)) name = fmt::format("t{}", ++counter);
+        taken.insert(name);
+        return name;
+    };
+    const Naming naming = [&](Id id) -> std::string {
+        if (const auto known = local.find(id); known != local.end()) return known->second;
+        return graph.is_constant(id) ? "" : external(id);
+    };
+    const auto text_of = [&](Id id) {
+        const std::string name = naming(id);
+        return name.empty() ? formula(graph, id, Notation::cpp, naming, precision) : name;
+    };
+
+    const auto assign = [&](const Statement& statement) {
+        if (statement.target == "return")
+            text_ += wrapped(fmt::format("        return {};", text_of(statement.value)), "            ");
+        else if (statement.target == "return finite")
+            text_ += wrapped(fmt::format("        return lobatto::is_finite({});", text_of(statement.value)),
+                             "            ");
+        else
+            text_ +=
+                wrapped(fmt::format("        {} = {};", statement.target, text_of(statement.value)), "            ");
+        // A field of k or a local constant may serve as the value's name from here on.
+        if (statement.target.rfind("k.", 0) == 0 && !local.contains(statement.value) &&
+            graph[statement.value].op != Op::input)
+            local[statement.value] = statement.target;
+    };
+    std::set<Id> emitted;
+    const std::function<void(Id)> compute = [&](Id id) {
+        if (!emitted.insert(id).second || std::find(computed.begin(), computed.end(), id) == computed.end()) return;
+        if (local.contains(id)) return;
+        for (const Id operand : graph[id].operands) compute(operand);
+        const Node& node = graph[id];
+        if (node.op == Op::pair_sine || node.op == Op::pair_cosine) {
+            const auto& both = pairs[node.operands[0]];
+            if (both.size() == 2) {
+                if (local.contains(id)) return;
+                const Id argument = graph[node.operands[0]].operands[0];
+                const std::string text = text_of(argument);
+                const std::string suffix = is_identifier(text) ? text : "";
+                for (const Id half : both) {
+                    const bool sine = graph[half].op == Op::pair_sine;
+                    local[half] = fresh(suffix.empty() ? "" : (sine ? "sin_" : "cos_") + suffix);
+                }
+                const Id sine = graph[both[0]].op == Op::pair_sine ? both[0] : both[1];
+                const Id cosine = graph[both[0]].op == Op::pair_sine ? both[1] : both[0];
+                text_ += fmt::format("        real {}, {};\n", local[sine], local[cosine]);
+                text_ += wrapped(fmt::format("        lobatto::sincos({}, {}, {});", text, local[sine], local[cosine]),
+                                 "            ");
+                return;
+            }
+        }
+        if (node.op == Op::sincos_pair) return;
+        if (uses[id] > 1) {
+            const auto wish = suggested.find(id);
+            const std::string name = fresh(wish == suggested.end() ? "" : wish->second);
+            text_ += wrapped(
+                fmt::format("        const real {} = {};", name, formula(graph, id, Notation::cpp, naming, precision)),
+                "            ");
+            local[id] = name;
+        }
+    };
+    for (const Statement& statement : statements) {
+        // The root itself is printed in its assignment, unless others use it too.
+        const bool is_field = statement.target.rfind("k.", 0) == 0;
+        if (is_field && !local.contains(statement.value)) {
+            for (const Id operand : graph[statement.value].operands) compute(operand);
+            emitted.insert(statement.value);
+        } else {
+            compute(statement.value);
+        }
+        assign(statement);
+    }
+    text_ = aliases + text_;
+}
+
+std::string wrapped(const std::string& line, const std::string& indent) {
+    constexpr std::size_t limit = 120;
+    std::string rest = line, text;
+    while (rest.size() > limit) {
+        std::size_t cut = rest.rfind(' ', limit);
+        if (cut == std::string::npos || cut <= indent.size()) break;
+        text += rest.substr(0, cut) + "\n";
+        rest = indent + rest.substr(cut + 1);
+    }
+    return text + rest + "\n";
+}
+
+bool mentions(const std::string& text, const std::string& identifier) {
+    const auto is_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+    for (std::size_t at = text.find(identifier); at != std::string::npos; at = text.find(identifier, at + 1)) {
+        const bool starts = at == 0 || !is_word(text[at - 1]);
+        const std::size_t end = at + identifier.size();
+        if (starts && (end == text.size() || !is_word(text[end]))) return true;
+    }
+    return false;
+}
+
+}  // namespace lobatto

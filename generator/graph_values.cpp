@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The graph's two bridges: from GiNaC expressions, and to numbers of 60 digits (CLN).
+#include <cln/cln.h>
+
+#include <optional>
+
+#include "generator/graph.hpp"
+
+namespace lobatto {
+
+namespace {
+
+const cln::float_format_t format = cln::float_format(number_digits);
+
+cln::cl_F real(const cln::cl_R& x) {
+    return cln::cl_float(x, format);
+}
+
+cln::cl_R real_part_of(const cln::cl_N& z, const char* what) {
+    if (!cln::zerop(cln::imagpart(z))) throw DomainError(std::string(what) + " of a value outside its domain");
+    return cln::realpart(z);
+}
+
+std::optional<Op> function_op(const std::string& name) {
+    static const std::map<std::string, Op> ops = {{"sin", Op::sin},   {"cos", Op::cos},   {"tan", Op::tan},
+                                                  {"exp", Op::exp},   {"log", Op::log},   {"sinh", Op::sinh},
+                                                  {"cosh", Op::cosh}, {"tanh", Op::tanh}, {"asin", Op::asin},
+                                                  {"acos", Op::acos}, {"atan", Op::atan}};
+    const auto found = ops.find(name);
+    return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
+}
+
+}  // namespace
+
+cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
+    switch (op) {
+        case Op::add: {
+            cln::cl_R sum = 0;
+            for (const auto& term : x) sum = sum + term;
+            return sum;
+        }
+        case Op::multiply: {
+            cln::cl_R product = 1;
+            for (const auto& factor : x) product = product * factor;
+            return product;
+        }
+        case Op::power:
+            if (exponent < 0 && cln::zerop(x[0])) throw DomainError("division by zero");
+            return cln::the<cln::cl_R>(cln::expt(x[0], exponent));
+        case Op::sqrt: {
+            if (cln::minusp(x[0])) throw DomainError("square root of a negative number");
+            cln::cl_RA root;
+            if (is_rational(x[0]) && cln::sqrtp(cln::the<cln::cl_RA>(x[0]), &root)) return root;
+            return cln::sqrt(real(x[0]));
+        }
+        case Op::sin:
+        case Op::pair_sine:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sin(real(x[0])));
+        case Op::cos:
+        case Op::pair_cosine:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cos(real(x[0])));
+        case Op::sincos_pair:
+            return x[0];  // carries its argument; the halves above evaluate it
+        case Op::tan:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tan(real(x[0])));
+        case Op::exp:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::exp(real(x[0])));
+        case Op::log:
+            if (!cln::plusp(x[0])) throw DomainError("logarithm of a number that is not positive");
+            return x[0] == 1 ? cln::cl_R(0) : cln::cl_R(cln::ln(real(x[0])));
+        case Op::sinh:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sinh(real(x[0])));
+        case Op::cosh:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cosh(real(x[0])));
+        case Op::tanh:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tanh(real(x[0])));
+        case Op::asin:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : real_part_of(cln::asin(real(x[0])), "asin");
+        case Op::acos:
+            return real_part_of(cln::acos(real(x[0])), "acos");
+        case Op::atan:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
+        case Op::raise:
+            if (!cln::plusp(x[0])) throw DomainError("real power of a number that is not positive");
+            return cln::exp(real(x[1]) * cln::ln(real(x[0])));
+        case Op::constant:
+        case Op::input:
+            break;
+    }
+    throw std::logic_error("apply: not an operation");
+}
+
+std::vector<cln::cl_R> Graph::evaluate(const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots) const {
+    std::vector<cln::cl_R> values(nodes_.size());
+    for (const Id id : topological(roots)) {
+        const Node& node = (*this)[id];
+        cln::cl_R& value = values[static_cast<std::size_t>(id)];
+        if (node.op == Op::constant) {
+            value = constant_of(id).value;
+        } else if (node.op == Op::input) {
+            value = inputs[static_cast<std::size_t>(node.index)];
+        } else {
+            std::vector<cln::cl_R> operands;
+            for (const Id operand : node.operands) operands.push_back(values[static_cast<std::size_t>(operand)]);
+            value = apply(node.op, node.index, operands);
+        }
+    }
+    return values;
+}
+
+Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
+    std::map<GiNaC::ex, Id, GiNaC::ex_is_less> done;
+    const auto convert = [&](const auto& self, const GiNaC::ex& e) -> Id {
+        const auto known = done.find(e);
+        if (known != done.end()) return known->second;
+        Id id = 0;
+        if (GiNaC::is_a<GiNaC::numeric>(e)) {
+            const GiNaC::numeric& value = GiNaC::ex_to<GiNaC::numeric>(e);
+            if (!value.is_real()) throw std::logic_error("a complex number in a real expression");
+            id = constant(cln::the<cln::cl_R>(value.to_cl_N()));
+        } else if (GiNaC::is_a<GiNaC::symbol>(e)) {
+            const auto place = inputs.find(e);
+            if (place == inputs.end())
+                throw std::logic_error("a symbol without input: " + GiNaC::ex_to<GiNaC::symbol>(e).get_name());
+            id = static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(place->second).to_int());
+        } else if (e.is_equal(GiNaC::Pi)) {
+            id = constant(cln::pi(format), "pi");
+        } else if (GiNaC::is_a<GiNaC::add>(e) || GiNaC::is_a<GiNaC::mul>(e)) {
+            std::vector<Id> operands;
+            for (const auto& operand : e) operands.push_back(self(self, operand));
+            id = GiNaC::is_a<GiNaC::add>(e) ? add(std::move(operands)) : multiply(std::move(operands));
+        } else if (GiNaC::is_a<GiNaC::power>(e)) {
+            const Id base = self(self, e.op(0));
+            const GiNaC::ex exponent = e.op(1);
+            if (exponent.info(GiNaC::info_flags::integer)) {
+                id = power(base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
+            } else if ((2 * exponent).info(GiNaC::info_flags::integer)) {
+                // x^(k/2) with k odd: sqrt(x) x^((k-1)/2), one root for all such powers.
+                const int k = GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int();
+                id = multiply({function(Op::sqrt, base), power(base, (k - 1) / 2)});
+            } else {
+                id = raise(base, self(self, exponent));
+            }
+        } else if (GiNaC::is_a<GiNaC::function>(e)) {
+            const std::string name = GiNaC::ex_to<GiNaC::function>(e).get_name();
+            const auto op = function_op(name);
+            if (!op || e.nops() != 1) throw std::logic_error("a function the graph does not know: " + name);
+            id = function(*op, self(self, e.op(0)));
+        } else {
+            throw std::logic_error("an expression the graph does not know");
+        }
+        done.emplace(e, id);
+        return id;
+    };
+    return convert(convert, expression);
+}
+
+}  // namespace lobatto

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What a kernel computes, as programs over one graph: node, drift, start values, correction, arrival, energy ...
+// (docs/derivation.md).
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "generator/passes.hpp"
+
+namespace lobatto {
+
+struct Derivation;
+
+// The programs of a scene's kernel, as derived, before any pass. Shapes of the inputs and outputs are those of
+// runtime/kernel.hpp.
+Programs build_programs(const Derivation& derivation);
+
+// A name of the scene as a C++ identifier that is no keyword.
+std::string identifier(const std::string& name);
+
+// Unknowns N of the stage equations up to which the Newton correction is written in closed form (Cramer's rule).
+constexpr int closed_form_limit = 3;
+
+}  // namespace lobatto

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "runtime/compile.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstring>
+
+#include "runtime/cache.hpp"
+#include "runtime/compiler.hpp"
+#include "runtime/error.hpp"
+#include "runtime/kernel_abi.h"
+#include "runtime/process.hpp"
+
+namespace lobatto {
+namespace {
+
+constexpr int shown_lines = 40;
+
+// As one would type it; words with anything unusual are quoted.
+std::string shell_text(const std::vector<std::string>& arguments) {
+    std::string text;
+    for (const std::string& argument : arguments) {
+        const bool is_plain = argument.find_first_not_of(
+                                  "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                                  "_-+=./:,") == std::string::npos;
+        if (!text.empty()) text += ' ';
+        if (is_plain && !argument.empty()) {
+            text += argument;
+            continue;
+        }
+        text += '\'';
+        for (const char c : argument) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        text += '\'';
+    }
+    return text;
+}
+
+std::string first_lines(const std::string& output) {
+    std::size_t end = 0;
+    for (int line = 0; line < shown_lines && end < output.size(); ++line) {
+        const std::size_t newline = output.find('\n', end);
+        end = newline == std::string::npos ? output.size() : newline + 1;
+    }
+    return output.substr(0, end) + (end < output.size() ? "[...]\n" : "");
+}
+
+std::string how_it_ended(const ProcessResult& result, double seconds_limit) {
+    if (result.timed_out) return fmt::format("did not finish within {} s", seconds_limit);
+    if (result.signal != 0) {
+        return fmt::format("was ended by signal {} ({}); a common cause is too little memory", result.signal,
+                           ::strsignal(result.signal));
+    }
+    return fmt::format("failed with exit code {}", result.exit_code);
+}
+
+}  // namespace
+
+Compiled compile(const Translation& translation) {
+    const Compiler compiler = find_compiler(translation.quadruple);
+    const std::string source = translation.name + ".cpp", object = translation.name + ".so";
+    ProcessRequest request;
+    request.arguments = compile_arguments(compiler, source, object, translation.quadruple);
+    const std::string command = shell_text(request.arguments);
+
+    const CacheEntry entry(
+        translation.name,
+        fmt::format("interface: {}\ncommand: {}\ncompiler: {}processor:\n{}source:\n{}", LOBATTO_ABI_VERSION, command,
+                    compiler.identity, processor_identity(), translation.text));
+    if (entry.is_valid()) return {entry.object_path(), command, true, 0};
+
+    const CacheEntry::Lock lock(entry);
+    if (entry.is_valid()) return {entry.object_path(), command, true, 0};  // built by another while we waited
+
+    request.folder = entry.building_path();
+    request.environment = {{"TMPDIR", request.folder}};  // what a killed compiler leaves is removed with the folder
+    write_file(request.folder + "/" + source, translation.text);
+    const auto start = std::chrono::steady_clock::now();
+    const ProcessResult result = run_process(request);
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    if (!result.succeeded()) {
+        write_file(request.folder + "/command", command + "\n");
+        write_file(request.folder + "/output", result.output);
+        entry.keep_failure();
+        throw MachineError(fmt::format(
+            "the C++ compiler {}.\nCommand: {}\nIts output:\n{}Source, command and whole output are kept in {}",
+            how_it_ended(result, request.seconds_limit), command, first_lines(result.output), entry.failed_path()));
+    }
+    entry.publish(object);
+    return {entry.object_path(), command, false, elapsed.count()};
+}
+
+}  // namespace lobatto

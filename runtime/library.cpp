@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+#include "runtime/library.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <cassert>
+#include <cstring>
+
+#include "runtime/error.hpp"
+
+namespace lobatto {
+namespace {
+
+[[noreturn]] void fail(const std::string& object, const std::string& reason) {
+    throw MachineError(fmt::format("cannot use the compiled kernel {}: {}; delete this file, and it is compiled again",
+                                   object, reason));
+}
+
+// Whether it can be aligned and what alignment costs is known only at run time, so memory has room for both.
+std::size_t memory_bytes(const lobatto_kernel& table) {
+    return static_cast<std::size_t>(table.stepper_bytes + table.stepper_alignment);
+}
+
+void* aligned(std::byte* memory, const lobatto_kernel& table) {
+    void* place = memory;
+    std::size_t space = memory_bytes(table);
+    return std::align(static_cast<std::size_t>(table.stepper_alignment), static_cast<std::size_t>(table.stepper_bytes),
+                      place, space);
+}
+
+const char* name_of(lobatto_real kind) {
+    switch (kind) {
+        case LOBATTO_FLOAT:
+            return "float";
+        case LOBATTO_DOUBLE:
+            return "double";
+        case LOBATTO_LONG_DOUBLE:
+            return "long double";
+        case LOBATTO_FLOAT128:
+            return "__float128";
+    }
+    return "an unknown number type";
+}
+
+}  // namespace
+
+Kernel Kernel::load(const std::string& object, const std::string& expected_digest) {
+    Kernel kernel;
+    void* const library = ::dlopen(object.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library == nullptr) fail(object, ::dlerror());
+    kernel.library_ = std::shared_ptr<void>(library, [](void* handle) { ::dlclose(handle); });
+
+    using Fetch = const lobatto_kernel* (*)();
+    const auto fetch = reinterpret_cast<Fetch>(::dlsym(library, "lobatto_kernel_table"));
+    if (fetch == nullptr) fail(object, "it has no function lobatto_kernel_table, so it is not a kernel");
+    kernel.table_ = fetch();
+    if (kernel.table_->abi_version != LOBATTO_ABI_VERSION) {
+        fail(object, fmt::format("it speaks version {} of the kernel interface, this program version {}",
+                                 kernel.table_->abi_version, LOBATTO_ABI_VERSION));
+    }
+    if (kernel.table_->bytes != sizeof(lobatto_kernel)) {
+        fail(object, fmt::format("its function table has {} bytes instead of {}", kernel.table_->bytes,
+                                 sizeof(lobatto_kernel)));
+    }
+    if (kernel.table_->digest != expected_digest) {
+        fail(object,
+             fmt::format("its formulas have the digest {} instead of {}", kernel.table_->digest, expected_digest));
+    }
+    return kernel;
+}
+
+template <class real>
+Stepper<real>::Stepper(Kernel kernel) : kernel_(std::move(kernel)) {
+    const auto kind = static_cast<lobatto_real>(kernel_->real_kind);
+    if (kind != real_kind<real>() || kernel_->real_bytes != static_cast<std::int32_t>(sizeof(real))) {
+        throw MachineError(fmt::format("the kernel {} computes in {}, but was asked to compute in {}", kernel_->name,
+                                       name_of(kind), name_of(real_kind<real>())));
+    }
+    memory_ = std::make_unique<std::byte[]>(memory_bytes(kernel_.table()));
+    stepper_ = aligned(memory_.get(), kernel_.table());
+}
+
+template <class real>
+Stepper<real>::Stepper(const Stepper& other) : Stepper(other.kernel_) {
+    std::memcpy(stepper_, other.stepper_, static_cast<std::size_t>(kernel_->stepper_bytes));
+}
+
+template <class real>
+Stepper<real>& Stepper<real>::operator=(const Stepper& other) {
+    return *this = Stepper(other);
+}
+
+template <class real>
+lobatto_status Stepper<real>::prepare(const std::vector<real>& parameters, real step) {
+    assert(std::ssize(parameters) == kernel_->parameters);
+    return static_cast<lobatto_status>(kernel_->prepare(stepper_, parameters.data(), &step));
+}
+
+template <class real>
+lobatto_status Stepper<real>::start(real time, const std::vector<real>& q, const std::vector<real>& p) {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    return static_cast<lobatto_status>(kernel_->start(stepper_, &time, q.data(), p.data()));
+}
+
+template <class real>
+lobatto_status Stepper<real>::advance(lobatto_advance& call) {
+    return static_cast<lobatto_status>(kernel_->advance(stepper_, &call));
+}
+
+template <class real>
+void Stepper<real>::state(real& time, std::vector<real>& q, std::vector<real>& p) const {
+    q.resize(kernel_->coordinates);
+    p.resize(kernel_->coordinates);
+    kernel_->state(stepper_, &time, q.data(), p.data());
+}
+
+template <class real>
+real Stepper<real>::energy(const std::vector<real>& q, const std::vector<real>& p) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    real energy{};
+    kernel_->energy(stepper_, q.data(), p.data(), &energy);
+    return energy;
+}
+
+template <class real>
+std::vector<real> Stepper<real>::momentum(const std::vector<real>& q, const std::vector<real>& velocity) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);
+    std::vector<real> p(kernel_->coordinates);
+    kernel_->momentum(stepper_, q.data(), velocity.data(), p.data());
+    return p;
+}
+
+template <class real>
+std::vector<real> Stepper<real>::velocity(const std::vector<real>& q, const std::vector<real>& p) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    std::vector<real> velocity(kernel_->coordinates);
+    kernel_->velocity(stepper_, q.data(), p.data(), velocity.data());
+    return velocity;
+}
+
+template <class real>
+void Stepper<real>::acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const {
+    assert(std::ssize(q) == kernel_->coordinates);
+    W.resize(kernel_->coordinates);
+    S.resize(kernel_->coordinates * kernel_->coordinates);
+    kernel_->acceleration(stepper_, q.data(), W.data(), S.data());
+}
+
+template <class real>
+std::vector<real> Stepper<real>::residual(const std::vector<real>& q, const std::vector<real>& p,
+                                          const std::vector<real>& Q) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    assert(std::ssize(Q) == kernel_->unknowns);
+    std::vector<real> F(kernel_->unknowns);
+    kernel_->residual(stepper_, q.data(), p.data(), Q.data(), F.data());
+    return F;
+}
+
+template <class real>
+std::vector<real> Stepper<real>::jacobian(const std::vector<real>& Q) const {
+    assert(std::ssize(Q) == kernel_->unknowns);
+    std::vector<real> J(kernel_->unknowns * kernel_->unknowns);
+    kernel_->jacobian(stepper_, Q.data(), J.data());
+    return J;
+}
+
+template <class real>
+lobatto_status Stepper<real>::tangent(const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1,
+                                      std::vector<real>& p1, std::vector<real>& T) const {
+    const std::int32_t n = kernel_->coordinates;
+    assert(std::ssize(q) == n && std::ssize(p) == n);
+    q1.resize(n);
+    p1.resize(n);
+    T.resize(4 * n * n);
+    return static_cast<lobatto_status>(kernel_->tangent(stepper_, q.data(), p.data(), q1.data(), p1.data(), T.data()));
+}
+
+template class Stepper<float>;
+template class Stepper<double>;
+template class Stepper<long double>;
+template class Stepper<__float128>;
+
+}  // namespace lobatto

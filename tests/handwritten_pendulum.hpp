@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The paper's four-point scheme for the pendulum V = m omega^2 (1 - cos q), written by hand: the reference for emitted
+// kernels.
+//
+// Eliminating q_r and p_r from eq:internesNL and eq:discreteDynamics leaves, with W = V'/m = omega^2 sin q and u = p/m,
+//     v       = u - h/12 W_l
+//     q_xi    = q_l + h xi v     - h^2 [ 1/60 W_xi             + (11 - 5 sqrt5)/120 W_{1-xi} ]
+//     q_{1-xi}= q_l + h (1-xi) v - h^2 [ (11 + 5 sqrt5)/120 W_xi + 1/60 W_{1-xi} ]
+//     q_r     = q_l + h v        - h^2 [ (5 + sqrt5)/24 W_xi     + (5 - sqrt5)/24 W_{1-xi} ]
+//     u_r     = v - h [ 5/12 W_xi + 5/12 W_{1-xi} + 1/12 W_r ]
+// The test "one step of the hand-written kernel satisfies the paper's equations" checks this elimination.
+#pragma once
+
+#include "runtime/kernel.hpp"
+
+namespace lobatto {
+
+struct HandwrittenPendulum {
+    using real = double;
+    static constexpr int coordinates = 1;
+    static constexpr int points = 4;
+    static constexpr int order = 6;
+    static constexpr int unknowns = 2;  // q_xi, q_{1-xi}
+    static constexpr int parameter_count = 2;
+    static constexpr int entries = 1;  // S = V''/m has one entry
+    static constexpr bool linear = false;
+    static constexpr const char* name = "handwritten_pendulum";
+    static constexpr const char* digest = "0123456789abcdef";
+    static constexpr int entry_row[1] = {0};
+    static constexpr int entry_column[1] = {0};
+
+    static constexpr real root5 = 2.2360679774997896964;
+    static constexpr real xi = 0.27639320225002103036;  // 1/2 - sqrt5/10
+    static constexpr real c[4] = {0, xi, 1 - xi, 1};
+    static constexpr real b[4] = {1.0 / 12, 5.0 / 12, 5.0 / 12, 1.0 / 12};
+    static constexpr real A[4] = {1.0 / 60, (11 - 5 * root5) / 120, (11 + 5 * root5) / 120, 1.0 / 60};
+
+    struct Parameters {
+        real m, omega;
+    };
+    static real& parameter(Parameters& parameters, int i) { return i == 0 ? parameters.m : parameters.omega; }
+
+    struct Coefficients {
+        real m, omega_squared, h;
+    };
+
+    static Status prepare(const Parameters& parameters, real h, Coefficients& k) {
+        k = {parameters.m, parameters.omega * parameters.omega, h};
+        return parameters.m != 0 ? Status::ok : Status::singular_mass;
+    }
+
+    static real energy(const Coefficients& k, const real* q, const real* p) {
+        return p[0] * p[0] / (2 * k.m) + k.m * k.omega_squared * (1 - std::cos(q[0]));
+    }
+    static void momentum(const Coefficients& k, const real* velocity, real* p) { p[0] = k.m * velocity[0]; }
+    static void velocity(const Coefficients& k, const real* p, real* velocity) { velocity[0] = p[0] / k.m; }
+
+    static void acceleration(const Coefficients& k, const real* q, real* W) {
+        real sine, cosine;
+        sincos(q[0], sine, cosine);
+        W[0] = k.omega_squared * sine;
+    }
+    static void node(const Coefficients& k, const real* q, real* W, real* S) {
+        real sine, cosine;
+        sincos(q[0], sine, cosine);
+        W[0] = k.omega_squared * sine;
+        S[0] = k.omega_squared * cosine;
+    }
+
+    // base: what is known of q_xi, q_{1-xi} and q_r before the inner accelerations are.
+    static void drift(const Coefficients& k, const real* q, const real* u, const real* W0, real* v, real* base) {
+        v[0] = u[0] - k.h * b[0] * W0[0];
+        for (int i = 1; i < 4; ++i) base[i - 1] = q[0] + k.h * c[i] * v[0];
+    }
+
+    static void positions(const Coefficients& k, const real* base, const real* W, real* Q) {
+        Q[0] = base[0] - k.h * k.h * (A[0] * W[0] + A[1] * W[1]);
+        Q[1] = base[1] - k.h * k.h * (A[2] * W[0] + A[3] * W[1]);
+    }
+
+    static void simple_start(const Coefficients& k, const real* base, const real* W0, real* Q) {
+        const real W[2] = {W0[0], W0[0]};
+        positions(k, base, W, Q);
+    }
+
+    // The cubic through the last step's four accelerations, continued to the times 1 + xi and 2 - xi.
+    static void extrapolated_start(const Coefficients& k, const real* base, const real* W_previous, real* Q) {
+        real W[2] = {0, 0};
+        for (int i = 0; i < 2; ++i) {
+            for (int j = 0; j < 4; ++j) {
+                real basis = 1;
+                for (int l = 0; l < 4; ++l) {
+                    if (l != j) basis *= (1 + c[i + 1] - c[l]) / (c[j] - c[l]);
+                }
+                W[i] += basis * W_previous[j];
+            }
+        }
+        positions(k, base, W, Q);
+    }
+
+    static void residual(const Coefficients& k, const real* base, const real* Q, const real* W, real* F) {
+        real solved[2];
+        positions(k, base, W, solved);
+        for (int i = 0; i < 2; ++i) F[i] = Q[i] - solved[i];
+    }
+
+    static void jacobian(const Coefficients& k, const real* S, real* J) {
+        J[0] = 1 + k.h * k.h * A[0] * S[0];
+        J[1] = k.h * k.h * A[1] * S[1];
+        J[2] = k.h * k.h * A[2] * S[0];
+        J[3] = 1 + k.h * k.h * A[3] * S[1];
+    }
+
+    static bool correction(const Coefficients& k, const real* base, const real* Q, const real* W, const real* S,
+                           real* delta) {
+        real F[2], J[4];
+        residual(k, base, Q, W, F);
+        jacobian(k, S, J);
+        const real determinant = J[0] * J[3] - J[1] * J[2];
+        delta[0] = -(J[3] * F[0] - J[1] * F[1]) / determinant;
+        delta[1] = -(J[0] * F[1] - J[2] * F[0]) / determinant;
+        return determinant != 0;
+    }
+
+    static void carry(const Coefficients&, const real* S, const real* delta, real* W) {
+        for (int i = 0; i < 2; ++i) W[i] += S[i] * delta[i];
+    }
+
+    static void arrive(const Coefficients& k, const real* base, const real* W, real* q1) {
+        q1[0] = base[2] - k.h * k.h * ((5 + root5) / 24 * W[0] + (5 - root5) / 24 * W[1]);
+    }
+
+    static void finish(const Coefficients& k, const real* v, const real* W, const real* W1, real* u1) {
+        u1[0] = v[0] - k.h * (b[1] * W[0] + b[2] * W[1] + b[3] * W1[0]);
+    }
+};
+
+}  // namespace lobatto
