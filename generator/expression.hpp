@@ -28,15 +28,16 @@ struct Scope {
 
 // Bounds, stated in docs/scene_format.md and in the errors.
 struct ExpressionLimits {
-    static constexpr int depth = 200;            // nested parentheses, functions, signs and powers
-    static constexpr int length = 100000;        // bytes of one formula
-    static constexpr int exponent = 64;          // |integer exponent| of anything but a number
-    static constexpr int number_bits = 4096;     // size of an exact number
+    static constexpr int depth = 200;         // nested parentheses, functions, signs and powers
+    static constexpr int length = 100000;     // bytes of one formula
+    static constexpr int exponent = 64;       // |integer exponent| of anything but a number
+    static constexpr int number_bits = 4096;  // size of an exact number
 };
 
-// Grammar: + - * / ^ (right-associative; -x^2 is -(x^2), 2^-1 is allowed), parentheses, numbers (0.1 is exactly 1/10), pi, and the functions
-// sqrt sin cos tan exp log sinh cosh tanh asin acos atan. Throws InputError.
-// `used` collects the names that occur.
-GiNaC::ex parse_expression(const Source& source, const Text& text, const Scope& scope, std::map<std::string, bool>* used = nullptr);
+// Grammar: + - * / ^ (right-associative; -x^2 is -(x^2), 2^-1 is allowed), parentheses, numbers (0.1 is exactly 1/10),
+// pi, and the functions sqrt sin cos tan exp log sinh cosh tanh asin acos atan. Throws InputError. `used` collects the
+// names that occur.
+GiNaC::ex parse_expression(const Source& source, const Text& text, const Scope& scope,
+                           std::map<std::string, bool>* used = nullptr);
 
 }  // namespace lobatto

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The only file that knows toml++. It gives values with line and column of their beginning; keys come sorted by name,
+// so order is restored by position, and the bytes of strings and numbers are found again in the raw text.
+#include "generator/document.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cassert>
+#include <tuple>
+
+namespace lobatto {
+namespace {
+
+constexpr int longest_key = 16;  // parts of a dotted key: toml++ nests a table for each, without a bound
+
+Position position_of(const toml::source_region& region) {
+    return {static_cast<int>(region.begin.line), static_cast<int>(region.begin.column)};
+}
+
+// A place in the raw text that moves character by character and knows its line and column.
+class Cursor {
+public:
+    explicit Cursor(std::string_view content) : content_(content) { starts_.push_back(0); }
+
+    void move_to(Position target) {
+        if (target.line != position_.line || target.column < position_.column) {
+            while (starts_.size() < static_cast<std::size_t>(target.line))
+                starts_.push_back(content_.find('\n', starts_.back()) + 1);
+            offset_ = starts_[static_cast<std::size_t>(target.line - 1)];
+            position_ = {target.line, 1};
+        }
+        while (position_.column < target.column) advance();
+    }
+    void advance() {
+        if (content_[offset_] == '\n') {
+            ++position_.line;
+            position_.column = 0;
+        }
+        offset_ += character_length(content_.substr(offset_));
+        ++position_.column;
+    }
+    void advance(std::size_t characters) {
+        for (; characters > 0; --characters) advance();
+    }
+    std::string_view rest() const { return content_.substr(offset_); }
+    char front() const { return offset_ < content_.size() ? content_[offset_] : '\0'; }
+    Position position() const { return position_; }
+
+private:
+    std::string_view content_;
+    std::vector<std::size_t> starts_;  // of the lines seen so far
+    std::size_t offset_ = 0;
+    Position position_;
+};
+
+// What the escape at the cursor (after the backslash) stands for is known from the value; how long it is, from its
+// letter.
+std::size_t escape_length(char letter) {
+    return letter == 'u' ? 5 : letter == 'U' ? 9 : 1;
+}
+
+// The places of all bytes of a string value: walks through quotes, escapes, folded line ends and CRLF beside the
+// decoded value.
+Text locate_string(Cursor& cursor, const std::string& value) {
+    Text text{value, {}};
+    text.at.reserve(value.size() + 1);
+    const char quote = cursor.front();
+    assert(quote == '"' || quote == '\'');
+    const bool multiline = cursor.rest().starts_with(std::string(3, quote));
+    cursor.advance(multiline ? 3 : 1);
+    if (multiline) {
+        if (cursor.front() == '\r') cursor.advance();
+        if (cursor.front() == '\n') cursor.advance();
+    }
+    while (text.at.size() < value.size()) {
+        const Position here = cursor.position();
+        const std::string_view rest = std::string_view(value).substr(text.at.size());
+        if (quote == '"' && cursor.front() == '\\') {
+            cursor.advance();
+            if (multiline && std::string_view(" \t\r\n").find(cursor.front()) != std::string_view::npos) {
+                while (std::string_view(" \t\r\n").find(cursor.front()) != std::string_view::npos) cursor.advance();
+                continue;
+            }
+            cursor.advance(escape_length(cursor.front()));
+        } else {
+            if (cursor.front() == '\r') cursor.advance();
+            assert(cursor.front() == rest.front());
+            cursor.advance();
+        }
+        text.at.insert(text.at.end(), character_length(rest), here);
+    }
+    text.at.push_back(cursor.position());
+    return text;
+}
+
+// The characters of a number as they stand in the file, without the underscores and the plus sign that formulas do not
+// know.
+Text locate_number(Cursor& cursor) {
+    Text text;
+    const std::string_view digits = "0123456789abcdefABCDEF_+-.xXoO";
+    for (; digits.find(cursor.front()) != std::string_view::npos; cursor.advance()) {
+        const bool leading_plus = cursor.front() == '+' && text.value.empty();
+        if (cursor.front() == '_' || leading_plus) continue;
+        text.value += cursor.front();
+        text.at.push_back(cursor.position());
+    }
+    text.at.push_back(cursor.position());
+    return text;
+}
+
+Value convert(const Source& source, Cursor& cursor, const toml::node& node);
+
+std::vector<Entry> convert_entries(const Source& source, Cursor& cursor, const toml::table& table) {
+    struct Pending {
+        Position at;
+        std::string_view key;
+        const toml::node* node;
+    };
+    std::vector<Pending> pending;
+    for (const auto& [key, node] : table) pending.push_back({position_of(key.source()), key.str(), &node});
+    std::sort(pending.begin(), pending.end(), [](const Pending& a, const Pending& b) {
+        return std::tie(a.at.line, a.at.column) < std::tie(b.at.line, b.at.column);
+    });
+    std::vector<Entry> entries;
+    for (const Pending& next : pending)
+        entries.push_back({std::string(next.key), next.at, convert(source, cursor, *next.node)});
+    return entries;
+}
+
+Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
+    Value value;
+    value.at = position_of(node.source());
+    switch (node.type()) {
+        case toml::node_type::string:
+            value.kind = Value::Kind::text;
+            cursor.move_to(value.at);
+            value.text = locate_string(cursor, **node.as_string());
+            break;
+        case toml::node_type::integer:
+            value.kind = Value::Kind::integer;
+            value.integer = **node.as_integer();
+            cursor.move_to(value.at);
+            value.text = locate_number(cursor);
+            if (value.text.value.find_first_of("xXoObB") != std::string::npos) {
+                value.text.value = std::to_string(value.integer);
+                value.text.at.assign(value.text.value.size() + 1, value.at);
+            }
+            break;
+        case toml::node_type::floating_point:
+            value.kind = Value::Kind::real;
+            if (!std::isfinite(**node.as_floating_point()))
+                source.fail(value.at, "inf and nan are not numbers a scene can use; write a finite number");
+            cursor.move_to(value.at);
+            value.text = locate_number(cursor);
+            break;
+        case toml::node_type::boolean:
+            value.kind = Value::Kind::boolean;
+            value.boolean = **node.as_boolean();
+            break;
+        case toml::node_type::table:
+            value.entries = convert_entries(source, cursor, *node.as_table());
+            break;
+        default:
+            value.kind = Value::Kind::other;
+            break;
+    }
+    return value;
+}
+
+// Refuses keys of very many parts before toml++ nests a table for each. Dots are counted outside strings and comments,
+// from one
+// '=', ',' or line end to the next.
+void bound_dotted_keys(const Source& source) {
+    Cursor cursor(source.content());
+    int dots = 0;
+    while (!cursor.rest().empty()) {
+        const char c = cursor.front();
+        if (c == '"' || c == '\'') {
+            const bool multiline = cursor.rest().starts_with(std::string(3, c));
+            const std::string end = multiline ? std::string(3, c) : std::string(1, c);
+            cursor.advance(end.size());
+            while (!cursor.rest().empty() && !cursor.rest().starts_with(end) && (multiline || cursor.front() != '\n'))
+                cursor.advance(c == '"' && cursor.front() == '\\' && cursor.rest().size() > 1 ? 2 : 1);
+            for (std::size_t i = 0; i < end.size() && cursor.front() == c; ++i) cursor.advance();
+            continue;
+        }
+        if (c == '#')
+            while (!cursor.rest().empty() && cursor.front() != '\n') cursor.advance();
+        if (cursor.rest().empty()) break;
+        dots = c == '.' ? dots + 1 : c == '=' || c == ',' || c == '\n' || c == '#' ? 0 : dots;
+        if (dots >= longest_key)
+            source.fail(cursor.position(),
+                        fmt::format("a key with more than {} parts; no key of a scene has more than 3", longest_key));
+        cursor.advance();
+    }
+}
+
+}  // namespace
+
+std::string Value::kind_name() const {
+    switch (kind) {
+        case Kind::text:
+            return "a text";
+        case Kind::integer:
+            return "a whole number";
+        case Kind::real:
+            return "a number";
+        case Kind::boolean:
+            return "true or false";
+        case Kind::table:
+            return "a table";
+        case Kind::other:
+            break;
+    }
+    return "a list, a date or a time";
+}
+
+Value read_document(const Source& source) {
+    bound_dotted_keys(source);
+    try {
+        const toml::table root = toml::parse(std::string_view(source.content()));
+        Cursor cursor(source.content());
+        Value document;
+        document.entries = convert_entries(source, cursor, root);
+        return document;
+    } catch (const toml::parse_error& error) {
+        source.fail(position_of(error.source()), fmt::format("not valid TOML: {}", error.description()));
+    }
+}
+
+}  // namespace lobatto

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Values of constant expressions: 60 digits, every intermediate result a finite real number of bounded size.
+#pragma once
+
+#include <ginac/ginac.h>
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace lobatto {
+
+// Why an expression has no value, as a clause: "log of 0 is not finite".
+class NoValue : public std::domain_error {
+public:
+    using std::domain_error::domain_error;
+};
+
+// A function a formula may call: on expressions (exact) and on numbers (60 digits).
+struct Function {
+    std::string name;
+    GiNaC::ex (*symbolic)(const GiNaC::ex&);
+    GiNaC::numeric (*value)(const GiNaC::numeric&);
+};
+const std::vector<Function>& functions();
+const Function* find_function(const std::string& name);  // nullptr: there is none of this name
+
+// A number at 60 digits.
+GiNaC::numeric real_value(const GiNaC::numeric& exact);
+// All throw NoValue.
+GiNaC::numeric real_sum(const std::vector<GiNaC::numeric>& terms);  // a sum that cancels to rounding is exactly 0
+GiNaC::numeric real_product(const std::vector<GiNaC::numeric>& factors);
+GiNaC::numeric real_power(const GiNaC::numeric& base, const GiNaC::numeric& exponent);
+GiNaC::numeric real_function(const Function& function, const GiNaC::numeric& argument);
+// The value of a whole expression, its symbols replaced by numbers (60 digits) before anything is computed.
+GiNaC::numeric real_value(const GiNaC::ex& expression, const GiNaC::exmap& symbols = {});
+
+}  // namespace lobatto

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "generator/token.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace lobatto {
+namespace {
+
+bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+bool is_letter(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+}
+bool is_name_part(char c) {
+    return is_letter(c) || is_digit(c) || c == '_';
+}
+bool is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+// What people paste or type by habit, and what a formula has in its place.
+constexpr std::pair<std::string_view, std::string_view> mends[] = {
+    {"−", "write - instead"},
+    {"–", "write - instead"},
+    {"—", "write - instead"},
+    {"×", "write * instead"},
+    {"·", "write * instead"},
+    {"⋅", "write * instead"},
+    {"∙", "write * instead"},
+    {"÷", "write / instead"},
+    {"∕", "write / instead"},
+    {"²", "write ^2 instead"},
+    {"³", "write ^3 instead"},
+    {"⁴", "write ^4 instead"},
+    {"½", "write 1/2 instead"},
+    {"√", "write sqrt(...)"},
+    {"π", "write pi instead"},
+    {"′", "write ' instead"},
+    {"’", "write ' instead"},
+    {"‘", "write ' instead"},
+    {"`", "write ' instead"},
+    {"´", "write ' instead"},
+    {"″", "write q' for the velocity of q"},
+    {"\"", "write q' for the velocity of q"},
+    {"\u0307", "write q' for the velocity of q"},
+    {"α", "write alpha"},
+    {"β", "write beta"},
+    {"γ", "write gamma"},
+    {"δ", "write delta"},
+    {"ε", "write epsilon"},
+    {"θ", "write theta"},
+    {"κ", "write kappa"},
+    {"λ", "write lambda"},
+    {"μ", "write mu"},
+    {"ρ", "write rho"},
+    {"σ", "write sigma"},
+    {"φ", "write phi"},
+    {"ω", "write omega"},
+    {"Ω", "write Omega"},
+    {"\u00A0", "this is a no-break space: type a plain one"},
+    {",", "decimals have a point, and every function one argument"},
+    {"[", "write ( instead"},
+    {"]", "write ) instead"},
+    {"{", "write ( instead"},
+    {"}", "write ) instead"},
+    {"=", "a formula is one side only"},
+    {"_", "a name begins with a letter"}};
+
+class Lexer {
+public:
+    Lexer(const Source& source, const Text& text, const std::string& formula)
+        : source_(source), text_(text), value_(text.value), formula_(formula) {}
+
+    std::vector<Token> run() {
+        std::vector<Token> tokens;
+        for (;;) {
+            while (is_blank(at(0))) ++next_;
+            begin_ = next_;
+            if (next_ == value_.size()) {
+                tokens.push_back({Token::Kind::end, value_.substr(next_), text_.at[next_]});
+                return tokens;
+            }
+            tokens.push_back(read_token());
+        }
+    }
+
+private:
+    char at(std::size_t ahead) const { return next_ + ahead < value_.size() ? value_[next_ + ahead] : '\0'; }
+    Token token(Token::Kind kind) const { return {kind, value_.substr(begin_, next_ - begin_), text_.at[begin_]}; }
+    [[noreturn]] void fail(std::size_t byte, const std::string& message) const {
+        source_.fail(text_.at[byte], message);
+    }
+
+    Token read_token() {
+        const char c = at(0);
+        if (is_digit(c) || (c == '.' && is_digit(at(1)))) return read_number();
+        if (is_letter(c)) return read_name();
+        if (c == '*' && at(1) == '*') fail(next_, "'**' is not an operator: write ^ for powers");
+        if (c == '\'') fail(next_, "a prime ' belongs directly after the name of a coordinate");
+        if (std::string_view("+-*/^()").find(c) == std::string_view::npos) refuse_character();
+        ++next_;
+        return token(Token::Kind::sign);
+    }
+
+    // 12, 0.5, .5, 1.5e-3; the e belongs to the number only when digits follow.
+    Token read_number() {
+        const auto skip_digits = [&] {
+            while (is_digit(at(0))) ++next_;
+        };
+        skip_digits();
+        if (at(0) == '.') ++next_;
+        skip_digits();
+        if (at(0) == 'e' || at(0) == 'E') {
+            const std::size_t sign = at(1) == '+' || at(1) == '-' ? 1 : 0;
+            if (is_digit(at(1 + sign))) {
+                next_ += 1 + sign;
+                skip_digits();
+            }
+        }
+        if (at(0) == '.') {
+            while (is_digit(at(0)) || at(0) == '.') ++next_;
+            fail(begin_, fmt::format("'{}' is not a number: it has too many points",
+                                     value_.substr(begin_, std::min<std::size_t>(next_ - begin_, 40))));
+        }
+        return token(Token::Kind::number);
+    }
+
+    Token read_name() {
+        while (is_name_part(at(0))) ++next_;
+        if (at(0) != '\'') return token(Token::Kind::name);
+        ++next_;
+        Token name = token(Token::Kind::name);
+        name.primed = true;
+        if (at(0) == '\'')
+            fail(next_,
+                 fmt::format("'{}'' is an acceleration; a Lagrangian has positions and velocities only", name.text));
+        return name;
+    }
+
+    [[noreturn]] void refuse_character() const {
+        const std::string_view rest = value_.substr(next_);
+        for (const auto& [character, mend] : mends)
+            if (rest.starts_with(character))
+                fail(next_, fmt::format("unexpected character '{}' in {}: {}", character, formula_, mend));
+        fail(next_, fmt::format("unexpected character '{}' in {}", rest.substr(0, character_length(rest)), formula_));
+    }
+
+    const Source& source_;
+    const Text& text_;
+    std::string_view value_;
+    const std::string& formula_;
+    std::size_t next_ = 0;
+    std::size_t begin_ = 0;
+};
+
+}  // namespace
+
+std::vector<Token> tokenise(const Source& source, const Text& text, const std::string& formula) {
+    return Lexer(source, text, formula).run();
+}
+
+bool is_identifier(std::string_view word) {
+    return !word.empty() && is_letter(word.front()) && std::all_of(word.begin(), word.end(), is_name_part);
+}
+
+}  // namespace lobatto

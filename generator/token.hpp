@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A formula cut into numbers, names and signs; every character that has no place in a formula is an error with its
+// mend.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "generator/source.hpp"
+
+namespace lobatto {
+
+struct Token {
+    enum class Kind { number, name, sign, end };  // sign: one of + - * / ^ ( )
+    Kind kind = Kind::end;
+    std::string_view text;  // as written; a name includes its prime
+    Position at;
+    bool primed = false;
+
+    bool is(char c) const { return kind == Kind::sign && text.front() == c; }
+};
+
+// The tokens, the last one of kind end. Throws InputError.
+std::vector<Token> tokenise(const Source& source, const Text& text, const std::string& formula);
+
+// Letters, digits and underscores, beginning with a letter.
+bool is_identifier(std::string_view word);
+
+}  // namespace lobatto
