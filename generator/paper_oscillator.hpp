@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The oscillator's integrator derived from its discrete Lagrangian, shared by the two halves of section 4.
+// The oscillator's integrator derived from its discrete Lagrangian, shared by the files of section 4.
 #pragma once
 
 #include <ginac/ginac.h>
@@ -24,6 +24,12 @@ struct Oscillator {
 
 const Oscillator& oscillator();
 
+// The polynomial in r with these roots and leading coefficient has `sign` on begin < r < end: no root inside, sign at
+// the middle.
+bool keeps_sign(const GiNaC::ex& polynomial, const GiNaC::ex& leading, const std::vector<GiNaC::ex>& roots,
+                const GiNaC::ex& begin, const GiNaC::ex& end, int sign);
+
+void truncation_and_stability(std::vector<Statement>& list);
 void symplectic_structure(std::vector<Statement>& list);
 
 }  // namespace lobatto::paper

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The paper's sections 5 and 6: the integrator for any potential V(q), its Jacobian and symplectic structure; claims
-// about the experiments.
+// The paper's section 5: the integrator for any potential V(q), its equations and symplectic structure.
 #include <fmt/format.h>
 
-#include <stdexcept>
-
+#include "generator/paper_pendulum.hpp"
 #include "generator/paper_symbols.hpp"
 
 namespace lobatto::paper {
@@ -30,15 +28,6 @@ ex along(const ex& expression, const std::string& x) {
         total += by("dV_l") * symbol("ddV_j");
     return total.expand();
 }
-
-struct Integrator {
-    ex discrete;            // L_d
-    std::vector<ex> inner;  // 2 dL_d/dq_xi + dL_d/dq_1xi and its mirror image
-    GiNaC::lst solved;  // q_xi, q_1xi == linear part + (h^2/30m)(V' terms): the inner equations, used as substitutions
-    ex left, right;     // dL_d/dq_l, dL_d/dq_r with `solved` injected
-    std::vector<ex> full;          // F_L, four residuals in (q_xi, q_1xi, p_jp, q_r)
-    GiNaC::matrix jacobian{4, 4};  // dF_L
-};
 
 Integrator derive() {
     Integrator result;
@@ -74,11 +63,6 @@ Integrator derive() {
     return result;
 }
 
-const Integrator& integrator() {
-    static const Integrator result = derive();
-    return result;
-}
-
 // From q_l, q_xi, q_1xi, q_r to q_j, q_{j+xi}, q_{j+1-xi}, q_{j+1}, and V' and V'' with them.
 exmap forward_step() {
     exmap names;
@@ -99,80 +83,6 @@ exmap backward_step() {
     for (int i = 0; i < 4; ++i) names[symbol("q_" + node_name[i])] = symbol("q_" + earlier[i]);
     for (int i = 1; i < 4; ++i) names[symbol("dV_" + node_name[i])] = symbol("dV_" + earlier[i]);
     return names;
-}
-
-const char* const printed_jacobian =
-    "dF_L = {{1-h^2/(15*m)*ddV_xi, -h^2/(30*m)*ddV_1xi, 0, (-5+sqrt(5))/10}, {-h^2/(30*m)*ddV_1xi, "
-    "1-h^2/(15*m)*ddV_1xi, 0, -(5+sqrt(5))/10}, "
-    "{5*h/12*ddV_xi, 5*h/12*ddV_1xi, 1, h/12*ddV}, {sqrt(5)*h^2/(24*m)*ddV_xi, -sqrt(5)*h^2/(24*m)*ddV_1xi, -h/(2*m), "
-    "1-h^2/(24*m)*ddV}}";
-const char* const corrected_jacobian =
-    "dF_L = {{1-h^2/(15*m)*ddV_xi, -h^2/(30*m)*ddV_1xi, 0, (-5+sqrt(5))/10}, {-h^2/(30*m)*ddV_xi, "
-    "1-h^2/(15*m)*ddV_1xi, 0, -(5+sqrt(5))/10}, "
-    "{5*h/12*ddV_xi, 5*h/12*ddV_1xi, 1, h/12*ddV}, {sqrt(5)*h^2/(24*m)*ddV_xi, -sqrt(5)*h^2/(24*m)*ddV_1xi, -h/(2*m), "
-    "1-h^2/(24*m)*ddV}}";
-
-// Newton on the paper's four unknowns with a given Jacobian: pendulum, m = 1, omega = 2 pi, from p_j = 1 and q_j =
-// pi/2, all states starting at q_j; 40 digits. The largest residual after each iteration.
-std::vector<double> newton_residuals(const std::vector<ex>& jacobian, const numeric& step, int iterations) {
-    const std::vector<ex> unknowns{symbol("q_xi"), symbol("q_1xi"), symbol("p_jp"), symbol("q_r")};
-    const ex stiffness = 4 * pow(GiNaC::Pi, 2);
-    const numeric start = at(GiNaC::Pi / 2, {}, 40);
-    std::vector<ex> value{start, start, 1, start};
-    std::vector<double> residuals;
-    for (int k = 0; k <= iterations; ++k) {
-        exmap point{{symbol("h"), step},
-                    {symbol("m"), 1},
-                    {symbol("q_l"), start},
-                    {symbol("p_j"), 1},
-                    {symbol("dV_l"), stiffness * GiNaC::sin(start)}};
-        for (int i = 0; i < 4; ++i) {
-            point[unknowns[i]] = value[i];
-            if (i == 2) continue;
-            const std::string x = i == 3 ? "r" : node_name[i + 1];
-            point[symbol("dV_" + x)] = stiffness * GiNaC::sin(value[i]);
-            point[symbol(i == 3 ? std::string("ddV") : "ddV_" + x)] = stiffness * GiNaC::cos(value[i]);
-        }
-        GiNaC::matrix J(4, 4), F(4, 1);
-        double largest = 0;
-        for (int i = 0; i < 4; ++i) {
-            F(i, 0) = at(integrator().full[i], point, 40);
-            largest = std::max(largest, std::abs(GiNaC::ex_to<numeric>(F(i, 0)).to_double()));
-            for (int j = 0; j < 4; ++j) J(i, j) = at(jacobian[4 * i + j], point, 40);
-        }
-        if (k > 0) residuals.push_back(largest);
-        const GiNaC::matrix change = J.inverse().mul(F);
-        for (int i = 0; i < 4; ++i) value[i] = at(value[i] - change(i, 0), {}, 40);
-    }
-    return residuals;
-}
-
-std::string sequence(const std::vector<double>& values) {
-    std::string text;
-    for (double value : values) text += (text.empty() ? "" : ", ") + fmt::format("{:.1e}", value);
-    return text;
-}
-
-std::string jacobian_numbers() {
-    const std::string formula = std::string(printed_jacobian).substr(7);
-    const numeric step(1, 10);
-    return fmt::format(
-        "element (2, 1). Newton's largest residual after each iteration (pendulum, h = 0.1, 40 digits), printed "
-        "matrix: {}; corrected: {}. The printed "
-        "matrix still converges, but only linearly",
-        sequence(newton_residuals(elements(read(formula)), step, 6)),
-        sequence(newton_residuals(elements(GiNaC::ex(integrator().jacobian)), step, 6)));
-}
-
-std::string determinant_numbers() {
-    const ex derived = integrator().jacobian.determinant().expand();
-    const ex printed = read("1 + h^2/(60*m)*(ddV_xi+ddV_1xi) + h^4/(1800*m)*ddV_xi*ddV_1xi");
-    const exmap values{{symbol("m"), 2}, {symbol("h"), 1}, {symbol("ddV_xi"), 30}, {symbol("ddV_1xi"), 60}};
-    return fmt::format(
-        "m = 2, h = 1, V″_ξ = 30, V″_{{1−ξ}} = 60: determinant of the matrix {}, printed formula {} (for m = 1 they "
-        "agree). In units, h⁴V″V″/m² is a "
-        "pure number, h⁴V″V″/m is not",
-        decimal(at(derived, values)), decimal(at(printed, values)));
 }
 
 void equations(std::vector<Statement>& list) {
@@ -259,49 +169,6 @@ void equations(std::vector<Statement>& list) {
          .route = "both lines with p_{j+1} = ∂L_d/∂q_r and p_j = −∂L_d/∂q_ℓ, inner states of eq:internesNL"});
 }
 
-void newton(std::vector<Statement>& list) {
-    const Integrator& scheme = integrator();
-    list.push_back({.label = "after eq:discreteDynamics: dF_L",
-                    .section = "5",
-                    .what = "the Jacobian of the four equations",
-                    .parts = {{.text = printed_jacobian, .derived = scheme.jacobian, .corrected = corrected_jacobian}},
-                    .route = "",
-                    .demonstration = jacobian_numbers});
-    list.push_back({.label = "after eq:discreteDynamics: det dF_L",
-                    .section = "5",
-                    .what = "its determinant",
-                    .parts = {{.text = "det = 1 + h^2/(60*m)*(ddV_xi+ddV_1xi) + h^4/(1800*m)*ddV_xi*ddV_1xi",
-                               .derived = scheme.jacobian.determinant().expand(),
-                               .corrected = "det = 1 + h^2/(60*m)*(ddV_xi+ddV_1xi) + h^4/(1800*m^2)*ddV_xi*ddV_1xi"}},
-                    .route = "",
-                    .demonstration = determinant_numbers});
-    list.push_back(
-        {.label = "after eq:discreteDynamics: limit",
-         .section = "5",
-         .what = "det dF_L → 1 as h → 0",
-         .parts = {},
-         .route = "the derived determinant at h = 0",
-         .sentence = "tends to 1 as h diminishes",
-         .holds = [] { return equal(integrator().jacobian.determinant().expand().subs(symbol("h") == 0), 1); }});
-    list.push_back({.label = "after eq:discreteDynamics: F_L = 0",
-                    .section = "5",
-                    .what = "the four-equation system",
-                    .parts = {},
-                    .route = "definition: eq:internesNL and eq:discreteDynamics as residuals",
-                    .sentence = "F_L(q_{j+ξ}, q_{j+1−ξ}, p_{j+1}, q_{j+1}) = 0",
-                    .introduces = true});
-    const std::vector<double> residuals = newton_residuals(elements(GiNaC::ex(scheme.jacobian)), numeric(1, 10), 5);
-    list.push_back({.label = "after eq:discreteDynamics: Newton",
-                    .section = "5",
-                    .what = "machine precision by the fifth iteration",
-                    .parts = {},
-                    .route = "largest residual after each iteration with the derived matrix (pendulum, h = 0.1, all "
-                             "states started at q_j): " +
-                             sequence(residuals),
-                    .sentence = "machine precision convergence at the fifth iteration",
-                    .holds = [=] { return residuals.back() < 2.2e-16; }});
-}
-
 void symplecticity(std::vector<Statement>& list) {
     const Integrator& scheme = integrator();
     const exmap later = forward_step();
@@ -371,58 +238,15 @@ void symplecticity(std::vector<Statement>& list) {
 
 }  // namespace
 
+const Integrator& integrator() {
+    static const Integrator result = derive();
+    return result;
+}
+
 void section_5(std::vector<Statement>& list) {
     equations(list);
     newton(list);
     symplecticity(list);
-}
-
-void section_6(std::vector<Statement>& list) {
-    const GiNaC::symbol t("t");
-    const ex m = symbol("m"), omega = symbol("omega");
-    const ex q = GiNaC::Pi / 2 * GiNaC::cos(omega * t), p = -GiNaC::Pi / 2 * m * omega * GiNaC::sin(omega * t);
-    list.push_back({.label = "before fig:simulations: exact solution",
-                    .section = "6",
-                    .what = "the oscillator's exact solution",
-                    .parts = {},
-                    .route = "q′ = p/m and p′ = −mω²q; its period is T = 1 for ω = 2π",
-                    .sentence = "q(t) = (π/2) cos(ωt), p(t) = −(π/2) mω sin(ωt)",
-                    .holds = [=] {
-                        return (q.diff(t) - p / m).expand().is_zero() &&
-                               (p.diff(t) + m * omega * omega * q).expand().is_zero();
-                    }});
-    list.push_back({.label = "fig:errorEvolution",
-                    .section = "6",
-                    .what = "growth of the oscillator's energy error over 1e5 periods",
-                    .parts = {},
-                    .route = "what is divided by what, and in which arithmetic, is not said",
-                    .sentence = "growth rate 2.50e−11 when h = 0.1, 5.45e−14 when h = 0.05, 1.35e−13 when h = 0.025",
-                    .instead = "measured: see figure 2",
-                    .contradicts = true});
-    list.push_back({.label = "fig:errorEvolutionNL: periods",
-                    .section = "6",
-                    .what = "how long the pendulum ran",
-                    .parts = {},
-                    .route = "the text and the caption of the same figure",
-                    .sentence = "the text says 1e5 periods, the caption 5e3",
-                    .instead = "5e3 periods are shown in figure 4 here",
-                    .contradicts = true});
-    list.push_back({.label = "fig:errorEvolutionNL",
-                    .section = "6",
-                    .what = "growth of the pendulum's energy error over 5e3 periods",
-                    .parts = {},
-                    .route = "not monotone in h: the rate printed for h = 0.05 is above that for h = 0.1",
-                    .sentence = "growth rate 7.99e−13 when h = 0.1, 5.39e−11 when h = 0.05, 5.33e−15 when h = 0.025",
-                    .instead = "measured: see figure 4",
-                    .contradicts = true});
-    list.push_back({.label = "heading of the conclusions",
-                    .section = "7",
-                    .what = "the number of the last section",
-                    .parts = {},
-                    .route = "section 5 is the pendulum, section 6 the experiments",
-                    .sentence = "5) Conclusions",
-                    .instead = "7) Conclusions",
-                    .contradicts = true});
 }
 
 }  // namespace lobatto::paper
