@@ -1,0 +1,2 @@
+#include "cli/commands.hpp"
+namespace lobatto { void add_paper(CLI::App&){} }
