@@ -21,6 +21,7 @@ struct Figure {
     std::string title;
     std::string caption;
     std::vector<Growth> growth;  // figures 2 and 4
+    std::string remark;          // on the growth
 };
 
 // Runs the experiments, writes NAME.csv and NAME.svg into `folder`. MachineError when gnuplot is missing or fails.

@@ -164,8 +164,8 @@ std::vector<PaperState> midpoint_states(PaperSystem system, double step, int ste
     return states;
 }
 
-double TableRow::order(const double (&errors)[3]) {
-    return std::log2(errors[1] / errors[2]);
+double TableRow::order(double coarse, double fine) {
+    return std::log2(coarse / fine);
 }
 
 bool TableRow::reproduced() const {

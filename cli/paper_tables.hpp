@@ -38,8 +38,8 @@ struct TableRow {
     double printed[3];
     double lobatto[3], simpson[3], midpoint[3];
     bool rounding = false;  // errors of rounding only: no order, nothing to reproduce
-    // The closest to log2 of successive errors, from the last two meshes.
-    static double order(const double (&errors)[3]);
+    // log2 of successive errors.
+    static double order(double coarse, double fine);
     // |ours/printed - 1| <= 1 % wherever the printed figure is above 1e-12 (and 10 % below it, to the last digit a
     // double can keep).
     bool reproduced() const;

@@ -44,19 +44,47 @@ std::string factor_between(const ex& printed, const ex& derived) {
     return is_scaling(ratio) && !ratio.is_zero() ? decimal(at_sample(ratio, 0)) : "";
 }
 
-// The first element that differs, at the sample point.
-std::string difference(const ex& printed, const ex& derived) {
+// Where lists first differ; -1 when they do not, 0 for single expressions.
+int first_difference(const ex& printed, const ex& derived) {
     const auto left = elements(printed), right = elements(derived);
-    for (size_t i = 0; i < left.size() && i < right.size(); ++i) {
-        if (equal(left[i], right[i])) continue;
-        const std::string place = sample_text(left[i] + symbol("unit") * right[i]);
-        return (left.size() > 1 ? "element " + std::to_string(i + 1) + " of " + std::to_string(left.size()) + ": "
-                                : std::string()) +
-               "printed " + decimal(at_sample(left[i], 0)) + ", derived " + decimal(at_sample(right[i], 0)) +
-               (place.empty() ? "" : " at " + place);
-    }
-    return "";
+    for (size_t i = 0; i < left.size() && i < right.size(); ++i)
+        if (!equal(left[i], right[i])) return static_cast<int>(i);
+    return -1;
 }
+
+// Both values of the element that differs, at the sample point.
+std::string difference(const ex& printed, const ex& derived) {
+    const int i = first_difference(printed, derived);
+    if (i < 0) return "";
+    const ex left = elements(printed)[static_cast<size_t>(i)], right = elements(derived)[static_cast<size_t>(i)];
+    const std::string place = sample_text(left + symbol("unit") * right);
+    return "printed " + decimal(at_sample(left, 0)) + ", derived " + decimal(at_sample(right, 0)) +
+           (place.empty() ? "" : " at " + place);
+}
+
+// Element `index` of "name = {{a, b}, {c, d}}" as "element (2, 1) = c"; other texts whole.
+std::string element_text(const std::string& text, int index) {
+    const auto open = text.find('{');
+    if (open == std::string::npos) return text;
+    std::string element;
+    int row = 1, column = 1, depth = 0;
+    for (size_t i = open; i < text.size() && index >= 0; ++i) {
+        const char c = text[i];
+        depth += c == '(' ? 1 : c == ')' ? -1 : 0;
+        if (c == ',' && depth == 0) {
+            if (--index < 0) break;
+            const bool ends_row = text[i - 1] == '}';
+            row += ends_row ? 1 : 0;
+            column = ends_row ? 1 : column + 1;
+            element.clear();
+        } else if (c != '{' && c != '}' && !(c == ' ' && element.empty())) {
+            element += c;
+        }
+    }
+    return "element (" + std::to_string(row) + ", " + std::to_string(column) + ") = " + element;
+}
+
+const char* const no_correction = "no correction is known";
 
 struct PartVerdict {
     Verdict verdict = Verdict::verified;
@@ -65,21 +93,25 @@ struct PartVerdict {
 
 PartVerdict judge_part(const Part& part) {
     const ex printed = printed_side(part.text, part.kind, part.values);
-    if (all_equal(printed, part.derived)) return {};
+    if (all_equal(printed, part.derived)) {
+        if (!part.corrected.empty()) throw std::logic_error("paper: \"" + part.text + "\" needs no correction");
+        return {};
+    }
     if (!part.factor.empty() && all_equal(printed, read(part.factor) * part.derived))
         return {Verdict::up_to_factor, spell(part.factor), ""};
     if (part.kind == Kind::equation) {
         const std::string factor = factor_between(printed, part.derived);
         if (!factor.empty()) return {Verdict::up_to_factor, factor, ""};
     }
-    if (part.corrected.empty()) return {Verdict::misprint, "no correction is known", difference(printed, part.derived)};
+    if (part.corrected.empty()) return {Verdict::misprint, no_correction, difference(printed, part.derived)};
     const ex corrected = printed_side(part.corrected, part.kind, part.values);
     const bool right = all_equal(corrected, part.derived) ||
                        (part.kind == Kind::equation && !factor_between(corrected, part.derived).empty());
     if (!right)
         throw std::logic_error("paper: the correction \"" + part.corrected +
                                "\" is itself wrong: " + difference(corrected, part.derived));
-    return {Verdict::misprint, spell(part.corrected), difference(printed, part.derived)};
+    return {Verdict::misprint, spell(element_text(part.corrected, first_difference(printed, part.derived))),
+            difference(printed, part.derived)};
 }
 
 void append(std::string& text, const std::string& more, const std::string& separator) {
@@ -122,6 +154,11 @@ Finding judge(const Statement& statement) {
     if (statement.introduces) finding.verdict = Verdict::definition;
     finding.demonstration = statement.route;
     return finding;
+}
+
+bool is_resolved(const Finding& finding) {
+    return finding.verdict != Verdict::misprint ||
+           (!finding.mended.empty() && finding.mended.find(no_correction) == std::string::npos);
 }
 
 std::string name(Verdict verdict) {

@@ -69,6 +69,9 @@ std::vector<Statement> statements();
 // the two routes disagree or a stated correction or factor is itself wrong.
 Finding judge(const Statement& statement);
 
+// A misprint is resolved when its correction is known and agrees with the derivation.
+bool is_resolved(const Finding& finding);
+
 std::string name(Verdict verdict);
 
 // "q_xi = 5*h^2*omega" to "q_ξ = 5·h²·ω".

@@ -85,6 +85,10 @@ exmap backward_step() {
     return names;
 }
 
+const char* const border_text =
+    "1/h^2*(q_jm-2*q_j+q_jp) + 1/(24*m)*((5-sqrt(5))*dV_jmxi + (5+sqrt(5))*dV_jm1xi "
+    "+ 4*dV_j + (5+sqrt(5))*dV_jxi + (5-sqrt(5))*dV_j1xi)";
+
 void equations(std::vector<Statement>& list) {
     const Integrator& scheme = integrator();
     const ex m = symbol("m"), omega = symbol("omega"), q = symbol("q");
@@ -136,21 +140,36 @@ void equations(std::vector<Statement>& list) {
     list.push_back({.label = "after eq:ELequationsNL: border equations",
                     .section = "5",
                     .what = "the same, explicitly",
-                    .parts = {{.text = "1/h^2*(q_jm-2*q_j+q_jp) + 1/(24*m)*((5-sqrt(5))*dV_jmxi + (5+sqrt(5))*dV_jm1xi "
-                                       "+ 4*dV_j + (5+sqrt(5))*dV_jxi + (5-sqrt(5))*dV_j1xi) = 0",
+                    .parts = {{.text = std::string(border_text) + " = 0",
                                .derived = scheme.right.subs(backward_step()) + scheme.left.subs(forward_step()),
                                .kind = Kind::equation,
                                .factor = "-1/(m*h)"}},
                     .route = "∂L_d/∂q_r + ∂L_d/∂q_ℓ with the inner states of eq:internesNL, times the factor"});
-    list.push_back({.label = "after the border equations: p_r, p_{j+1}, p_j",
+    list.push_back({.label = "after the border equations: p_r",
                     .section = "5",
-                    .what = "momenta at both ends",
+                    .what = "the momentum at the right end",
                     .parts = {},
-                    .route = "definitions; eq:ELequationsNL makes the two of one instant equal, since ∂L_d/∂q_r − "
-                             "(−∂L_d/∂q_ℓ) is its left side",
-                    .sentence = "p_r = ∂L_d/∂q_r; p_{j+1} = ∂L_d/∂q_r (q_j, q_{j+ξ}, q_{j+1−ξ}, q_{j+1}); p_j = "
-                                "−∂L_d/∂q_ℓ (q_j, q_{j+ξ}, q_{j+1−ξ}, q_{j+1})",
+                    .route = "definition",
+                    .sentence = "p_r = ∂L_d/∂q_r (q_ℓ, q_ξ, q_{1−ξ}, q_r)",
                     .introduces = true});
+    list.push_back({.label = "after the border equations: p_{j+1}",
+                    .section = "5",
+                    .what = "the same at the end of a step",
+                    .parts = {},
+                    .route = "definition",
+                    .sentence = "p_{j+1} = ∂L_d/∂q_r (q_j, q_{j+ξ}, q_{j+1−ξ}, q_{j+1})",
+                    .introduces = true});
+    list.push_back({.label = "after the border equations: p_j",
+                    .section = "5",
+                    .what = "the momentum at the left end",
+                    .parts = {},
+                    .route = "∂L_d/∂q_r of the step before minus this is −mh times the border equation above",
+                    .sentence = "p_j = −∂L_d/∂q_ℓ (q_j, q_{j+ξ}, q_{j+1−ξ}, q_{j+1})",
+                    .holds = [] {
+                        const ex before = integrator().right.subs(backward_step()),
+                                 after = -integrator().left.subs(forward_step());
+                        return equal(before - after, -symbol("m") * symbol("h") * read(border_text));
+                    }});
     const exmap momenta{{symbol("p_jp"), scheme.right.subs(forward_step())},
                         {symbol("p_j"), -scheme.left.subs(forward_step())}};
     list.push_back(
