@@ -13,7 +13,7 @@ namespace {
 void append_part(std::string& whole, const std::string& text) {
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
-        const bool joins_parts = line == "#pragma once" || line.starts_with("#include \"kernel");
+        const bool joins_parts = line == "#pragma once" || line.starts_with("#include \"");
         if (!joins_parts) whole += line + '\n';
     }
 }

@@ -67,15 +67,16 @@ void flush_output() {
 void describe(CLI::App& program) {
     program.set_version_flag("--version", "lobatto " LOBATTO_VERSION);
     program.require_subcommand(0, 1);
-    program.footer(
-        "Example:\n"
-        "  lobatto run scenes/pendulum.toml\n\n"
-        "`lobatto COMMAND --help` explains a command. In the source tree, `./lobatto test` runs the tests.");
     add_derive(program);
     add_emit(program);
     add_run(program);
     add_verify(program);
     add_paper(program);
+    // Last, because a command takes over the footer that its parent has at that moment.
+    program.footer(
+        "Example:\n"
+        "  lobatto run scenes/pendulum.toml\n\n"
+        "`lobatto COMMAND --help` explains a command. In the source tree, `./lobatto test` runs the tests.");
 }
 
 }  // namespace
@@ -98,7 +99,10 @@ int main(int argc, char** argv) {
         program.exit(error);  // prints the help or the version
         return success;
     } catch (const InputError& error) {
-        return complain(wrong_input, error.what());
+        // Begins with file:line:column, as editors expect of a compiler.
+        std::cout.flush();
+        fmt::print(stderr, "{}\n", error.what());
+        return wrong_input;
     } catch (const ComputationError& error) {
         return complain(failed_computation, error.what());
     } catch (const MachineError& error) {

@@ -290,7 +290,7 @@ private:
         std::string pivots, finite;
         for (const Id id : hoisted_.order) {
             statements.push_back({"k." + hoisted_.names.at(id), id});
-            finite += fmt::format(" + (k.{0} - k.{0})", hoisted_.names.at(id));
+            finite += (finite.empty() ? "k." : ", k.") + hoisted_.names.at(id);
         }
         for (const Program& program : p_.programs) {
             if (program.name == "prepare") {
@@ -301,9 +301,9 @@ private:
                     pivots += (pivots.empty() ? "" : " || ") + pivot + " == real(0)";
                 }
             } else if (program.name == "prepare_map") {
-                for (std::size_t i = 0; i < program.outputs.size(); ++i) {
-                    statements.push_back({program.outputs[i].target, program.outputs[i].value});
-                    finite += fmt::format(" + (k.Phi[{0}] - k.Phi[{0}])", i);
+                for (const Output& output : program.outputs) {
+                    statements.push_back({output.target, output.value});
+                    if (output.target.rfind("k.", 0) == 0) finite += (finite.empty() ? "" : ", ") + output.target;
                 }
             }
         }
@@ -316,9 +316,9 @@ private:
         std::string text = body.lines();
         if (!pivots.empty())
             text += wrapped("        if (" + pivots + ") return Status::singular_mass;", "            ");
-        if (finite.empty()) finite = " + (h - h)";
-        text += wrapped("        const real not_finite =" + finite.substr(2) + ";", "            ");
-        text += "        if (!(not_finite == real(0))) return Status::not_finite;\n";
+        text += wrapped(
+            "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
+            "            ");
         if (d_.structure.linear && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else

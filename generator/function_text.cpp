@@ -18,6 +18,19 @@ bool is_identifier(const std::string& text) {
                        [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; });
 }
 
+// inverse_m for 1/m, omega_squared for omega^2; other values have no plain name.
+std::string plain_name(const Graph& graph, Id id) {
+    const Node& node = graph[id];
+    const auto input = [&graph](Id operand) {
+        return graph[operand].op == Op::input ? graph.input_of(operand).code : "";
+    };
+    if (node.op == Op::power && !input(node.operands[0]).empty()) return "inverse_" + input(node.operands[0]);
+    if (node.op == Op::multiply && node.operands.size() == 2 && node.operands[0] == node.operands[1] &&
+        !input(node.operands[0]).empty())
+        return input(node.operands[0]) + "_squared";
+    return "";
+}
+
 }  // namespace
 
 Hoisted::Hoisted(const Programs& programs) {
@@ -51,6 +64,8 @@ Hoisted::Hoisted(const Programs& programs) {
             name = graph.input_of(id).code;
         else if (const auto known = suggested.find(id); known != suggested.end())
             name = known->second;
+        else
+            name = plain_name(graph, id);
         while (name.empty() || taken.contains(name)) name = fmt::format("k{}", ++counter);
         taken.insert(name);
         names[id] = name;
@@ -195,10 +210,12 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
                 if (local.contains(id)) return;
                 const Id argument = graph[node.operands[0]].operands[0];
                 const std::string text = text_of(argument);
-                const std::string suffix = is_identifier(text) ? text : "";
+                const std::string suffix = is_identifier(text)               ? text
+                                           : graph[argument].op == Op::input ? graph.input_of(argument).name
+                                                                             : "";
                 for (const Id half : both) {
                     const bool sine = graph[half].op == Op::pair_sine;
-                    local[half] = fresh(suffix.empty() ? "" : (sine ? "sin_" : "cos_") + suffix);
+                    local[half] = fresh(is_identifier(suffix) ? (sine ? "sin_" : "cos_") + suffix : "");
                 }
                 const Id sine = graph[both[0]].op == Op::pair_sine ? both[0] : both[1];
                 const Id cosine = graph[both[0]].op == Op::pair_sine ? both[1] : both[0];

@@ -219,7 +219,6 @@ int Graph::compare(Id a, Id b) const {
     if (x.op != y.op) return x.op < y.op ? -1 : 1;
     if (x.op == Op::constant) return constant_of(a).value < constant_of(b).value ? -1 : 1;
     if (x.op == Op::input) {
-        if (x.stage != y.stage) return x.stage < y.stage ? -1 : 1;
         return x.index < y.index ? -1 : 1;
     }
     for (std::size_t i = 0; i < x.operands.size() && i < y.operands.size(); ++i) {

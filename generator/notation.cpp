@@ -158,10 +158,16 @@ private:
     }
 
     Printed addition(const Node& node) const {
+        std::vector<Id> terms = node.operands;
+        if (notation_ != Notation::cpp) {  // for people: a positive term first
+            const auto first =
+                std::find_if(terms.begin(), terms.end(), [this](Id term) { return !graph_.is_negative(term); });
+            if (first != terms.end()) std::rotate(terms.begin(), first, first + 1);
+        }
         std::string text;
-        for (const Id term : node.operands) {
+        for (const Id term : terms) {
             const bool named = naming_ && !naming_(term).empty();
-            std::string printed = enclosed(print(term), product);
+            const std::string printed = enclosed(print(term), product);
             if (!text.empty() && !named && printed.front() == '-')
                 text += " - " + printed.substr(1);
             else

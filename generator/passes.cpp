@@ -161,10 +161,32 @@ Programs multiply_powers(const Programs& programs) {
 // ---- stages: the operands known first are combined first, so that their part can be hoisted
 // ---------------------------------------------
 
+std::string positive_label(const Constant& negative) {
+    if (negative.label.empty()) return "";
+    return negative.label.rfind("-(", 0) == 0 && negative.label.back() == ')'
+               ? negative.label.substr(2, negative.label.size() - 3)
+               : "-(" + negative.label + ")";
+}
+
 Programs group_by_stage(const Programs& programs) {
-    return rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+    // Products that have a name of their own keep their sign.
+    std::set<std::vector<Id>> named;
+    for (const auto& [id, name] : programs.names) named.insert(programs.graph[id].operands);
+    return rewrite(programs, [&named](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
         if (node.op != Op::add && node.op != Op::multiply) return same(graph, node, std::move(operands));
+        // A minus sign stays with the later operand, where it is a subtraction: what is hoisted keeps its name and
+        // sign.
+        std::vector<Id> early;
+        for (const Id operand : node.operands)
+            if (before[operand].stage <= Stage::step_size) early.push_back(operand);
+        const bool minus = node.op == Op::multiply && node.stage > Stage::step_size &&
+                           graph.is_negative(operands.front()) && !named.contains(early);
+        if (minus) {
+            operands.front() = graph.constant(-graph.constant_of(operands.front()).value,
+                                              positive_label(graph.constant_of(operands.front())));
+            if (graph.is_number(operands.front(), 1)) operands.erase(operands.begin());
+        }
         std::vector<Id> group;
         for (const Stage stage : {Stage::constant, Stage::parameter, Stage::step_size, Stage::step, Stage::iterate}) {
             std::vector<Id> here;
@@ -174,6 +196,13 @@ Programs group_by_stage(const Programs& programs) {
             // What came before forms one operand; a lone constant stays beside what it multiplies or is added to.
             if (group.size() > 1) group = {graph.raw(node.op, group)};
             group.insert(group.end(), here.begin(), here.end());
+        }
+        if (minus) group.insert(group.begin(), graph.number(-1));
+        // A sum begins with a term that has no minus sign, where there is one.
+        if (node.op == Op::add) {
+            const auto first =
+                std::find_if(group.begin(), group.end(), [&graph](Id term) { return !graph.is_negative(term); });
+            if (first != group.end()) std::rotate(group.begin(), first, first + 1);
         }
         return graph.raw(node.op, std::move(group));
     });

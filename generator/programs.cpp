@@ -57,7 +57,7 @@ public:
         }
         h_ = g().input({"h", "h", Stage::step_size});
         for (std::size_t k = 0; k < n_; ++k) {
-            q_.push_back(g().input({at("q", k), d_.scene.coordinates[k].name, Stage::iterate}));
+            q_.push_back(g().input({at("q", k), d_.scene.coordinates[k].name, Stage::step}));
             symbols_[d_.system.q[k]] = q_.back();
         }
         for (std::size_t k = 0; k < n_; ++k)
@@ -167,25 +167,27 @@ private:
         const Id k = convert(d_.system.hessian(0, 0).expand());
         const Id m = mass_[0][0];
         const Id force = g().negate(convert(d_.system.gradient[0].subs(d_.system.q[0] == 0)));
-        const Id z = named("z", g().multiply({h2(), k, g().power(m, -1)}));
-        GiNaC::exmap symbols = symbols_;
-        symbols[exact.z] = z;
-        const auto polynomial = [&](const GiNaC::ex& e) { return g().from(e, symbols); };
-        const Id delta = named("delta", polynomial(exact.delta));
-        const Id a = polynomial(exact.a);
-        const auto over = [&](Ids factors) {
-            factors.push_back(g().power(delta, -1));
-            return g().multiply(std::move(factors));
+        // The polynomials as locals of prepare(): each is an input to what follows.
+        Program prepare_map{"prepare_map", {}};
+        const auto local = [&](const std::string& name, Id value) {
+            prepare_map.outputs.push_back({"const real " + name, value});
+            return g().input({name, name, Stage::step_size});
         };
         const Id h_by_m = g().multiply({h_, g().power(m, -1)});
-        Program prepare_map{"prepare_map", {}};
-        const Ids entries = {over({a}),
-                             over({h_by_m, polynomial(exact.c)}),
-                             over({h_, h_by_m, force, polynomial(exact.e_q)}),
-                             over({g().power(h_by_m, -1), polynomial(exact.b)}),
-                             over({a}),
-                             over({h_, force, polynomial(exact.e_p)})};
-        for (std::size_t i = 0; i < entries.size(); ++i) prepare_map.outputs.push_back({at("k.Phi", i), entries[i]});
+        const Id z = local("z", g().multiply({h_by_m, h_, k}));
+        const auto polynomial = [&](const std::string& name, const GiNaC::ex& e) {
+            return local(name, g().from(e, {{exact.z, z}}));
+        };
+        const Id inverse_delta = g().power(polynomial("delta", exact.delta), -1);
+        const Id a = polynomial("a", exact.a), b = polynomial("b", exact.b), c = polynomial("c", exact.c);
+        const Ids position = {a, g().multiply({h_by_m, c}),
+                              g().multiply({h_, h_by_m, force, g().from(exact.e_q, {{exact.z, z}})})};
+        const Ids momentum = {g().multiply({g().power(h_by_m, -1), b}), a,
+                              g().multiply({h_, force, g().from(exact.e_p, {{exact.z, z}})})};
+        std::size_t index = 0;
+        for (const Ids& row : {position, momentum})
+            for (const Id entry : row)
+                prepare_map.outputs.push_back({at("k.Phi", index++), g().multiply({entry, inverse_delta})});
         p_.programs.push_back(std::move(prepare_map));
 
         const auto row = [&](std::size_t r) {

@@ -178,9 +178,9 @@ inline double cos(double x) {
     return cosine;
 }
 
-template <class real>
-inline bool is_finite(real x) {
-    return x - x == real(0);
+template <class... reals>
+inline bool is_finite(reals... x) {
+    return ((x - x == reals(0)) && ...);
 }
 
 // ---------------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Loaded kernels: what is accepted, what is refused and with which words, and that the wrapper passes everything
+// through.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "runtime/error.hpp"
+#include "runtime/library.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+using namespace lobatto::test;
+
+namespace {
+
+// Compiled in a cache of its own; the headers are found in the source tree.
+struct Workshop {
+    TemporaryFolder folder;
+    EnvironmentVariable cache{"LOBATTO_CACHE_DIR", folder.string()};
+    EnvironmentVariable headers{"CPATH", LOBATTO_SOURCE_DIR};
+
+    std::string build(const std::string& name, const std::string& text) const { return compile({name, text}).object; }
+    std::string build_pendulum() const {
+        return build("pendulum",
+                     "#include \"tests/handwritten_pendulum.hpp\"\n#include \"runtime/kernel_export.hpp\"\n"
+                     "LOBATTO_EXPORT_KERNEL(lobatto::HandwrittenPendulum)\n");
+    }
+    // A table with these first two members and nothing behind them.
+    std::string build_stub(const std::string& version, const std::string& bytes) const {
+        return build(
+            "stub",
+            "#include \"runtime/kernel_abi.h\"\n"
+            "extern \"C\" __attribute__((visibility(\"default\"))) const lobatto_kernel* lobatto_kernel_table() {\n"
+            "    static const lobatto_kernel table = {" +
+                version + ", " + bytes + "};\n    return &table;\n}\n");
+    }
+};
+
+const std::string digest = "0123456789abcdef";
+
+std::string refusal(const std::string& object, const std::string& expected_digest = digest) {
+    const std::string message = message_of<MachineError>([&] { Kernel::load(object, expected_digest); });
+    const std::string begin = "cannot use the compiled kernel " + object + ": ";
+    const std::string end = "; delete this file, and it is compiled again";
+    REQUIRE(message.starts_with(begin));
+    REQUIRE(message.ends_with(end));
+    return message.substr(begin.size(), message.size() - begin.size() - end.size());
+}
+
+Stepper<double> pendulum_stepper(const Workshop& workshop, double h) {
+    Stepper<double> stepper(Kernel::load(workshop.build_pendulum(), digest));
+    REQUIRE(stepper.prepare({2.0, 3.0}, h) == LOBATTO_OK);
+    return stepper;
+}
+
+}  // namespace
+
+TEST_CASE("a loaded kernel says what it is") {
+    const Workshop workshop;
+    const Kernel kernel = Kernel::load(workshop.build_pendulum(), digest);
+    CHECK(std::string(kernel->name) == "handwritten_pendulum");
+    CHECK(kernel->real_kind == LOBATTO_DOUBLE);
+    CHECK(kernel->real_bytes == 8);
+    CHECK(kernel->coordinates == 1);
+    CHECK(kernel->parameters == 2);
+    CHECK(kernel->points == 4);
+    CHECK(kernel->order == 6);
+    CHECK(kernel->unknowns == 2);
+    CHECK(kernel->linear == 0);
+}
+
+TEST_CASE("a file that is not a kernel, or not the expected one, is refused with the reason") {
+    const Workshop workshop;
+    const std::string missing = (workshop.folder / "missing.so").string();
+    CHECK(refusal(missing) == missing + ": cannot open shared object file: No such file or directory");
+    const std::string text = (workshop.folder / "text.so").string();
+    write_text(
+        text, "not an object, but long enough to be read as the header of one, had it begun with the right four bytes");
+    CHECK(refusal(text) == text + ": invalid ELF header");
+    CHECK(refusal(workshop.build("library", "int nothing;\n")) ==
+          "it has no function lobatto_kernel_table, so it is not a kernel");
+    CHECK(refusal(workshop.build_stub("2", "sizeof(lobatto_kernel)")) ==
+          "it speaks version 2 of the kernel interface, this program version 1");
+    CHECK(refusal(workshop.build_stub("LOBATTO_ABI_VERSION", "8")) ==
+          "its function table has 8 bytes instead of " + std::to_string(sizeof(lobatto_kernel)));
+    CHECK(refusal(workshop.build_pendulum(), "fedcba9876543210") ==
+          "its formulas have the digest 0123456789abcdef instead of fedcba9876543210");
+}
+
+TEST_CASE("a kernel computes in its own number type only") {
+    const Workshop workshop;
+    const Kernel kernel = Kernel::load(workshop.build_pendulum(), digest);
+    const auto message = [&](auto zero) { return message_of<MachineError>([&] { Stepper<decltype(zero)>{kernel}; }); };
+    const std::string begin = "the kernel handwritten_pendulum computes in double, but was asked to compute in ";
+    CHECK(message(0.0F) == begin + "float");
+    CHECK(message(0.0L) == begin + "long double");
+    CHECK(message(__float128(0)) == begin + "__float128");
+    CHECK(message(0.0) == "");
+}
+
+TEST_CASE("the wrapper passes every function of the kernel through") {
+    const Workshop workshop;
+    const double m = 2, omega2 = 9, h = 0.1, q = 0.7, p = 0.4, xi = 0.5 - std::sqrt(0.05);
+    Stepper<double> stepper = pendulum_stepper(workshop, h);
+    CHECK(stepper.energy({q}, {p}) == doctest::Approx(p * p / (2 * m) + m * omega2 * (1 - std::cos(q))).epsilon(1e-15));
+    CHECK(stepper.momentum({q}, {0.25}) == std::vector<double>{0.5});
+    CHECK(stepper.velocity({q}, {0.5}) == std::vector<double>{0.25});
+    std::vector<double> W, S;
+    stepper.acceleration({q}, W, S);
+    CHECK(W.at(0) == doctest::Approx(omega2 * std::sin(q)).epsilon(1e-15));
+    CHECK(S.at(0) == doctest::Approx(omega2 * std::cos(q)).epsilon(1e-15));
+    // With both nodes at 0 the accelerations vanish: F = -base = -(q + h c_i v), J = 1 + h^2 omega^2 A.
+    const double v = p / m - h / 12 * omega2 * std::sin(q);
+    const std::vector<double> F = stepper.residual({q}, {p}, {0, 0});
+    CHECK(F.at(0) == doctest::Approx(-(q + h * xi * v)).epsilon(1e-15));
+    CHECK(F.at(1) == doctest::Approx(-(q + h * (1 - xi) * v)).epsilon(1e-15));
+    const std::vector<double> J = stepper.jacobian({0, 0});
+    REQUIRE(J.size() == 4);
+    const double z = h * h * omega2;
+    CHECK(J[0] == doctest::Approx(1 + z / 60).epsilon(1e-15));
+    CHECK(J[1] == doctest::Approx(z * (11 - 5 * std::sqrt(5.0)) / 120).epsilon(1e-13));
+    CHECK(J[2] == doctest::Approx(z * (11 + 5 * std::sqrt(5.0)) / 120).epsilon(1e-15));
+    CHECK(J[3] == doctest::Approx(1 + z / 60).epsilon(1e-15));
+}
+
+TEST_CASE("advance records every k-th state, stops when the room is full, and state agrees with the last record") {
+    const Workshop workshop;
+    Stepper<double> stepper = pendulum_stepper(workshop, 0.125);
+    REQUIRE(stepper.start(1.0, {0.7}, {0.4}) == LOBATTO_OK);
+    std::vector<double> records(3 * 4);
+    lobatto_advance call{};
+    call.steps = 100;
+    call.record_every = 5;
+    call.records = records.data();
+    call.capacity = 4;
+    REQUIRE(stepper.advance(call) == LOBATTO_OK);
+    CHECK(call.records_written == 4);
+    CHECK(call.steps_done == 24);  // the step that would write a fifth row is not taken
+    CHECK(records[0] == 1.0 + 5 * 0.125);
+    CHECK(records[9] == 1.0 + 20 * 0.125);
+    call.capacity = 1;
+    call.steps = 1;
+    REQUIRE(stepper.advance(call) == LOBATTO_OK);
+    double time = 0;
+    std::vector<double> q, p;
+    stepper.state(time, q, p);
+    CHECK(std::vector<double>{time, q.at(0), p.at(0)} == std::vector<double>(records.begin(), records.begin() + 3));
+    CHECK(time == 1.0 + 25 * 0.125);
+}
+
+TEST_CASE("a copied stepper goes its own way, and the way of the original") {
+    const Workshop workshop;
+    Stepper<double> original = pendulum_stepper(workshop, 0.1);
+    REQUIRE(original.start(0.0, {2.0}, {0.0}) == LOBATTO_OK);
+    lobatto_advance call{};
+    call.steps = 10;
+    original.advance(call);
+    Stepper<double> copy = original;
+    const auto position = [](const Stepper<double>& stepper) {
+        double time = 0;
+        std::vector<double> q, p;
+        stepper.state(time, q, p);
+        return q.at(0);
+    };
+    const double before = position(original);
+    copy.advance(call);
+    CHECK(position(original) == before);
+    CHECK(position(copy) != before);
+    original.advance(call);
+    CHECK(position(original) == position(copy));
+    copy.advance(call);
+    original = copy;
+    CHECK(position(original) == position(copy));
+}
+
+TEST_CASE("a kernel stays loaded as long as a stepper uses it") {
+    const Workshop workshop;
+    auto stepper = std::make_unique<Stepper<double>>(Kernel::load(workshop.build_pendulum(), digest));
+    Stepper<double> moved = std::move(*stepper);
+    stepper.reset();
+    REQUIRE(moved.prepare({1.0, 1.0}, 0.1) == LOBATTO_OK);
+    CHECK(moved.start(0.0, {0.5}, {0.0}) == LOBATTO_OK);
+}
+
+TEST_CASE("the tangent map of the pendulum's step agrees with differences, and is symplectic") {
+    const Workshop workshop;
+    const Stepper<double> stepper = pendulum_stepper(workshop, 0.2);
+    const double q = 1.3, p = -0.8, d = 1e-5;
+    std::vector<double> q1, p1, T, q_plus, p_plus, q_minus, p_minus, unused;
+    REQUIRE(stepper.tangent({q}, {p}, q1, p1, T) == LOBATTO_OK);
+    CHECK(T[0] * T[3] - T[1] * T[2] == doctest::Approx(1.0).epsilon(1e-14));
+    // Central differences err by d^2/6 of the third derivative: 6e-10 measured at most.
+    stepper.tangent({q + d}, {p}, q_plus, p_plus, unused);
+    stepper.tangent({q - d}, {p}, q_minus, p_minus, unused);
+    CHECK(T[0] == doctest::Approx((q_plus[0] - q_minus[0]) / (2 * d)).epsilon(1e-8));
+    CHECK(T[2] == doctest::Approx((p_plus[0] - p_minus[0]) / (2 * d)).epsilon(1e-8));
+    stepper.tangent({q}, {p + d}, q_plus, p_plus, unused);
+    stepper.tangent({q}, {p - d}, q_minus, p_minus, unused);
+    CHECK(T[1] == doctest::Approx((q_plus[0] - q_minus[0]) / (2 * d)).epsilon(1e-8));
+    CHECK(T[3] == doctest::Approx((p_plus[0] - p_minus[0]) / (2 * d)).epsilon(1e-8));
+}
