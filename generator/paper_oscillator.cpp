@@ -83,13 +83,20 @@ void discrete_lagrangian(std::vector<Statement>& list) {
                     .route = "f_i = dq/dθ(c_i); equal to the exact integral, since (dq/dθ)² has degree 4"});
     list.push_back({.label = "eq:rigidityKE",
                     .section = "4",
-                    .what = "the matrix K of K_d = m/(2h²) qᵗ K q",
+                    .what = "the matrix of the quadratic form K_d",
                     .parts = {{.text = "K = {{13/3, -5*sqrt(5)/4-25/12, 5*sqrt(5)/4-25/12, -1/6}, {-5*sqrt(5)/4-25/12, "
                                        "25/3, -25/6, 5*sqrt(5)/4-25/12}, "
                                        "{5*sqrt(5)/4-25/12, -25/6, 25/3, -5*sqrt(5)/4-25/12}, {-1/6, "
                                        "5*sqrt(5)/4-25/12, -5*sqrt(5)/4-25/12, 13/3}}",
                                .derived = stiffness}},
-                    .route = "K_ij = ∫ φ′_i φ′_j dθ, integrated exactly; 16 entries"});
+                    .route = "K_ij = ∫ φ′_i φ′_j dθ, integrated exactly; the form equals the mean kinetic energy",
+                    .sentence = "K_d ≡ m/(2h²) qᵗ K q, q = (q_0, q_ξ, q_{1−ξ}, q_1)ᵗ:",
+                    .holds = [=] {
+                        ex form = 0;
+                        for (int i = 0; i < 4; ++i)
+                            for (int j = 0; j < 4; ++j) form += states()[i] * stiffness.op(i).op(j) * states()[j];
+                        return equal(m() / (2 * pow(h(), 2)) * form, mean_kinetic);
+                    }});
     list.push_back(
         {.label = "eq:discretePE",
          .section = "4",

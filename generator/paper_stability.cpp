@@ -179,9 +179,10 @@ void truncation_and_stability(std::vector<Statement>& list) {
                     .parts = {},
                     .route = "Δ < 0 with real coefficients; leading and constant coefficients are equal, so |r|² = 1",
                     .sentence = "two complex conjugate roots of unit module",
-                    .holds = [=] {
-                        const ex polynomial = (outer * (1 + r * r) + centre * r).expand();
-                        return equal(polynomial.coeff(r, 2), polynomial.coeff(r, 0));
+                    .holds = [] {
+                        const ex border = oscillator().border;
+                        return equal(border.diff(GiNaC::ex_to<GiNaC::symbol>(symbol("q_jm"))),
+                                     border.diff(GiNaC::ex_to<GiNaC::symbol>(symbol("q_jp"))));
                     }});
     const double bound = at(GiNaC::sqrt(root_pair()[0]), {}).to_double();
     list.push_back(
