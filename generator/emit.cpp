@@ -379,8 +379,11 @@ KernelSource emit_kernel(const Derivation& derivation, Programs programs, const 
     source.name = identifier(derivation.scene.name);
     source.report = optimise(programs);
     const Emitter emitter(derivation, programs, options);
-    source.digest = digest_of(emitter.header(source.name, "", source.report));
-    source.header = emitter.header(source.name, source.digest, source.report);
+    // The digest of the text with the digest left out, put in its place.
+    source.header = emitter.header(source.name, "", source.report);
+    source.digest = digest_of(source.header);
+    const std::string empty = "digest = \"\"";
+    source.header.replace(source.header.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
     return source;
 }
 

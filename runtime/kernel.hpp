@@ -123,10 +123,11 @@ inline void sincos(real x, real& sine, real& cosine) {
     cosine = cos(x);
 }
 
-// The same for double, branch-free up to |x| < 2^19 pi/2: reduction by pi/2 in three parts (33 + 33 + 53 bits, so that
-// k * part is exact for |k| < 2^20), kept as a sum of two doubles, then the Taylor-minimax polynomials of degree 13 and
-// 14 on [-pi/4, pi/4] (coefficients: Cody & Waite type, as published with FDLIBM). Below 1 ulp, tested. Uses no FMA, so
-// that every processor and compiler gives the same bits.
+// The same for double, up to |x| < 2^19 pi/2: reduction by pi/2 in three parts (33 + 33 + 53 bits, so that k * part is
+// exact for |k| < 2^20 in the first two), kept as a sum of two doubles, then the minimax polynomials of degree 13 and
+// 14 on
+// [-pi/4, pi/4] published with FDLIBM. Measured: at most 0.77 ulp for |x| < 10^4 and 0.87 beyond, but 1.07 at some of
+// the doubles nearest the multiples of pi/2. Uses no FMA, so that every processor and compiler gives the same bits.
 inline void sincos(double x, double& sine, double& cosine) {
     if (!(fabs(x) < 823549.0)) {
         sine = std::sin(x);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The compiler and its cache: what is compiled when, what is trusted, what survives, what people are told.
+#include <dlfcn.h>
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 #include <signal.h>
@@ -7,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "runtime/compile.hpp"
@@ -129,6 +131,20 @@ TEST_CASE("the command names the compiler that CXX names and all flags, and fuse
                                          "-fvisibility=hidden -std=c++17 answer.cpp -o answer.so");
     const EnvironmentVariable words("CXX", compiler + "  -DLOBATTO_UNUSED='a' ");
     CHECK(compile(answer).command.starts_with(compiler + " '-DLOBATTO_UNUSED='\\''a'\\''' -O3 "));
+}
+
+TEST_CASE("a product is rounded before it is added to, on every processor") {
+    const Workshop workshop;
+    const Compiled compiled =
+        compile({"sum",
+                 "extern \"C\" __attribute__((visibility(\"default\"))) double sum(double a, double b, double c) "
+                 "{ return a * b + c; }\n"});
+    void* const library = ::dlopen(compiled.object.c_str(), RTLD_NOW | RTLD_LOCAL);
+    REQUIRE(library != nullptr);
+    const auto sum = reinterpret_cast<double (*)(double, double, double)>(::dlsym(library, "sum"));
+    const double small = std::ldexp(1.0, -30);
+    CHECK(sum(1 + small, 1 - small, -1) == 0);  // a fused multiply-add gives -2^-60
+    ::dlclose(library);
 }
 
 TEST_CASE("an entry whose key text is forged is built again") {
@@ -287,6 +303,24 @@ TEST_CASE("a folder that cannot be made is named with the reason") {
         "cannot create the folder " + (folder / "file/cache").string() +
             ": Not a directory; make room or give permission there, or name another folder in the environment variable "
             "LOBATTO_CACHE_DIR");
+}
+
+TEST_CASE("a folder without permission to write is named with the reason, but what is in it is used") {
+    TemporaryFolder folder;
+    fs::permissions(folder.string(), fs::perms::all);  // for another user, too
+    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
+    const pid_t pid = start_process([&] {
+        if (::geteuid() == 0 && ::setuid(65534) != 0) return false;  // root may write everywhere
+        compile(answer);
+        fs::permissions(folder / "cache", fs::perms::owner_read | fs::perms::owner_exec);
+        const std::string message = message_of<MachineError>([] { compile({"other", answer.text}); });
+        return compile(answer).from_cache &&
+               message.starts_with("cannot create " + (folder / "cache/other-").string()) &&
+               message.ends_with(
+                   ".lock: Permission denied; make room or give permission there, or name another folder in the "
+                   "environment variable LOBATTO_CACHE_DIR");
+    });
+    CHECK(exit_code_of(pid) == 0);
 }
 
 TEST_CASE("a compiler that fails is quoted, and source, command and output are kept") {
