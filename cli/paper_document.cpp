@@ -95,7 +95,7 @@ std::string walk_document(const std::vector<Finding>& findings) {
                                 section);
         }
         const std::string route = finding.verdict == Verdict::misprint ? "" : cell(finding.demonstration);
-        text += fmt::format("| {}: {} | {} | {} | {} |\n", cell(finding.label), cell(finding.what),
+        text += fmt::format("| **{}**<br>{} | {} | {} | {} |\n", cell(finding.label), cell(finding.what),
                             code(finding.printed), verdict_cell(finding), route);
     }
     return text;
