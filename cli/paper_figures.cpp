@@ -58,9 +58,9 @@ void draw(const std::string& folder, const std::string& name, const std::string&
     std::filesystem::remove(path, ignored);
     if (!result.succeeded())
         throw MachineError(
-            fmt::format("gnuplot could not draw {}: {}\nInstall it (apt install gnuplot-nox) or leave the figures out "
+            fmt::format("gnuplot could not draw {}: {}Install it (apt install gnuplot-nox) or leave the figures out "
                         "with --no-figures.",
-                        name, result.output.empty() ? "no message" : result.output));
+                        name, result.output.empty() ? "no message\n" : result.output));
 }
 
 // Figures 1 and 3: exact curve at `fine` points a step, states of the three schemes at the steps; p divided by m omega.
@@ -237,7 +237,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
              logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|\"\nset yrange [1e-9:1e-3]\n" + "plot " +
              curves_of("figure2", 2, 2, true) + "\n" +
              "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H_d/H_d(0) − 1|\"\nset "
-             "yrange [1e-16:1e-8]\n" +
+             "yrange [1e-17:1e-8]\n" +
              "plot " + curves_of("figure2", 5, 2, false) + ", " + curves_of("figure2", 8, 12, false) +
              "\nunset multiplot\n",
          700);
