@@ -319,6 +319,7 @@ private:
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");
+        if (d_.structure.linear && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi);\n";
         if (d_.structure.linear && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else
