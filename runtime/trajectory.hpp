@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Drives one trajectory: blocks of steps inside the kernel, records to a sink, progress, interruption, diagnosis of a stop.
+// Drives one trajectory: blocks of steps inside the kernel, records to a sink, progress, interruption, diagnosis of a
+// stop.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +13,10 @@
 
 namespace lobatto {
 
-// One kept state: t, q[n], p[n], row-major as the kernel writes them.
+// Kept states: rows of t, q[n], p[n], row-major as the kernel writes them, and the energy of each.
 struct Records {
-    const double* rows = nullptr;
+    const double* rows = nullptr;    // count x columns
+    const double* energy = nullptr;  // count: H(q, p)
     std::int64_t count = 0;
     int columns = 0;  // 1 + 2n
 };
@@ -23,12 +25,12 @@ struct TrajectoryRequest {
     std::vector<double> parameters;  // scene order
     std::vector<double> q, p;        // n each
     double time = 0;
-    double step = 0;                 // h; may be negative
-    std::int64_t steps = 0;          // >= 0
-    std::int64_t every = 1;          // keep every such state; the first and the last state are always kept
-    std::function<void(const Records&)> sink;             // called for each block, in order
-    std::function<void(std::int64_t done)> progress;      // called about ten times a second
-    const volatile int* interrupted = nullptr;            // stop between blocks once it is not zero
+    double step = 0;                           // h; may be negative
+    std::int64_t steps = 0;                    // >= 0
+    std::int64_t every = 1;                    // keep every such state; the first and the last state are always kept
+    std::function<void(const Records&)> sink;  // called for each block, in order
+    std::function<void(std::int64_t done)> progress;  // called about ten times a second
+    const volatile int* interrupted = nullptr;        // stop between blocks once it is not zero
 };
 
 struct TrajectoryResult {
@@ -39,12 +41,13 @@ struct TrajectoryResult {
     std::int32_t iterations_most = 0;
     double increment_largest = 0;
     double increment_failed = 0;
-    double time = 0;                 // of the last good state
-    std::vector<double> q, p;        // the last good state
-    double seconds = 0;              // inside the kernel
+    double time = 0;           // of the last good state
+    std::vector<double> q, p;  // the last good state
+    double seconds = 0;        // inside the kernel
     double energy_start = 0;
-    double energy_error_largest = 0; // max over the kept states |H - H(0)|, absolute
-    double energy_error_final = 0;
+    double energy_error_largest =
+        0;  // max over the kept states |H - H(0)|, absolute; H in double, so about |H| 2^-53 of it is rounding
+    double energy_error_final = 0;  // H - H(0) at the last good state
 };
 
 TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request);

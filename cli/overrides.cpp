@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/overrides.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/expression.hpp"
+#include "generator/suggest.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// The part of an argument from byte `begin` on, each byte with its column.
+Text text_from(const std::string& argument, std::size_t begin) {
+    Text text{argument.substr(begin), {}};
+    int column = 0;
+    for (std::size_t i = 0; i <= argument.size(); ++i) {
+        const bool starts_character = i == argument.size() || (static_cast<unsigned char>(argument[i]) & 0xC0) != 0x80;
+        if (starts_character) ++column;
+        if (i >= begin) text.at.push_back({1, column});
+    }
+    return text;
+}
+
+[[noreturn]] void fail_unknown(const Source& source, const Scene& scene, const std::string& name) {
+    for (const Parameter& constant : scene.constants) {
+        if (constant.name == name)
+            source.fail(
+                {1, 1},
+                fmt::format(
+                    "'{}' is declared constant in {}, so it is part of the kernel; only run-time parameters can be set",
+                    name, scene.path));
+    }
+    if (scene.parameters.empty())
+        source.fail({1, 1}, fmt::format("unknown parameter '{}'; {} has no run-time parameters", name, scene.path));
+    std::vector<std::string> names;
+    for (const Parameter& parameter : scene.parameters) names.push_back(parameter.name);
+    source.fail({1, 1},
+                fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
+}
+
+void set_parameter(const std::string& argument, Scene& scene) {
+    const Source source("--set", argument);
+    const std::size_t equals = argument.find('=');
+    if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
+    const std::string name = argument.substr(0, equals);
+    const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
+                                        [&](const Parameter& p) { return p.name == name; });
+    if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
+    Scope scope;
+    scope.formula = fmt::format("the value of {}", name);
+    scope.velocities_allowed = scope.positions_allowed = false;
+    parameter->value = parse_expression(source, text_from(argument, equals + 1), scope);
+}
+
+GiNaC::ex in_parameters(const std::string& option, const std::string& argument, const std::string& what,
+                        const Scene& scene) {
+    Scope scope;
+    scope.formula = what;
+    scope.velocities_allowed = scope.positions_allowed = false;
+    for (const Parameter& parameter : scene.parameters)
+        scope.names[parameter.name] = {parameter.symbol, Name::Role::parameter};
+    for (const Parameter& constant : scene.constants)
+        scope.names[constant.name] = {constant.value, Name::Role::parameter};
+    return parse_expression(Source(option, argument), text_from(argument, 0), scope);
+}
+
+}  // namespace
+
+void apply(const Overrides& overrides, Scene& scene) {
+    for (const std::string& argument : overrides.set) set_parameter(argument, scene);
+    if (!overrides.step.empty()) scene.run.step = in_parameters("--step", overrides.step, "the step", scene);
+    if (!overrides.until.empty()) scene.run.until = in_parameters("--until", overrides.until, "the end time", scene);
+    if (overrides.points) scene.method.points = *overrides.points;
+    if (overrides.every) scene.outputs.every = *overrides.every;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Values of a scene that the command line replaces.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "generator/scene.hpp"
+
+namespace lobatto {
+
+struct Overrides {
+    std::vector<std::string> set;  // "name=expression": run-time parameters; the expression is a number such as 2*pi
+    std::string step, until;       // expressions in the parameters; empty: as in the scene
+    std::optional<int> points;
+    std::optional<long> every;
+};
+
+// Throws InputError with the place in the argument.
+void apply(const Overrides& overrides, Scene& scene);
+
+}  // namespace lobatto

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto run: a scene from text to trajectory, and what there is to say about it.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+
+#include "cli/commands.hpp"
+#include "cli/kernel_of.hpp"
+#include "cli/overrides.hpp"
+#include "cli/progress.hpp"
+#include "cli/watch.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/diagnostics.hpp"
+#include "runtime/error.hpp"
+#include "runtime/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr int interrupted_exit = 130;  // as shells count an interruption
+
+struct RunOptions {
+    std::string scene;
+    std::string output;  // empty: out/NAME.csv
+    Overrides overrides;
+    bool quiet = false;
+};
+
+// While it lives, the first SIGINT or SIGTERM only raises a flag; a second one ends the process.
+class Interruption {
+public:
+    Interruption() {
+        raised_ = 0;
+        struct sigaction action {};
+        action.sa_handler = [](int) { raised_ = 1; };
+        action.sa_flags = SA_RESETHAND;
+        for (std::size_t i = 0; i < 2; ++i) {
+            sigaction(signals[i], nullptr, &before_[i]);
+            if (before_[i].sa_handler != SIG_IGN) sigaction(signals[i], &action, nullptr);
+        }
+    }
+    ~Interruption() {
+        for (std::size_t i = 0; i < 2; ++i) sigaction(signals[i], &before_[i], nullptr);
+    }
+    Interruption(const Interruption&) = delete;
+    Interruption& operator=(const Interruption&) = delete;
+    static const volatile int* flag() { return &raised_; }
+
+private:
+    static constexpr int signals[2] = {SIGINT, SIGTERM};
+    static inline volatile std::sig_atomic_t raised_ = 0;
+    struct sigaction before_[2]{};
+};
+
+// The number of steps to the end; the end itself when it is a multiple of h.
+struct Steps {
+    std::int64_t count = 0;
+    bool reaches_end = true;
+};
+
+Steps steps_of(const Scene& scene) {
+    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step"),
+                         until = scene.evaluate(scene.run.until, "the end time");
+    if (!step.is_positive())
+        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
+    if (until.is_negative())
+        throw InputError(
+            fmt::format("{}: the end time must not be negative, but is {:.6g}", scene.path, until.to_double()));
+    const double ratio = (until / step).to_double();
+    if (!(ratio < 9e15))
+        throw InputError(fmt::format(
+            "{}: {:.3g} steps are too many to count; make the step larger or the end time smaller", scene.path, ratio));
+    const double nearest = std::round(ratio);
+    const bool reaches_end = std::fabs(ratio - nearest) <= 1e-9;
+    return {static_cast<std::int64_t>(reaches_end ? nearest : std::floor(ratio)), reaches_end};
+}
+
+std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& values, const std::string& what) {
+    std::vector<double> numbers;
+    for (std::size_t k = 0; k < values.size(); ++k)
+        numbers.push_back(
+            scene.evaluate(values[k], fmt::format("the initial {} of {}", what, scene.coordinates[k].name))
+                .to_double());
+    return numbers;
+}
+
+TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
+    TrajectoryHeader header;
+    header.scene = scene.title.empty() ? scene.name : scene.title;
+    header.method = fmt::format("Lobatto, {} points, h = {}", scene.method.points, exact_text(request.step));
+    header.kernel = source.digest;
+    for (std::size_t i = 0; i < scene.parameters.size(); ++i)
+        header.parameters.emplace_back(scene.parameters[i].name, request.parameters[i]);
+    header.columns = {{"t", ""}};
+    for (const Coordinate& coordinate : scene.coordinates)
+        header.columns.emplace_back(coordinate.name, coordinate.unit);
+    for (const Coordinate& coordinate : scene.coordinates) header.columns.emplace_back("p_" + coordinate.name, "");
+    header.energy = scene.outputs.energy;
+    if (header.energy) header.columns.emplace_back("H", "");
+    return header;
+}
+
+// Three digits and a unit.
+std::string duration(double seconds) {
+    if (seconds < 1e-6) return fmt::format("{:.3g} ns", seconds * 1e9);
+    if (seconds < 1e-3) return fmt::format("{:.3g} us", seconds * 1e6);
+    return seconds < 1 ? fmt::format("{:.3g} ms", seconds * 1e3) : fmt::format("{:.3g} s", seconds);
+}
+
+void print_row(const std::string& label, const std::string& value) {
+    fmt::print("  {:<24}{}\n", label, value);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void print_table(const Kernel& kernel, const TrajectoryRequest& request, const TrajectoryResult& result,
+                 const Watch& watch, std::optional<double> defect) {
+    const double steps = static_cast<double>(result.steps_done);
+    print_row("steps",
+              result.steps_done == request.steps
+                  ? fmt::format("{} of h = {:.6g}, to t = {:.6g}", result.steps_done, request.step, result.time)
+                  : fmt::format("{} of {}, h = {:.6g}, to t = {:.6g}", result.steps_done, request.steps, request.step,
+                                result.time));
+    if (result.steps_done == 0) return;
+    print_row("time per step", duration(result.seconds / steps));
+    print_row("Newton iterations", kernel->linear          ? "none: the step is a linear map"
+                                   : kernel->unknowns == 0 ? "none: the step is explicit"
+                                                           : fmt::format("{:.2f} per step, at most {}",
+                                                                         static_cast<double>(result.iterations) / steps,
+                                                                         result.iterations_most));
+    const double H0 = std::fabs(result.energy_start);
+    print_row("energy error", fmt::format("{:.2g} at most", result.energy_error_largest) +
+                                  (H0 > 0 ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
+    if (const auto error = watch.discrete_error())
+        print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
+    if (defect) print_row("symplectic defect", fmt::format("{:.2g}", *defect));
+    if (const auto error = watch.position_error()) {
+        print_row("position error", fmt::format("{:.2g} at most, against the exact {}solution", *error,
+                                                watch.is_elliptic() ? "elliptic " : ""));
+    }
+}
+
+void run(const RunOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    Scene scene = read_scene(options.scene);
+    apply(options.overrides, scene);
+    const Steps steps = steps_of(scene);
+    const Derivation derivation = derive(scene);
+    const KernelSource source = emit(derivation);
+    const double derivation_seconds = seconds_since(start);
+    Compiled compiled;
+    const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
+
+    TrajectoryRequest request;
+    for (const Parameter& parameter : scene.parameters)
+        request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = steps.count;
+    request.every = scene.outputs.every;
+    request.q = doubles(scene, scene.initial_position, "position");
+    const bool from_velocity = scene.start == Start::velocity;
+    const std::vector<double> rate = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
+
+    Stepper<double> stepper(kernel);
+    TrajectoryResult failed_start;
+    failed_start.q = request.q;
+    failed_start.p = request.p = rate;
+    failed_start.status = stepper.prepare(request.parameters, request.step);
+    if (failed_start.status == LOBATTO_OK) {
+        if (from_velocity) failed_start.p = request.p = stepper.momentum(request.q, rate);
+        failed_start.status = stepper.start(request.time, request.q, request.p);
+    }
+    if (failed_start.status != LOBATTO_OK)
+        throw ComputationError(scene.path + ": " + explain_stop(failed_start, request));
+
+    std::string path = options.output;
+    if (path.empty()) {
+        path = "out/" + scene.name + ".csv";
+        std::error_code error;
+        std::filesystem::create_directory("out", error);
+        if (error)
+            throw MachineError(
+                fmt::format("cannot create the folder out here: {}. Choose another place with -o", error.message()));
+    }
+    if (!options.quiet) {
+        fmt::print("{}: kernel {}, {}\n", scene.path, source.digest,
+                   compiled.from_cache ? "from the cache"
+                                       : fmt::format("derived in {:.2f} s, compiled in {:.2f} s", derivation_seconds,
+                                                     compiled.seconds));
+    }
+
+    TrajectoryFile file(path, header_of(scene, source, request));
+    Watch watch(scene, derivation.structure, stepper, stepper.velocity(request.q, request.p));
+    std::int64_t states = 0;
+    request.sink = [&](const Records& records) {
+        file.write(records);
+        watch.look(records);
+        states += records.count;
+    };
+    TrajectoryResult result;
+    {
+        Progress progress(request.steps);
+        if (!options.quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
+        const Interruption interruption;
+        request.interrupted = interruption.flag();
+        result = integrate(kernel, request);
+    }
+    watch.look_at_end(result);
+    file.finish();
+
+    if (!options.quiet) {
+        // Where no step succeeded there is no tangent to measure.
+        const auto defect =
+            result.steps_done > 0 ? std::optional(symplectic_defect(stepper, request.q, request.p)) : std::nullopt;
+        print_table(kernel, request, result, watch, defect);
+        print_row("trajectory", fmt::format("{}, {} states", path, states));
+        if (!steps.reaches_end)
+            fmt::print("The end time is not a multiple of the step: the run ends one incomplete step before it.\n");
+    }
+    if (result.status != LOBATTO_OK)
+        throw ComputationError(
+            fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
+    if (result.interrupted) {
+        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.\n", result.time, path);
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+}
+
+}  // namespace
+
+void add_run(CLI::App& program) {
+    CLI::App* command =
+        program.add_subcommand("run", "Derive, compile and run a scene; write its trajectory and say how good it is");
+    const auto options = std::make_shared<RunOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
+    command
+        ->add_option("--points", options->overrides.points,
+                     "Points of the Lobatto quadrature; the order is 2 points - 2")
+        ->check(CLI::Range(2, 5));
+    command->add_option("--step", options->overrides.step,
+                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
+    command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
+    command->add_option("--every", options->overrides.every, "Keep every such state")->check(CLI::PositiveNumber);
+    command
+        ->add_option("--set", options->overrides.set,
+                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
+        ->allow_extra_args(false);
+    command->add_flag("--quiet", options->quiet, "Print nothing but errors");
+    command->footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
+    command->callback([options] { run(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// Trajectories as CSV files that round-trip: every number is the shortest text that reads back to the same bits.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "runtime/trajectory.hpp"
+
+namespace lobatto {
+
+// What the comment lines at the head of a file say. No dates, paths or machines: same scene, same bytes.
+struct TrajectoryHeader {
+    std::string scene;   // its title
+    std::string method;  // "Lobatto, 4 points, h = 0.05"
+    std::string kernel;  // digest
+    std::vector<std::pair<std::string, double>> parameters;
+    std::vector<std::pair<std::string, std::string>>
+        columns;         // names and units ("" when unknown): t, q.., p.., and H when it is kept
+    bool energy = true;  // whether the last column is H
+};
+
+// The file appears under its name only when `finish` is called. Until then its rows stand in NAME.partial beside it,
+// whole lines written block by block, so that a killed run leaves a readable NAME.partial and an earlier NAME
+// untouched. Two runs cannot write the same file at once. A destination that exists and is no regular file (a pipe, a
+// device) is written to directly.
+class TrajectoryFile {
+public:
+    // All functions throw MachineError, which names the path, when the machine refuses.
+    TrajectoryFile(const std::string& path, const TrajectoryHeader& header);
+    ~TrajectoryFile();  // without `finish`: NAME.partial stays
+    TrajectoryFile(const TrajectoryFile&) = delete;
+    TrajectoryFile& operator=(const TrajectoryFile&) = delete;
+
+    void write(const Records& records);
+    void finish();
+
+private:
+    void flush();
+
+    std::string path_;     // the destination
+    std::string partial_;  // what is being written; the same as path_ for a pipe or device
+    int descriptor_ = -1;
+    bool energy_ = true;
+    std::string text_;
+};
+
+// A file read back. The last line of an unfinished file may be torn; it is left out.
+struct TrajectoryTable {
+    std::vector<std::string> comments;  // the lines that begin with '#', without "# "
+    std::vector<std::string> columns;
+    std::vector<std::vector<double>> rows;
+};
+TrajectoryTable read_trajectory(const std::string& path);
+
+// The shortest text that reads back to the same double.
+std::string exact_text(double value);
+
+}  // namespace lobatto

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// The host's side of a run: how many steps to ask the kernel for at a time, and what to say when it stops.
+#include "runtime/trajectory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace lobatto {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+constexpr std::int64_t rows_at_once = 4096;  // the records in memory, however long the run
+constexpr double block_seconds = 0.02;       // of a block of steps: an interruption is noticed within about twice this
+constexpr double progress_seconds = 0.1;
+
+// Watches the kept states go by: their energies, and the sink.
+class Keeper {
+public:
+    Keeper(const Stepper<double>& stepper, const TrajectoryRequest& request, TrajectoryResult& result)
+        : stepper_(stepper), request_(request), result_(result), n_(request.q.size()), q_(n_), p_(n_) {
+        result_.energy_start = energy(request.q.data(), request.p.data());
+    }
+
+    void keep(const double* rows, std::int64_t count) {
+        energies_.resize(static_cast<std::size_t>(count));
+        const std::size_t columns = 1 + 2 * n_;
+        for (std::size_t i = 0; i < energies_.size(); ++i) {
+            const double* q = rows + i * columns + 1;
+            energies_[i] = energy(q, q + n_);
+            result_.energy_error_final = energies_[i] - result_.energy_start;
+            const double error = std::fabs(result_.energy_error_final);
+            if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
+        }
+        if (request_.sink && count > 0) request_.sink({rows, energies_.data(), count, static_cast<int>(columns)});
+    }
+
+    void keep_last() {
+        std::vector<double> row{result_.time};
+        row.insert(row.end(), result_.q.begin(), result_.q.end());
+        row.insert(row.end(), result_.p.begin(), result_.p.end());
+        keep(row.data(), 1);
+    }
+
+private:
+    double energy(const double* q, const double* p) {
+        std::copy_n(q, n_, q_.begin());
+        std::copy_n(p, n_, p_.begin());
+        return stepper_.energy(q_, p_);
+    }
+
+    const Stepper<double>& stepper_;
+    const TrajectoryRequest& request_;
+    TrajectoryResult& result_;
+    std::size_t n_;
+    std::vector<double> q_, p_, energies_;
+};
+
+std::string list(const std::vector<double>& values) {
+    return fmt::format("({:.6g})", fmt::join(values, ", "));
+}
+
+}  // namespace
+
+TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request) {
+    TrajectoryResult result;
+    result.time = request.time;
+    result.q = request.q;
+    result.p = request.p;
+    Stepper<double> stepper(kernel);
+    result.status = stepper.prepare(request.parameters, request.step);
+    if (result.status == LOBATTO_OK) result.status = stepper.start(request.time, request.q, request.p);
+    if (result.status != LOBATTO_OK) return result;
+
+    Keeper keeper(stepper, request, result);
+    keeper.keep_last();
+
+    const std::int64_t rows = std::clamp<std::int64_t>(request.steps / request.every, 1, rows_at_once);
+    std::vector<double> records(static_cast<std::size_t>(rows) * (1 + 2 * request.q.size()));
+    std::int64_t block = 256;
+    Clock::time_point last_progress = Clock::now();
+    while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
+        result.interrupted = request.interrupted != nullptr && *request.interrupted != 0;
+        if (result.interrupted) break;
+
+        lobatto_advance call{};
+        call.steps = std::min(block, request.steps - result.steps_done);
+        call.record_every = request.every;
+        call.records = records.data();
+        call.capacity = rows;
+        const Clock::time_point start = Clock::now();
+        result.status = stepper.advance(call);
+        const double seconds = seconds_since(start);
+
+        result.seconds += seconds;
+        result.steps_done += call.steps_done;
+        result.iterations += call.iterations;
+        result.iterations_most = std::max(result.iterations_most, call.iterations_most);
+        result.increment_largest = std::max(result.increment_largest, call.increment_largest);
+        result.increment_failed = call.increment_failed;
+        stepper.state(result.time, result.q, result.p);
+        keeper.keep(records.data(), call.records_written);
+
+        // The clock ticks coarsely against a short block: grow at most eightfold at a time.
+        const double pace = block_seconds / std::max(seconds, block_seconds / 8);
+        block = std::max<std::int64_t>(1, std::llround(static_cast<double>(call.steps_done) * pace));
+        if (request.progress && seconds_since(last_progress) > progress_seconds) {
+            last_progress = Clock::now();
+            request.progress(result.steps_done);
+        }
+    }
+    if (result.steps_done % request.every != 0) keeper.keep_last();
+    return result;
+}
+
+std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request) {
+    const std::string smaller = fmt::format("a smaller step, such as h = {:.6g}", request.step / 2);
+    std::string why, advice;
+    switch (result.status) {
+        case LOBATTO_OK:
+            return {};
+        case LOBATTO_NOT_CONVERGED:
+            why = fmt::format(
+                "Newton's iteration for the positions inside the step did not converge: its last increment was {:.2g} "
+                "of the displacement "
+                "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
+                "of the potential",
+                result.increment_failed);
+            advice = smaller + ", or start elsewhere";
+            break;
+        case LOBATTO_NOT_FINITE:
+            why =
+                "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
+                "potential or away to infinity, or the "
+                "step is too long for the method to be stable";
+            advice = smaller + ", an earlier end, or start elsewhere";
+            break;
+        case LOBATTO_SINGULAR_JACOBIAN:
+            why =
+                "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
+                "This h meets a resonance of the forces there";
+            advice = smaller + ", or a slightly different one";
+            break;
+        case LOBATTO_SINGULAR_MASS:
+            why = "the mass matrix has no inverse for these parameters, so that momenta do not determine velocities";
+            advice =
+                "other values of the parameters that stand before the squared velocities; none of the masses may "
+                "vanish";
+            break;
+        case LOBATTO_TIME_STANDS_STILL:
+            why =
+                fmt::format("t + h equals t in double precision: h = {:.6g} is below the rounding of t", request.step);
+            advice = "a larger step, or a start time nearer to zero";
+            break;
+    }
+    const std::string where =
+        result.steps_done == 0
+            ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
+            : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);
+    return fmt::format("{}, from q = {}, p = {}: {}. Try {}.", where, list(result.q), list(result.p), why, advice);
+}
+
+}  // namespace lobatto

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Driving a kernel: which states are kept, what is measured, how a run ends. On the hand-written pendulum of the paper.
+#include "runtime/trajectory.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "cli/kernel_of.hpp"
+#include "runtime/diagnostics.hpp"
+#include "runtime/reference.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const Kernel& pendulum() {
+    static const Kernel kernel = [] {
+        KernelSource source;
+        source.name = "handwritten_pendulum";
+        source.digest = "0123456789abcdef";
+        source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
+                        "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
+        return kernel_of(source, Precision::double_);
+    }();
+    return kernel;
+}
+
+// m = omega = 1 from q = 2 at rest.
+TrajectoryRequest from_two(double step, std::int64_t steps, std::int64_t every = 1) {
+    TrajectoryRequest request;
+    request.parameters = {1, 1};
+    request.q = {2};
+    request.p = {0};
+    request.step = step;
+    request.steps = steps;
+    request.every = every;
+    return request;
+}
+
+std::vector<double> kept_times(TrajectoryRequest request, TrajectoryResult* result = nullptr) {
+    std::vector<double> times;
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) times.push_back(records.rows[i * records.columns]);
+    };
+    const TrajectoryResult done = integrate(pendulum(), request);
+    if (result != nullptr) *result = done;
+    return times;
+}
+
+}  // namespace
+
+TEST_CASE("the first and the last state are kept exactly once") {
+    using Times = std::vector<double>;
+    CHECK(kept_times(from_two(0.25, 0)) == Times{0});
+    CHECK(kept_times(from_two(0.25, 1)) == Times{0, 0.25});
+    CHECK(kept_times(from_two(0.25, 4, 2)) == Times{0, 0.5, 1});
+    CHECK(kept_times(from_two(0.25, 5, 2)) == Times{0, 0.5, 1, 1.25});
+    CHECK(kept_times(from_two(0.25, 3, 1000)) == Times{0, 0.75});
+    CHECK(kept_times(from_two(-0.25, 3, 2)) == Times{0, -0.5, -0.75});
+}
+
+TEST_CASE("a run of many blocks keeps every state in order") {
+    // 20,000 states pass through a buffer of 4096.
+    const std::vector<double> times = kept_times(from_two(0.125, 60001, 3));
+    REQUIRE(times.size() == 20002);
+    bool in_order = true;
+    for (std::size_t i = 0; i + 1 < times.size(); ++i)
+        in_order = in_order && times[i] == 0.375 * static_cast<double>(i);
+    CHECK(in_order);
+    CHECK(times.back() == 0.125 * 60001);
+}
+
+TEST_CASE("a trajectory follows the exact solution, forwards and backwards") {
+    for (const double h : {0.1, -0.1}) {
+        TrajectoryResult result;
+        kept_times(from_two(h, 1000), &result);
+        const PhasePoint exact = pendulum_solution(1, 2, 0, static_cast<long double>(result.time));
+        CHECK(std::fabs(result.q[0] - static_cast<double>(exact.q)) < 5e-8);  // measured 1.2e-8 at t = 100
+        CHECK(result.time == doctest::Approx(1000 * h).epsilon(1e-14));
+        CHECK(result.steps_done == 1000);
+        CHECK(result.status == LOBATTO_OK);
+    }
+}
+
+TEST_CASE("there and back again leads to the start") {
+    TrajectoryRequest request = from_two(0.1, 1000);
+    const TrajectoryResult there = integrate(pendulum(), request);
+    request.q = there.q;
+    request.p = there.p;
+    request.time = there.time;
+    request.step = -0.1;
+    const TrajectoryResult back = integrate(pendulum(), request);
+    CHECK(std::fabs(back.q[0] - 2) < 1e-11);  // rounding, which grows with t; measured 3e-13
+    CHECK(std::fabs(back.p[0]) < 1e-11);
+    CHECK(back.time == doctest::Approx(0));
+}
+
+TEST_CASE("the energy error is that of the kept states") {
+    TrajectoryRequest request = from_two(0.5, 1000);
+    double largest = 0, last = 0;
+    const double start = 1 - std::cos(2.0);
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) {
+            const double q = records.rows[3 * i + 1], p = records.rows[3 * i + 2], H = p * p / 2 + 1 - std::cos(q);
+            CHECK(std::fabs(records.energy[i] - H) < 1e-15);
+            last = H - start;
+            largest = std::fmax(largest, std::fabs(last));
+        }
+    };
+    const TrajectoryResult result = integrate(pendulum(), request);
+    CHECK(result.energy_start == doctest::Approx(start).epsilon(1e-15));
+    CHECK(std::fabs(result.energy_error_largest - largest) < 1e-15);
+    CHECK(std::fabs(result.energy_error_final - last) < 1e-15);
+    CHECK(largest > 1e-6);  // the method's own error, far above rounding; measured 8e-6
+    CHECK(largest < 1e-4);
+}
+
+TEST_CASE("iterations, increments and progress are counted") {
+    TrajectoryRequest request = from_two(0.2, 3000000, 1000000);
+    std::int64_t told = 0;
+    request.progress = [&](std::int64_t done) {
+        CHECK(done > told);
+        told = done;
+    };
+    const TrajectoryResult result = integrate(pendulum(), request);
+    CHECK(result.iterations >= result.steps_done);
+    CHECK(result.iterations_most >= 2);
+    CHECK(result.iterations_most <= 6);
+    CHECK(result.increment_largest > 0);
+    CHECK(result.increment_largest < 1e-3);
+    CHECK(result.seconds > 0);
+    CHECK(told > 0);  // 3 million steps take more than a tenth of a second
+}
+
+TEST_CASE("an interruption ends the run between two blocks and keeps what was done") {
+    TrajectoryRequest request = from_two(0.125, 1'000'000'000'000, 1000);
+    volatile int flag = 0;
+    request.interrupted = &flag;
+    request.progress = [&](std::int64_t) { flag = 1; };
+    TrajectoryResult result;
+    const std::vector<double> times = kept_times(request, &result);
+    CHECK(result.interrupted);
+    CHECK(result.status == LOBATTO_OK);
+    CHECK(result.steps_done > 0);
+    CHECK(times.back() == result.time);
+    CHECK(result.time == 0.125 * static_cast<double>(result.steps_done));
+}
+
+TEST_CASE("a step that does not converge stops the run, keeps the steps before and explains itself") {
+    TrajectoryRequest request = from_two(6, 100, 3);  // omega h = 38, an order beyond the stability bound 3.1
+    request.parameters = {1, 6.283185307179586};
+    TrajectoryResult result;
+    const std::vector<double> times = kept_times(request, &result);
+    CHECK(result.status == LOBATTO_NOT_CONVERGED);
+    CHECK(result.increment_failed > 1e-6);
+    CHECK(result.steps_done > 0);  // 4
+    CHECK(result.steps_done < 100);
+    CHECK(times.front() == 0);
+    CHECK(times.back() == result.time);
+    CHECK(times.back() == 6.0 * static_cast<double>(result.steps_done));
+    CHECK(explain_stop(result, request).starts_with("the run stopped in step 5, after t = 24, from q = "));
+}
+
+TEST_CASE("each way to stop has its own explanation") {
+    TrajectoryRequest request = from_two(0.5, 100);
+    TrajectoryResult result;
+    result.steps_done = 41;
+    result.time = 20.5;
+    result.q = {1.25, -3};
+    result.p = {0, 1e10};
+    const std::string where = "the run stopped in step 42, after t = 20.5, from q = (1.25, -3), p = (0, 1e+10): ";
+    result.status = LOBATTO_OK;
+    CHECK(explain_stop(result, request) == "");
+    result.status = LOBATTO_NOT_CONVERGED;
+    result.increment_failed = 0.3;
+    CHECK(explain_stop(result, request) ==
+          where +
+              "Newton's iteration for the positions inside the step did not converge: its last increment was 0.3 of "
+              "the displacement within the step. The step is too "
+              "long for the forces met there, or the motion runs into a singularity of the potential. Try a smaller "
+              "step, such as h = 0.25, or start elsewhere.");
+    result.status = LOBATTO_NOT_FINITE;
+    CHECK(explain_stop(result, request) ==
+          where +
+              "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
+              "potential or away to infinity, or the step is too long "
+              "for the method to be stable. Try a smaller step, such as h = 0.25, an earlier end, or start elsewhere.");
+    result.status = LOBATTO_SINGULAR_JACOBIAN;
+    CHECK(explain_stop(result, request) ==
+          where +
+              "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
+              "This h meets a resonance of the forces there. Try a "
+              "smaller step, such as h = 0.25, or a slightly different one.");
+    result.status = LOBATTO_TIME_STANDS_STILL;
+    CHECK(explain_stop(result, request) == where +
+                                               "t + h equals t in double precision: h = 0.5 is below the rounding of "
+                                               "t. Try a larger step, or a start time nearer to zero.");
+    result.status = LOBATTO_SINGULAR_MASS;
+    result.steps_done = 0;
+    result.time = 0;
+    CHECK(explain_stop(result, request) ==
+          "the run stopped in its first step, at t = 0, from q = (1.25, -3), p = (0, 1e+10): the mass matrix has no "
+          "inverse for these parameters, so that momenta do not "
+          "determine velocities. Try other values of the parameters that stand before the squared velocities; none of "
+          "the masses may vanish.");
+}
+
+TEST_CASE("a start that is impossible keeps nothing and says why") {
+    TrajectoryRequest request = from_two(0.1, 10);
+    request.parameters = {0, 1};
+    TrajectoryResult result;
+    CHECK(kept_times(request, &result).empty());
+    CHECK(result.status == LOBATTO_SINGULAR_MASS);
+    request = from_two(0.1, 10);
+    request.q = {std::nan("")};
+    CHECK(kept_times(request, &result).empty());
+    CHECK(result.status == LOBATTO_NOT_FINITE);
+    request = from_two(1e-30, 10);
+    request.time = 1;
+    CHECK(kept_times(request, &result).size() == 1);
+    CHECK(result.status == LOBATTO_TIME_STANDS_STILL);
+}
+
+TEST_CASE("the step is symplectic to rounding") {
+    Stepper<double> stepper(pendulum());
+    REQUIRE(stepper.prepare({1.5, 2}, 0.7) == LOBATTO_OK);
+    for (const double q : {0.0, 1.0, 2.9}) {
+        const double defect = symplectic_defect(stepper, {q}, {0.8});
+        CHECK(defect < 2e-15);  // measured 3e-16
+    }
+}
