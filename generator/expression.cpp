@@ -62,7 +62,7 @@ public:
     ex run() {
         if (token().kind == Token::Kind::end) fail(token(), fmt::format("{} is empty", scope_.formula));
         const Operand whole = read_sum();
-        if (token().is(')')) fail(token(), "this ) has no (");
+        if (token().is(')')) fail(token(), "this ) closes nothing: remove it, or add a ( before it");
         if (token().kind != Token::Kind::end) fail_missing_operator();
         return whole.expression;
     }
@@ -95,8 +95,9 @@ private:
             fail(at, fmt::format("{} has no finite real value here: {}", scope_.formula, error.what()));
         } catch (const InputError&) {
             throw;
-        } catch (const std::exception&) {
-            fail(at, fmt::format("{} has no finite value here", scope_.formula));
+        } catch (const std::exception&) {  // a pole that GiNaC knows, such as tan(pi/2)
+            fail(at, fmt::format("{} has no finite real value here: the result of {} is not finite", scope_.formula,
+                                 at.text));
         }
     }
 
@@ -155,9 +156,9 @@ private:
         if (is_a<numeric>(exponent.expression)) {
             const numeric n = ex_to<numeric>(exponent.expression);
             if (is_a<numeric>(base.expression)) {
-                // Size of b^n before it is computed; 0, 1 and -1 stay small whatever n.
-                const numeric b = ex_to<numeric>(base.expression);
-                if (abs(b) != 1 && !b.is_zero() && bits(b) * abs(n) > ExpressionLimits::number_bits) fail_number(at);
+                // The size of b^n, before it is computed, is at least this; 1 and -1 have one bit and stay small.
+                if ((bits(ex_to<numeric>(base.expression)) - 1) * abs(n) > ExpressionLimits::number_bits)
+                    fail_number(at);
             } else if (n.is_integer() && abs(n) > ExpressionLimits::exponent) {
                 fail(at, fmt::format("the exponent is beyond {}; write the formula with smaller powers",
                                      ExpressionLimits::exponent));
@@ -235,7 +236,7 @@ private:
     Operand read_parenthesis() {
         const Token open = tokens_[next_++];
         const Operand inside = read_sum();
-        if (token().kind == Token::Kind::end) fail(open, "this ( is not closed");
+        if (token().kind == Token::Kind::end) fail(open, "this ( is not closed: add a )");
         ++next_;  // the only thing that ends a sum, but for the end, is )
         return inside;
     }
@@ -304,14 +305,12 @@ private:
             if (scope_.names.count(base) > 0 && scope_.names.at(base).role == Name::Role::parameter)
                 fail(at, fmt::format("{} is a parameter and has no velocity; only coordinates have one", base));
         }
-        std::vector<std::string> declared, known{"pi"};
+        std::vector<std::string> declared;
         for (const auto& [declared_name, meaning] : scope_.names) {
             const bool allowed = (meaning.role != Name::Role::velocity || scope_.velocities_allowed) &&
                                  (meaning.role != Name::Role::position || scope_.positions_allowed);
             if (allowed) declared.push_back(declared_name);
         }
-        known.insert(known.end(), declared.begin(), declared.end());
-        for (const Function& function : functions()) known.push_back(function.name);
         if (token().is('(')) {
             std::vector<std::string> names;
             for (const Function& function : functions()) names.push_back(function.name);
@@ -323,7 +322,7 @@ private:
             fail(at, fmt::format("unknown name '{}' in {}: only numbers, pi and functions of them may stand here",
                                  shown, scope_.formula));
         fail(at, fmt::format("unknown name '{}' in {}; declared: {}.{}", shown, scope_.formula, listing(declared),
-                             suggestion(name, known)));
+                             suggestion(name, declared)));
     }
 
     const Source& source_;

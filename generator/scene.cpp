@@ -11,7 +11,7 @@
 #include "generator/document.hpp"
 #include "generator/expression.hpp"
 #include "generator/real.hpp"
-#include "generator/suggest.hpp"
+#include "generator/table.hpp"
 #include "generator/token.hpp"
 
 namespace lobatto {
@@ -21,42 +21,16 @@ constexpr std::size_t most_coordinates = 64, most_parameters = 1000;
 constexpr std::size_t longest_name = 64, longest_title = 200, longest_unit = 40;
 constexpr long long most_steps = 9'000'000'000'000'000;  // step numbers are exact as doubles up to 2^53
 
+constexpr std::pair<std::string_view, std::string_view> reserved_names[] = {
+    {"pi", "the number 3.14159..."}, {"h", "the time step"}, {"t", "the time"}, {"H", "the energy"}};
+
 // The values of the run-time parameters: as given, or else those of the scene.
-GiNaC::exmap parameter_values(const std::vector<Parameter>& parameters, const std::vector<GiNaC::ex>& given) {
+GiNaC::exmap values_of(const std::vector<Parameter>& parameters, const std::vector<GiNaC::ex>& given) {
     GiNaC::exmap values;
     for (std::size_t k = 0; k < parameters.size(); ++k)
         values[parameters[k].symbol] = real_value(given.empty() ? parameters[k].value : given[k]);
     return values;
 }
-
-// One table of the file: the keys it may have, and its values by key.
-class Table {
-public:
-    Table(const Source& source, const std::vector<Entry>& entries, Position at, std::string name,
-          std::vector<std::string> keys)
-        : source_(source), entries_(entries), at_(at), name_(std::move(name)) {
-        for (const Entry& entry : entries_)
-            if (std::find(keys.begin(), keys.end(), entry.key) == keys.end())
-                source_.fail(entry.at, fmt::format("unknown key '{}' in {}; there are {}.{}", entry.key, name_,
-                                                   listing(keys), suggestion(entry.key, keys)));
-    }
-
-    const Entry* find(const std::string& key) const {
-        const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key; });
-        return found == entries_.end() ? nullptr : &*found;
-    }
-    const Entry& get(const std::string& key, const std::string& mend) const {
-        if (const Entry* entry = find(key)) return *entry;
-        source_.fail(at_, fmt::format("{} has no {}; add {}", name_, key, mend));
-    }
-    Position at() const { return at_; }
-
-private:
-    const Source& source_;
-    const std::vector<Entry>& entries_;
-    Position at_;
-    std::string name_;
-};
 
 class Reader {
 public:
@@ -70,7 +44,7 @@ public:
         scene_.path = source_.path();
         scene_.name = identifier_of_file(source_.path());
         scene_.title = scene_.name;
-        if (const Entry* title = root_.find("title")) scene_.title = read_label(*title, longest_title);
+        if (const Entry* title = root_.find("title")) scene_.title = label_of(source_, *title, longest_title);
         read_parameters();
         read_coordinates();
         read_lagrangian();
@@ -100,48 +74,6 @@ private:
         return is_identifier(name) ? name : "scene_" + name;
     }
 
-    // Titles and units are copied into comments, tables and CSV headers.
-    std::string read_label(const Entry& entry, std::size_t longest) const {
-        const Value& value = entry.value;
-        if (value.kind != Value::Kind::text)
-            fail(value.at, fmt::format("{} must be a text in quotes, not {}", entry.key, value.kind_name()));
-        const std::string& text = value.text.value;
-        if (text.size() > longest)
-            fail(value.at, fmt::format("{} has {} bytes; at most {} are kept", entry.key, text.size(), longest));
-        if (!is_printable(text) || text.find_first_of("\\\"") != std::string::npos)
-            fail(value.at,
-                 fmt::format("{} must be one line without control characters, quotes and backslashes", entry.key));
-        return text;
-    }
-
-    const std::vector<Entry>& entries_of(const Entry& entry, const std::string& example) const {
-        if (entry.value.kind != Value::Kind::table)
-            fail(entry.value.at, fmt::format("{} must be a table, for example {}; this is {}", entry.key, example,
-                                             entry.value.kind_name()));
-        return entry.value.entries;
-    }
-
-    const Text& formula_text(const Entry& entry) const {
-        const Value::Kind kind = entry.value.kind;
-        if (kind != Value::Kind::text && kind != Value::Kind::integer && kind != Value::Kind::real)
-            fail(entry.value.at, fmt::format("{} must be a number, or a formula in quotes, not {}", entry.key,
-                                             entry.value.kind_name()));
-        return entry.value.text;
-    }
-
-    long long read_integer(const Entry& entry, long long least, long long most, const std::string& mend) const {
-        if (entry.value.kind != Value::Kind::integer)
-            fail(entry.value.at, fmt::format("{} must be a whole number, not {}", entry.key, entry.value.kind_name()));
-        if (entry.value.integer < least || entry.value.integer > most) fail(entry.value.at, mend);
-        return entry.value.integer;
-    }
-
-    bool read_boolean(const Entry& entry) const {
-        if (entry.value.kind != Value::Kind::boolean)
-            fail(entry.value.at, fmt::format("{} must be true or false, not {}", entry.key, entry.value.kind_name()));
-        return entry.value.boolean;
-    }
-
     // A new name of a coordinate or parameter.
     void declare(const Entry& entry, const std::string& what) {
         const std::string& name = entry.key;
@@ -153,10 +85,9 @@ private:
             fail(entry.at, fmt::format("a name of {} letters; at most {}", name.size(), longest_name));
         if (find_function(name) != nullptr)
             fail(entry.at, fmt::format("'{}' is the name of a function; give the {} another name", name, what));
-        if (name == "pi") fail(entry.at, fmt::format("'pi' is the number 3.14159...; give the {} another name", what));
-        if (name == "h") fail(entry.at, fmt::format("'h' is the time step; give the {} another name", what));
-        if (name == "t") fail(entry.at, fmt::format("'t' is the time; give the {} another name", what));
-        if (name == "H") fail(entry.at, fmt::format("'H' is the energy; give the {} another name", what));
+        for (const auto& [reserved, meaning] : reserved_names)
+            if (name == reserved)
+                fail(entry.at, fmt::format("'{}' is {}; give the {} another name", name, meaning, what));
         if (names_.count(name) > 0)
             fail(entry.at, fmt::format("'{}' is both a parameter and a coordinate; rename one", name));
     }
@@ -164,7 +95,7 @@ private:
     void read_parameters() {
         const Entry* section = root_.find("parameters");
         if (section == nullptr) return;
-        const std::vector<Entry>& entries = entries_of(*section, "[parameters] with lines such as m = 1");
+        const std::vector<Entry>& entries = table_of(source_, *section, "[parameters] with lines such as m = 1");
         if (entries.size() > most_parameters)
             fail(section->at, fmt::format("{} parameters; at most {}", entries.size(), most_parameters));
         for (const Entry& entry : entries) {
@@ -176,19 +107,20 @@ private:
                 const Table table(source_, entry.value.entries, entry.at, "parameter " + entry.key,
                                   {"value", "unit", "constant"});
                 value = &table.get("value", "a number, for example value = 1");
-                if (const Entry* unit = table.find("unit")) parameter.unit = read_label(*unit, longest_unit);
-                if (const Entry* flag = table.find("constant")) constant = read_boolean(*flag);
+                if (const Entry* unit = table.find("unit")) parameter.unit = label_of(source_, *unit, longest_unit);
+                if (const Entry* flag = table.find("constant")) constant = boolean_of(source_, *flag);
             }
             parameter.value = read_formula(*value, {{}, "the value of " + entry.key, false, false});
             names_[entry.key] = {constant ? parameter.value : GiNaC::ex(parameter.symbol), Name::Role::parameter};
             (constant ? scene_.constants : scene_.parameters).push_back(parameter);
         }
+        parameter_values_ = values_of(scene_.parameters, {});
     }
 
     void read_coordinates() {
         const std::string example = "[coordinates] with lines such as q = { position = 1, velocity = 0 }";
         const Entry& section = root_.get("coordinates", example);
-        const std::vector<Entry>& entries = entries_of(section, example);
+        const std::vector<Entry>& entries = table_of(source_, section, example);
         if (entries.empty())
             fail(section.at, "a scene needs a coordinate; add a line such as q = { position = 1, velocity = 0 }");
         if (entries.size() > most_coordinates)
@@ -196,10 +128,10 @@ private:
         for (const Entry& entry : entries) {
             declare(entry, "coordinate");
             const std::string example_line = entry.key + " = { position = 1, velocity = 0 }";
-            const Table table(source_, entries_of(entry, example_line), entry.at, "coordinate " + entry.key,
+            const Table table(source_, table_of(source_, entry, example_line), entry.at, "coordinate " + entry.key,
                               {"unit", "position", "velocity", "momentum"});
             Coordinate coordinate{entry.key, "", GiNaC::symbol(entry.key), GiNaC::symbol(entry.key + "'")};
-            if (const Entry* unit = table.find("unit")) coordinate.unit = read_label(*unit, longest_unit);
+            if (const Entry* unit = table.find("unit")) coordinate.unit = label_of(source_, *unit, longest_unit);
             read_initial_entries(entry, table);
             names_[entry.key] = {coordinate.position, Name::Role::position};
             names_[entry.key + "'"] = {coordinate.velocity, Name::Role::velocity};
@@ -258,21 +190,22 @@ private:
     void read_method() {
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
-        const Table table(source_, entries_of(*section, "[method] with a line points = 4"), section->at, "[method]",
-                          {"family", "points"});
+        const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
+                          "[method]", {"family", "points"});
         if (const Entry* family = table.find("family")) {
             const Value& value = family->value;
             if (value.kind != Value::Kind::text || value.text.value != "lobatto")
                 fail(value.at, "unknown family; there is \"lobatto\"");
         }
         if (const Entry* points = table.find("points"))
-            scene_.method.points = static_cast<int>(read_integer(*points, 2, 5, "there is Lobatto with 2 to 5 points"));
+            scene_.method.points =
+                static_cast<int>(integer_of(source_, *points, 2, 5, "there is Lobatto with 2 to 5 points"));
     }
 
     void read_run() {
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
-        const Table table(source_, entries_of(section, example), section.at, "[run]",
+        const Table table(source_, table_of(source_, section, example), section.at, "[run]",
                           {"step", "steps_per_period", "period", "until"});
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
@@ -294,7 +227,7 @@ private:
             fail(length.value.at, fmt::format("{} is {}; it must be positive", scope.formula, shown(h)));
         if (per_period != nullptr) {
             const long long count =
-                read_integer(*per_period, 1, most_steps, "steps_per_period must be at least 1 and at most 9e15");
+                integer_of(source_, *per_period, 1, most_steps, "steps_per_period must be at least 1 and at most 9e15");
             scene_.run.step = scene_.run.step / GiNaC::numeric(static_cast<long>(count));
             h = h / GiNaC::numeric(static_cast<long>(count));
         }
@@ -313,13 +246,13 @@ private:
     void read_output() {
         const Entry* section = root_.find("output");
         if (section == nullptr) return;
-        const Table table(source_, entries_of(*section, "[output] with a line every = 1"), section->at, "[output]",
-                          {"every", "energy"});
+        const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
+                          "[output]", {"every", "energy"});
         if (const Entry* every = table.find("every"))
-            scene_.outputs.every = static_cast<long>(read_integer(
-                *every, 1, most_steps,
+            scene_.outputs.every = static_cast<long>(integer_of(
+                source_, *every, 1, most_steps,
                 "every must be at least 1 and at most 9e15: each state whose step is a multiple of it is kept"));
-        if (const Entry* energy = table.find("energy")) scene_.outputs.energy = read_boolean(*energy);
+        if (const Entry* energy = table.find("energy")) scene_.outputs.energy = boolean_of(source_, *energy);
     }
 
     void refuse_unused() const {
@@ -334,9 +267,9 @@ private:
 
     // A formula whose value with the parameters of the scene must be a finite real number.
     GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr) {
-        const GiNaC::ex expression = parse_expression(source_, formula_text(entry), scope, &used_);
+        const GiNaC::ex expression = parse_expression(source_, formula_of(source_, entry), scope, &used_);
         try {
-            const GiNaC::numeric number = real_value(expression, parameter_values(scene_.parameters, {}));
+            const GiNaC::numeric number = real_value(expression, parameter_values_);
             if (value != nullptr) *value = number;
         } catch (const NoValue& error) {
             fail(entry.value.at, fmt::format("{} has no finite real value: {}", scope.formula, error.what()));
@@ -363,15 +296,16 @@ private:
     Scene scene_;
     std::map<std::string, Name> names_;
     std::map<std::string, bool> used_;
+    GiNaC::exmap parameter_values_;
     std::vector<Initial> initial_;
 };
 
 }  // namespace
 
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
-                               const std::vector<GiNaC::ex>& parameter_values) const {
+                               const std::vector<GiNaC::ex>& given) const {
     try {
-        return real_value(expression, lobatto::parameter_values(parameters, parameter_values));
+        return real_value(expression, values_of(parameters, given));
     } catch (const NoValue& error) {
         throw InputError(fmt::format("{}: {} has no finite real value: {}", printable(path), what, error.what()));
     }

@@ -137,7 +137,7 @@ private:
         name.primed = true;
         if (at(0) == '\'')
             fail(next_,
-                 fmt::format("'{}'' is an acceleration; a Lagrangian has positions and velocities only", name.text));
+                 fmt::format("{}' is an acceleration; a Lagrangian has positions and velocities only", name.text));
         return name;
     }
 
