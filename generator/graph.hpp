@@ -124,6 +124,8 @@ public:
 
 private:
     Id intern(Node node);
+    bool leads_with_minus(Id id) const;
+    Id negate_terms(Id sum);
 
     std::vector<Node> nodes_;
     std::vector<Constant> constants_;
