@@ -70,21 +70,6 @@ bool Graph::is_negative(Id id) const {
     return node.op == Op::multiply && is_constant(node.operands.front()) && is_negative(node.operands.front());
 }
 
-// Whether a sum is the negative of its preferred form: the rational constant in it positive, else its first term.
-bool Graph::leads_with_minus(Id id) const {
-    const Node& node = (*this)[id];
-    if (node.op != Op::add) return false;
-    const Id last = node.operands.back();
-    const bool has_constant = is_constant(last) && is_rational(constant_of(last).value);
-    return is_negative(has_constant ? last : node.operands.front());
-}
-
-Id Graph::negate_terms(Id sum) {
-    std::vector<Id> terms = (*this)[sum].operands;
-    for (Id& term : terms) term = negate(term);
-    return add(std::move(terms));
-}
-
 Id Graph::add(std::vector<Id> terms) {
     std::vector<Id> flat;
     for (const Id term : terms) {
@@ -151,13 +136,8 @@ Id Graph::multiply(std::vector<Id> factors) {
             coefficient = coefficient * cln::the<cln::cl_RA>(constant_of(factor).value);
             continue;
         }
-        Id base = node.op == Op::power ? node.operands.front() : factor;
+        const Id base = node.op == Op::power ? node.operands.front() : factor;
         const int exponent = node.op == Op::power ? node.index : 1;
-        // GiNaC chooses between (a - b) (c - d) and (b - a) (d - c) by address; here each sum has the sign of its own.
-        if (leads_with_minus(base)) {
-            base = negate_terms(base);
-            if (exponent % 2 != 0) coefficient = -coefficient;
-        }
         const auto [known, is_new] = place.emplace(base, collected.size());
         if (is_new)
             collected.emplace_back(base, exponent);
@@ -209,10 +189,6 @@ Id Graph::power(Id base, int exponent) {
         const std::vector<Id> inner = node.operands;
         for (const Id factor : inner) factors.push_back(power(factor, exponent));
         return multiply(std::move(factors));
-    }
-    if (leads_with_minus(base)) {
-        const Id positive = intern({Op::power, Stage::constant, exponent, {negate_terms(base)}});
-        return exponent % 2 == 0 ? positive : intern({Op::multiply, Stage::constant, 0, {number(-1), positive}});
     }
     if (node.op == Op::sqrt && exponent % 2 == 0) return power(node.operands.front(), exponent / 2);
     return intern({Op::power, Stage::constant, exponent, {base}});
