@@ -124,6 +124,9 @@ public:
 
 private:
     Id intern(Node node);
+    bool leads_with_minus(Id id) const;
+    Id negate_terms(Id sum);
+    void append_factor(std::vector<Id>& factors, Id base, int exponent);
 
     std::vector<Node> nodes_;
     std::vector<Constant> constants_;
