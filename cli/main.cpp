@@ -99,7 +99,10 @@ int main(int argc, char** argv) {
         program.exit(error);  // prints the help or the version
         return success;
     } catch (const InputError& error) {
-        return complain(wrong_input, error.what());
+        // Begins with file:line:column, as editors expect of a compiler.
+        std::cout.flush();
+        fmt::print(stderr, "{}\n", error.what());
+        return wrong_input;
     } catch (const ComputationError& error) {
         return complain(failed_computation, error.what());
     } catch (const MachineError& error) {

@@ -73,7 +73,9 @@ void apply(const Overrides& overrides, Scene& scene) {
     for (const std::string& argument : overrides.set) set_parameter(argument, scene);
     if (!overrides.step.empty()) scene.run.step = in_parameters("--step", overrides.step, "the step", scene);
     if (!overrides.until.empty()) scene.run.until = in_parameters("--until", overrides.until, "the end time", scene);
-    if (overrides.points) scene.method.points = *overrides.points;
+    if (overrides.every && *overrides.every < 1)
+        throw InputError(fmt::format(
+            "--every: {} is not a number of states; give 1 to keep each, 10 to keep every tenth", *overrides.every));
     if (overrides.every) scene.outputs.every = *overrides.every;
 }
 

@@ -13,7 +13,6 @@ namespace lobatto {
 struct Overrides {
     std::vector<std::string> set;  // "name=expression": run-time parameters; the expression is a number such as 2*pi
     std::string step, until;       // expressions in the parameters; empty: as in the scene
-    std::optional<int> points;
     std::optional<long> every;
 };
 

@@ -27,6 +27,7 @@ constexpr int interrupted_exit = 130;  // as shells count an interruption
 struct RunOptions {
     std::string scene;
     std::string output;  // empty: out/NAME.csv
+    std::optional<int> points;
     Overrides overrides;
     bool quiet = false;
 };
@@ -63,14 +64,17 @@ struct Steps {
     bool reaches_end = true;
 };
 
-Steps steps_of(const Scene& scene) {
+Steps steps_of(const Scene& scene, const Overrides& overrides) {
     const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step"),
                          until = scene.evaluate(scene.run.until, "the end time");
-    if (!step.is_positive())
-        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
-    if (until.is_negative())
-        throw InputError(
-            fmt::format("{}: the end time must not be negative, but is {:.6g}", scene.path, until.to_double()));
+    if (!step.is_positive()) {
+        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}",
+                                     overrides.step.empty() ? scene.path : "--step", step.to_double()));
+    }
+    if (until.is_negative()) {
+        throw InputError(fmt::format("{}: the end time must not be negative, but is {:.6g}",
+                                     overrides.until.empty() ? scene.path : "--until", until.to_double()));
+    }
     const double ratio = (until / step).to_double();
     if (!(ratio < 9e15))
         throw InputError(fmt::format(
@@ -82,11 +86,36 @@ Steps steps_of(const Scene& scene) {
 
 std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& values, const std::string& what) {
     std::vector<double> numbers;
-    for (std::size_t k = 0; k < values.size(); ++k)
-        numbers.push_back(
-            scene.evaluate(values[k], fmt::format("the initial {} of {}", what, scene.coordinates[k].name))
-                .to_double());
+    for (std::size_t k = 0; k < values.size(); ++k) {
+        const std::string name = fmt::format("the initial {} of {}", what, scene.coordinates[k].name);
+        numbers.push_back(scene.evaluate(values[k], name).to_double());
+    }
     return numbers;
+}
+
+// Prepares and starts the stepper too: a start that is impossible is known before anything is written.
+TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, Stepper<double>& stepper) {
+    TrajectoryRequest request;
+    for (const Parameter& parameter : scene.parameters)
+        request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = steps;
+    request.every = scene.outputs.every;
+    const bool from_velocity = scene.start == Start::velocity;
+    request.q = doubles(scene, scene.initial_position, "position");
+    request.p = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
+
+    TrajectoryResult none;
+    none.status = stepper.prepare(request.parameters, request.step);
+    if (none.status == LOBATTO_OK) {
+        if (from_velocity) request.p = stepper.momentum(request.q, request.p);
+        none.status = stepper.start(request.time, request.q, request.p);
+    }
+    none.q = request.q;
+    none.p = request.p;
+    if (none.status != LOBATTO_OK)
+        throw ComputationError(fmt::format("{}: {}", scene.path, explain_stop(none, request)));
+    return request;
 }
 
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
@@ -120,80 +149,64 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void print_table(const Kernel& kernel, const TrajectoryRequest& request, const TrajectoryResult& result,
-                 const Watch& watch, std::optional<double> defect) {
-    const double steps = static_cast<double>(result.steps_done);
+// The stepper is prepared; a unit of the first coordinate may be empty.
+void print_table(const Stepper<double>& stepper, const TrajectoryRequest& request, const TrajectoryResult& result,
+                 const Watch& watch, const std::string& unit) {
+    const std::string of_all = result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
     print_row("steps",
-              result.steps_done == request.steps
-                  ? fmt::format("{} of h = {:.6g}, to t = {:.6g}", result.steps_done, request.step, result.time)
-                  : fmt::format("{} of {}, h = {:.6g}, to t = {:.6g}", result.steps_done, request.steps, request.step,
-                                result.time));
+              fmt::format("{}{}, h = {:.6g}, to t = {:.6g}", result.steps_done, of_all, request.step, result.time));
     if (result.steps_done == 0) return;
+    const double steps = static_cast<double>(result.steps_done);
+    const lobatto_kernel& kernel = stepper.kernel().table();
     print_row("time per step", duration(result.seconds / steps));
-    print_row("Newton iterations", kernel->linear          ? "none: the step is a linear map"
-                                   : kernel->unknowns == 0 ? "none: the step is explicit"
-                                                           : fmt::format("{:.2f} per step, at most {}",
-                                                                         static_cast<double>(result.iterations) / steps,
-                                                                         result.iterations_most));
+    print_row("Newton iterations", kernel.linear          ? "none: the step is a linear map"
+                                   : kernel.unknowns == 0 ? "none: the step is explicit"
+                                                          : fmt::format("{:.2f} per step, at most {}",
+                                                                        static_cast<double>(result.iterations) / steps,
+                                                                        result.iterations_most));
     const double H0 = std::fabs(result.energy_start);
-    print_row("energy error", fmt::format("{:.2g} at most", result.energy_error_largest) +
-                                  (H0 > 0 ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
+    print_row("energy error",
+              fmt::format("{:.2g} at most{}", result.energy_error_largest,
+                          H0 > 0 ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
     if (const auto error = watch.discrete_error())
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
-    if (defect) print_row("symplectic defect", fmt::format("{:.2g}", *defect));
+    print_row("symplectic defect",
+              fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p)));  // of the first step
     if (const auto error = watch.position_error()) {
-        print_row("position error", fmt::format("{:.2g} at most, against the exact {}solution", *error,
-                                                watch.is_elliptic() ? "elliptic " : ""));
+        print_row("position error",
+                  fmt::format("{:.2g}{} at most, against the exact {}solution", *error, unit.empty() ? "" : " " + unit,
+                              watch.is_elliptic() ? "elliptic " : ""));
     }
+}
+
+std::string output_path(const RunOptions& options, const Scene& scene) {
+    if (!options.output.empty()) return options.output;
+    std::error_code error;
+    std::filesystem::create_directory("out", error);
+    if (error)
+        throw MachineError(
+            fmt::format("cannot create the folder out here: {}. Choose another place with -o", error.message()));
+    return "out/" + scene.name + ".csv";
 }
 
 void run(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
-    apply(options.overrides, scene);
-    const Steps steps = steps_of(scene);
+    if (options.points) scene.method.points = *options.points;
     const Derivation derivation = derive(scene);
     const KernelSource source = emit(derivation);
     const double derivation_seconds = seconds_since(start);
+    apply(options.overrides, scene);  // after the derivation: one kernel serves all values
+    const Steps steps = steps_of(scene, options.overrides);
     Compiled compiled;
     const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
-
-    TrajectoryRequest request;
-    for (const Parameter& parameter : scene.parameters)
-        request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
-    request.step = scene.evaluate(scene.run.step, "the step").to_double();
-    request.steps = steps.count;
-    request.every = scene.outputs.every;
-    request.q = doubles(scene, scene.initial_position, "position");
-    const bool from_velocity = scene.start == Start::velocity;
-    const std::vector<double> rate = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
-
     Stepper<double> stepper(kernel);
-    TrajectoryResult failed_start;
-    failed_start.q = request.q;
-    failed_start.p = request.p = rate;
-    failed_start.status = stepper.prepare(request.parameters, request.step);
-    if (failed_start.status == LOBATTO_OK) {
-        if (from_velocity) failed_start.p = request.p = stepper.momentum(request.q, rate);
-        failed_start.status = stepper.start(request.time, request.q, request.p);
-    }
-    if (failed_start.status != LOBATTO_OK)
-        throw ComputationError(scene.path + ": " + explain_stop(failed_start, request));
-
-    std::string path = options.output;
-    if (path.empty()) {
-        path = "out/" + scene.name + ".csv";
-        std::error_code error;
-        std::filesystem::create_directory("out", error);
-        if (error)
-            throw MachineError(
-                fmt::format("cannot create the folder out here: {}. Choose another place with -o", error.message()));
-    }
+    TrajectoryRequest request = request_of(scene, steps.count, stepper);
+    const std::string path = output_path(options, scene);
     if (!options.quiet) {
-        fmt::print("{}: kernel {}, {}\n", scene.path, source.digest,
-                   compiled.from_cache ? "from the cache"
-                                       : fmt::format("derived in {:.2f} s, compiled in {:.2f} s", derivation_seconds,
-                                                     compiled.seconds));
+        fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, source.digest, derivation_seconds,
+                   compiled.from_cache ? "found compiled in the cache"
+                                       : fmt::format("compiled in {:.2f} s", compiled.seconds));
     }
 
     TrajectoryFile file(path, header_of(scene, source, request));
@@ -216,17 +229,15 @@ void run(const RunOptions& options) {
     file.finish();
 
     if (!options.quiet) {
-        // Where no step succeeded there is no tangent to measure.
-        const auto defect =
-            result.steps_done > 0 ? std::optional(symplectic_defect(stepper, request.q, request.p)) : std::nullopt;
-        print_table(kernel, request, result, watch, defect);
-        print_row("trajectory", fmt::format("{}, {} states", path, states));
+        print_table(stepper, request, result, watch, scene.coordinates.front().unit);
+        print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
         if (!steps.reaches_end)
-            fmt::print("The end time is not a multiple of the step: the run ends one incomplete step before it.\n");
+            fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
-    if (result.status != LOBATTO_OK)
+    if (result.status != LOBATTO_OK) {
         throw ComputationError(
             fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
+    }
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.\n", result.time, path);
         throw CLI::RuntimeError(interrupted_exit);
@@ -241,14 +252,12 @@ void add_run(CLI::App& program) {
     const auto options = std::make_shared<RunOptions>();
     command->add_option("scene", options->scene, "Scene file")->required();
     command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
-    command
-        ->add_option("--points", options->overrides.points,
-                     "Points of the Lobatto quadrature; the order is 2 points - 2")
+    command->add_option("--points", options->points, "Points of the Lobatto quadrature; the order is 2 points - 2")
         ->check(CLI::Range(2, 5));
     command->add_option("--step", options->overrides.step,
                         "Step h; may use the scene's parameters, as in 2*pi/omega/50");
     command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
-    command->add_option("--every", options->overrides.every, "Keep every such state")->check(CLI::PositiveNumber);
+    command->add_option("--every", options->overrides.every, "Keep every EVERY-th state");
     command
         ->add_option("--set", options->overrides.set,
                      "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")

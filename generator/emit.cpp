@@ -323,6 +323,7 @@ private:
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");
+        if (d_.structure.linear && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi);\n";
         if (d_.structure.linear && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else
@@ -384,8 +385,11 @@ KernelSource emit_kernel(const Derivation& derivation, Programs programs, const 
     source.name = identifier(derivation.scene.name);
     source.report = optimise(programs);
     const Emitter emitter(derivation, programs, options);
-    source.digest = digest_of(emitter.header(source.name, "", source.report));
-    source.header = emitter.header(source.name, source.digest, source.report);
+    // The digest of the text with the digest left out, put in its place.
+    source.header = emitter.header(source.name, "", source.report);
+    source.digest = digest_of(source.header);
+    const std::string empty = "digest = \"\"";
+    source.header.replace(source.header.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
     return source;
 }
 

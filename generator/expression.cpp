@@ -31,8 +31,9 @@ struct Operand {
     std::optional<numeric> value;  // present when the expression is constant
 };
 
+// b bits: 2^(b-1) <= max(|numerator|, denominator) < 2^b.
 int bits(const numeric& number) {
-    return std::max(number.numer().int_length(), number.denom().int_length());
+    return std::max(abs(number.numer()).int_length(), number.denom().int_length());
 }
 
 // The largest exact number in an expression, and the largest exponent of anything but a number.

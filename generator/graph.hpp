@@ -132,6 +132,8 @@ private:
     std::vector<Constant> constants_;
     std::vector<Input> inputs_;
     std::unordered_map<std::string, Id> known_;
+    std::unordered_map<std::uintptr_t, Id> constant_words_;            // by identity
+    std::unordered_map<std::uint32_t, std::vector<Id>> constant_ids_;  // by the hash of the value
 };
 
 // The value of a constant operation, to number_digits.

@@ -173,9 +173,8 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
                 append_factor(factors, base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
                 id = multiply(std::move(factors));
             } else if ((2 * exponent).info(GiNaC::info_flags::integer)) {
-                // x^(k/2) with k odd: sqrt(x) x^((k-1)/2), one root for all such powers.
-                const int k = GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int();
-                id = multiply({function(Op::sqrt, base), power(base, (k - 1) / 2)});
+                // x^(k/2) with k odd is sqrt(x)^k: one root for all such powers.
+                id = power(function(Op::sqrt, base), GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int());
             } else {
                 id = raise(base, self(self, exponent));
             }

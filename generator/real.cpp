@@ -122,8 +122,8 @@ numeric real_power(const numeric& base, const numeric& exponent) {
     return checked(
         [&] {
             // An exponent that happens to be whole is taken as such: (-2)^n is real for n = 3.
-            const bool small = abs(exponent) < numeric(largest_magnitude);
-            const numeric whole = small ? numeric(static_cast<long>(std::lround(exponent.to_double()))) : exponent;
+            const bool small = abs(exponent) < numeric(1'000'000'000);
+            const numeric whole = small ? numeric(std::lround(exponent.to_double())) : exponent;
             return GiNaC::pow(base, whole == exponent ? whole : exponent);
         },
         fmt::format("{} to the power {}", shown(base), shown(exponent)));

@@ -12,16 +12,16 @@
 namespace lobatto {
 
 struct Coordinate {
-    std::string name;         // an identifier
-    std::string unit;         // "" when none is given
-    GiNaC::symbol position;   // prints as name
-    GiNaC::symbol velocity;   // prints as name'
+    std::string name;        // an identifier
+    std::string unit;        // "" when none is given
+    GiNaC::symbol position;  // prints as name
+    GiNaC::symbol velocity;  // prints as name'
 };
 
 struct Parameter {
     std::string name;
     std::string unit;
-    GiNaC::ex value;          // exact, free of symbols
+    GiNaC::ex value;  // exact, free of symbols
     GiNaC::symbol symbol;
 };
 
@@ -38,7 +38,7 @@ struct Run {
 };
 
 struct Outputs {
-    long every = 1;  // keep each state whose step index is a multiple of this
+    long every = 1;      // keep each state whose step index is a multiple of this
     bool energy = true;  // a column H in the trajectory file
 };
 
@@ -46,9 +46,11 @@ struct Outputs {
 enum class Start { velocity, momentum };
 
 struct Scene {
-    std::string path;   // as given
-    std::string name;   // stem of the file as a C identifier: pendulum
-    std::string title;  // one line
+    Source source{"", ""};   // the file, for errors found after reading
+    Position lagrangian_at;  // where the Lagrangian stands in it
+    std::string path;        // as given
+    std::string name;        // stem of the file as a C identifier: pendulum
+    std::string title;       // one line
     std::vector<Coordinate> coordinates;
     std::vector<Parameter> parameters;        // run-time parameters, in the order of the file
     std::vector<Parameter> constants;         // declared constant: already substituted everywhere
@@ -61,9 +63,10 @@ struct Scene {
     Run run;
     Outputs outputs;
 
-    // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene order:
-    // 60 decimal digits; throws InputError naming `what` when it is not a finite real number.
-    GiNaC::numeric evaluate(const GiNaC::ex& expression, const std::string& what, const std::vector<GiNaC::ex>& parameter_values = {}) const;
+    // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
+    // order: 60 decimal digits; throws InputError naming `what` when it is not a finite real number.
+    GiNaC::numeric evaluate(const GiNaC::ex& expression, const std::string& what,
+                            const std::vector<GiNaC::ex>& parameter_values = {}) const;
 };
 
 // Throws InputError: what, where, why, how to mend.

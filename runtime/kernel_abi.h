@@ -7,9 +7,9 @@
  *   q, p      position and momentum, n each, in the units of the scene.
  *   u         momentum in velocity units, u = M^-1 p; the kernel's own state is (q, u).
  *   matrices  row-major.
- *   nodes     node-major: Q[i * n + k] is coordinate k at interior node i + 2, i = 0 ... s - 3 (the paper's q_xi, q_{1-xi} for s = 4).
- * Every function that can fail returns a lobatto_status and leaves the state of the last good step untouched.
- * No function allocates, locks, prints or keeps a pointer it was given.
+ *   nodes     node-major: Q[i * n + k] is coordinate k at interior node i + 2, i = 0 ... s - 3 (the paper's q_xi,
+ * q_{1-xi} for s = 4). Every function that can fail returns a lobatto_status and leaves the state of the last good step
+ * untouched. No function allocates, locks, prints or keeps a pointer it was given.
  */
 #ifndef LOBATTO_KERNEL_ABI_H
 #define LOBATTO_KERNEL_ABI_H
@@ -72,20 +72,25 @@ typedef struct lobatto_kernel {
     int32_t stepper_alignment;
 
     /* Life of a stepper: memory of stepper_bytes bytes that the caller owns, with this alignment. */
-    int32_t (*prepare)(void* stepper, const void* parameters, const void* step); /* values of stage parameter and step size */
-    int32_t (*start)(void* stepper, const void* time, const void* q, const void* p); /* forgets what earlier steps left */
+    int32_t (*prepare)(void* stepper, const void* parameters,
+                       const void* step); /* values of stage parameter and step size */
+    int32_t (*start)(void* stepper, const void* time, const void* q,
+                     const void* p); /* forgets what earlier steps left */
     int32_t (*advance)(void* stepper, lobatto_advance* call);
     void (*state)(const void* stepper, void* time, void* q, void* p);
 
     /* Pieces, for tests and diagnostics. All after `prepare`; none changes the state. */
-    void (*energy)(const void* stepper, const void* q, const void* p, void* energy);          /* H(q, p), 1 */
-    void (*momentum)(const void* stepper, const void* q, const void* velocity, void* p);      /* p = dL/dq', n */
-    void (*velocity)(const void* stepper, const void* q, const void* p, void* velocity);      /* its inverse, n */
-    void (*acceleration)(const void* stepper, const void* q, void* W, void* S);               /* W = M^-1 grad V, n; S = M^-1 V'', n x n */
-    void (*residual)(const void* stepper, const void* q, const void* p, const void* Q, void* F); /* stage equations at Q, N */
-    void (*jacobian)(const void* stepper, const void* Q, void* J);                            /* dF/dQ, N x N */
-    int32_t (*tangent)(const void* stepper, const void* q, const void* p, void* q1, void* p1, void* T); /* one step from (q, p)
-                                                     and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
+    void (*energy)(const void* stepper, const void* q, const void* p, void* energy);     /* H(q, p), 1 */
+    void (*momentum)(const void* stepper, const void* q, const void* velocity, void* p); /* p = dL/dq', n */
+    void (*velocity)(const void* stepper, const void* q, const void* p, void* velocity); /* its inverse, n */
+    void (*acceleration)(const void* stepper, const void* q, void* W,
+                         void* S); /* W = M^-1 grad V, n; S = M^-1 V'', n x n */
+    void (*residual)(const void* stepper, const void* q, const void* p, const void* Q,
+                     void* F);                                     /* stage equations at Q, N */
+    void (*jacobian)(const void* stepper, const void* Q, void* J); /* dF/dQ, N x N */
+    int32_t (*tangent)(const void* stepper, const void* q, const void* p, void* q1, void* p1,
+                       void* T); /* one step from (q, p)
+and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
 } lobatto_kernel;
 
 const lobatto_kernel* lobatto_kernel_table(void);

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto run from the outside: what it prints, writes and returns, also when it is interrupted, killed or refused.
+#include <doctest/doctest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <regex>
+#include <thread>
+
+#include "runtime/output.hpp"
+#include "runtime/reference.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
+const std::string oscillator = LOBATTO_SOURCE_DIR "/scenes/harmonic_oscillator.toml";
+
+// A folder for trajectories; the kernels of all tests share one cache.
+struct Place {
+    static const std::string& cache() {
+        static const test::TemporaryFolder folder;
+        static const std::string path = folder.string();
+        return path;
+    }
+    test::EnvironmentVariable variable{"LOBATTO_CACHE_DIR", cache()};
+    test::TemporaryFolder folder;
+    std::string file(const std::string& name = "run.csv") const { return folder / name; }
+
+    test::Finished run(std::vector<std::string> arguments) const {
+        arguments.insert(arguments.begin(), {LOBATTO_PROGRAM, "run"});
+        return test::run(arguments);
+    }
+};
+
+// Starts a run that would take hours, waits until it has written states, sends the signal.
+struct Signalled {
+    int exit_code = -1;  // 128 + signal when the signal ended it
+    std::string err;
+};
+Signalled signal_long_run(const Place& place, int signal) {
+    const std::string out = place.file(), partial = out + ".partial", err = place.file("err");
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+        ::dup2(::open("/dev/null", O_WRONLY), 1);
+        ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT, 0600), 2);
+        ::execl(LOBATTO_PROGRAM, LOBATTO_PROGRAM, "run", pendulum.c_str(), "--until", "1e9", "--every", "1000", "-o",
+                out.c_str(), nullptr);
+        ::_exit(127);
+    }
+    for (int tries = 0; tries < 3000; ++tries) {
+        if (std::filesystem::exists(partial) && std::filesystem::file_size(partial) > 10000) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    ::kill(pid, signal);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), test::read_file(err)};
+}
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+// Runs into infinity at t = 1.717, the integral of dy / sqrt(2 (y^3 - 1)) from 1 on, y = -x.
+const char* const escape =
+    "title = \"Escape\"\n"
+    "lagrangian = \"x'^2/2 - x^3\"\n"
+    "[coordinates]\nx = { position = -1, velocity = 0 }\n"
+    "[method]\nfamily = \"lobatto\"\npoints = 4\n"
+    "[run]\nstep = 0.1\nuntil = 10\n";
+
+}  // namespace
+
+TEST_CASE("a run says how good it is and where its trajectory is") {
+    const Place place;
+    const test::Finished first = place.run({pendulum, "-o", place.file()});
+    CHECK(first.exit_code == 0);
+    CHECK(first.err == "");
+    const std::regex table(
+        "\\S+scenes/pendulum.toml: kernel [0-9a-f]{16}, derived in 0\\.\\d\\d s, (compiled in \\d+\\.\\d\\d s|found "
+        "compiled in the cache)\n"
+        "  steps                   2400, h = 0.05, to t = 120\n"
+        "  time per step           \\S+ [nu]s\n"
+        "  Newton iterations       \\d\\.\\d\\d per step, at most \\d\n"
+        "  energy error            \\S+ at most, relative \\S+\n"
+        "  symplectic defect       \\S+\n"
+        "  position error          \\S+ rad at most, against the exact elliptic solution\n"
+        "  trajectory              \\S+/run.csv, 2401 states\n");
+    CHECK_MESSAGE(std::regex_match(first.out, table), first.out);
+    const test::Finished second = place.run({pendulum, "-o", place.file("again.csv")});
+    CHECK(contains(second.out, ", found compiled in the cache\n"));
+    CHECK(test::read_file(place.file()) == test::read_file(place.file("again.csv")));
+}
+
+TEST_CASE("the trajectory file follows the exact solution and names its columns") {
+    const Place place;
+    REQUIRE(place.run({pendulum, "-o", place.file(), "--quiet"}).out == "");
+    const TrajectoryTable table = read_trajectory(place.file());
+    REQUIRE(table.comments.size() == 6);
+    CHECK(table.comments[0] == "lobatto trajectory");
+    CHECK(table.comments[1] == "scene: A plane pendulum");
+    CHECK(table.comments[2] == "method: Lobatto, 4 points, h = 0.05");
+    CHECK(table.comments[3].starts_with("kernel: "));
+    CHECK(table.comments[4] == "parameters: m = 1, omega = 6.283185307179586");
+    CHECK(table.comments[5] == "columns: t, q [rad], p_q, H");
+    CHECK(table.columns == std::vector<std::string>{"t", "q", "p_q", "H"});
+    REQUIRE(table.rows.size() == 2401);
+    const long double pi = std::acos(-1.0L);
+    double largest = 0;
+    for (const std::vector<double>& row : table.rows) {
+        const PhasePoint exact = pendulum_solution(4 * pi * pi, pi / 2, 0, static_cast<long double>(row[0]));
+        largest = std::fmax(largest, std::fabs(row[1] - static_cast<double>(exact.q)));
+    }
+    CHECK(largest > 1e-8);  // the method's own error; measured 4.4e-8
+    CHECK(largest < 1e-7);
+}
+
+TEST_CASE("a linear system needs no iteration and conserves its discrete energy") {
+    const Place place;
+    const test::Finished done = place.run({oscillator, "--until", "50", "-o", place.file()});
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.out, "  Newton iterations       none: the step is a linear map\n"));
+    CHECK(contains(done.out, " at most, against the exact solution\n"));
+    std::smatch found;
+    REQUIRE(std::regex_search(done.out, found, std::regex("discrete energy error   relative (\\S+) at most\n")));
+    CHECK(std::stod(found[1]) < 1e-12);  // rounding of 1000 steps; measured 1.7e-13
+    REQUIRE(std::regex_search(done.out, found, std::regex("energy error            (\\S+) at most")));
+    CHECK(std::stod(found[1]) > 1e-7);  // while the energy itself sways; measured 1.1e-6
+}
+
+TEST_CASE("the command line replaces values of the scene, with one kernel for all") {
+    const Place place;
+    place.run({pendulum, "-o", place.file("first.csv"), "--quiet"});
+    const test::Finished done = place.run({pendulum, "-o", place.file(), "--set", "omega=2", "--set", "m=1/4", "--step",
+                                           "pi/omega/8", "--until", "2*pi", "--every", "4"});
+    CHECK(done.exit_code == 0);
+    CHECK(
+        contains(done.out, "found compiled in the cache\n  steps                   32, h = 0.19635, to t = 6.28319\n"));
+    const TrajectoryTable table = read_trajectory(place.file());
+    CHECK(table.comments[4] == "parameters: m = 0.25, omega = 2");
+    CHECK(table.rows.size() == 9);
+    CHECK(table.rows.front()[3] == doctest::Approx(0.25 * 4));  // H = m omega^2 (1 - cos(pi/2))
+    const test::Finished explicit_one = place.run({pendulum, "-o", place.file(), "--points", "2", "--until", "1"});
+    CHECK(contains(explicit_one.out, "  Newton iterations       none: the step is explicit\n"));
+    CHECK(read_trajectory(place.file()).comments[2] == "method: Lobatto, 2 points, h = 0.05");
+}
+
+TEST_CASE("an end that is no multiple of the step is said, not overrun") {
+    const Place place;
+    const test::Finished done = place.run({pendulum, "-o", place.file(), "--step", "0.3", "--until", "1"});
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.out, "  steps                   3, h = 0.3, to t = 0.9\n"));
+    CHECK(contains(done.out,
+                   "\nThe end time is not a multiple of the step: the run ends at the last multiple before it.\n"));
+    CHECK(!contains(place.run({pendulum, "-o", place.file(), "--step", "0.1", "--until", "0.3"}).out, "multiple"));
+    const test::Finished none = place.run({pendulum, "-o", place.file(), "--until", "0"});
+    CHECK(contains(none.out, "  steps                   0, h = 0.05, to t = 0\n"));
+    CHECK(contains(none.out, ", 1 state\n"));
+}
+
+TEST_CASE("without -o the trajectory goes to the folder out under the current one") {
+    const Place place;
+    const std::string command = "cd '" + place.folder.string() + "' && '" LOBATTO_PROGRAM "' run '" + pendulum + "'";
+    const test::Finished done = test::run({"sh", "-c", command});
+    CHECK(contains(done.out, "  trajectory              out/pendulum.csv, 2401 states\n"));
+    CHECK(read_trajectory(place.folder / "out/pendulum.csv").rows.size() == 2401);
+}
+
+TEST_CASE("wrong values on the command line are refused with exit code 2") {
+    const Place place;
+    const auto refusal = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), pendulum);
+        arguments.insert(arguments.end(), {"-o", place.file()});
+        const test::Finished done = place.run(arguments);
+        CHECK(done.exit_code == 2);
+        CHECK(done.out == "");
+        CHECK(!std::filesystem::exists(place.file()));
+        return done.err;
+    };
+    CHECK(refusal({"--set", "omgea=2"}) ==
+          "--set:1:1: unknown parameter 'omgea'; declared: m, omega. Did you mean 'omega'?\n  1 | omgea=2\n   "
+          " | ^\n");
+    CHECK(refusal({"--set", "m"}) == "--set:1:1: expected name=value, such as --set m=2\n  1 | m\n    | ^\n");
+    CHECK(contains(refusal({"--set", "m=2*omega"}), "--set:1:5: unknown name 'omega' in the value of m"));
+    CHECK(contains(refusal({"--step", "2*"}), "--step:1:3: "));
+    CHECK(refusal({"--step", "-0.1"}) == "--step: the step must be positive, but is -0.1\n");
+    CHECK(refusal({"--until", "-1"}) == "--until: the end time must not be negative, but is -1\n");
+    CHECK(refusal({"--until", "1e30"}) ==
+          pendulum + ": 2e+31 steps are too many to count; make the step larger or the end time smaller\n");
+    CHECK(refusal({"--every", "0"}) ==
+          "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
+    CHECK(contains(refusal({"--points", "6"}), "lobatto: --points: Value 6 not in range"));
+}
+
+TEST_CASE("a run that stops keeps what was computed, explains itself and returns 3") {
+    const Place place;
+    const std::string scene = place.file("escape.toml");
+    test::write_text(scene, escape);
+    const test::Finished done = place.run({scene, "-o", place.file()});
+    CHECK(done.exit_code == 3);
+    const TrajectoryTable table = read_trajectory(place.file());
+    REQUIRE(table.rows.size() > 10);
+    CHECK(table.rows.back()[0] == doctest::Approx(1.6));
+    CHECK(table.rows.back()[1] < -10);
+    CHECK(contains(done.out, " of 100, h = 0.1, to t = "));
+    CHECK(contains(done.out, "run.csv, " + std::to_string(table.rows.size()) + " states\n"));
+    CHECK(done.err.starts_with("lobatto: " + scene + ": the run stopped in step " + std::to_string(table.rows.size()) +
+                               ", after t = "));
+    CHECK(done.err.ends_with(" What was computed is in " + place.file() + ".\n"));
+}
+
+TEST_CASE("a start that is impossible returns 3 and leaves the file of before") {
+    const Place place;
+    test::write_text(place.file(), "of before\n");
+    const test::Finished done = place.run({pendulum, "--set", "m=0", "-o", place.file()});
+    CHECK(done.exit_code == 3);
+    CHECK(contains(done.err, "the mass matrix has no inverse for these parameters"));
+    CHECK(test::read_file(place.file()) == "of before\n");
+}
+
+TEST_CASE("an interrupted run keeps what was computed, says so and returns 130") {
+    for (const int signal : {SIGINT, SIGTERM}) {
+        const Place place;
+        const Signalled run = signal_long_run(place, signal);
+        CHECK(run.exit_code == 130);
+        CHECK(run.err.starts_with("lobatto: interrupted at t = "));
+        CHECK(run.err.ends_with("; what was computed is in " + place.file() + ".\n"));
+        const TrajectoryTable table = read_trajectory(place.file());
+        CHECK(table.rows.size() > 100);
+        CHECK(!std::filesystem::exists(place.file() + ".partial"));
+    }
+}
+
+TEST_CASE("kill -9 leaves readable rows beside the file of before") {
+    const Place place;
+    test::write_text(place.file(), "of before\n");
+    CHECK(signal_long_run(place, SIGKILL).exit_code == 128 + SIGKILL);
+    CHECK(test::read_file(place.file()) == "of before\n");
+    const TrajectoryTable table = read_trajectory(place.file() + ".partial");
+    REQUIRE(table.rows.size() > 100);
+    for (const std::vector<double>& row : table.rows) REQUIRE(row.size() == 4);
+    CHECK(table.rows[7][0] == doctest::Approx(7 * 1000 * 0.05).epsilon(1e-14));
+    CHECK(place.run({pendulum, "-o", place.file()}).exit_code == 0);  // what is left does not stand in the way
+    CHECK(read_trajectory(place.file()).rows.size() == 2401);
+}
+
+TEST_CASE("a machine that refuses to write is an error of exit code 4") {
+    const Place place;
+    const test::Finished missing = place.run({pendulum, "-o", place.file("none/run.csv")});
+    CHECK(missing.exit_code == 4);
+    CHECK(missing.err == "lobatto: cannot write the trajectory to " + place.file("none/run.csv.partial") +
+                             ": No such file or directory. Create its folder first, or choose another place with -o\n");
+    const test::Finished full = place.run({pendulum, "-o", "/dev/full", "--quiet"});
+    CHECK(full.exit_code == 4);
+    CHECK(full.err ==
+          "lobatto: cannot write the trajectory to /dev/full: No space left on device. Free some space, or choose "
+          "another place with -o\n");
+}
+
+TEST_CASE("a reader that goes away does not cost the trajectory") {
+    const Place place;
+    const test::Finished done =
+        test::run({"sh", "-c", "'" LOBATTO_PROGRAM "' run '" + pendulum + "' -o '" + place.file() + "' | true"});
+    CHECK(done.err == "");
+    CHECK(read_trajectory(place.file()).rows.size() == 2401);
+    // Rows to a pipe that closes: ended quietly.
+    const test::Finished head = test::run(
+        {"sh", "-c",
+         "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
+    CHECK(head.out == "t,q,p_q,H\n");
+    CHECK(head.err == "");
+}
