@@ -13,7 +13,7 @@
 #include <iostream>
 
 #include "cli/commands.hpp"
-#include "cli/overrides.hpp"
+
 #include "cli/support_text.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 struct EmitCommand {
     std::string scene;
     std::string folder;
-    Overrides overrides;
+    std::optional<int> points;  // instead of the scene's
     Precision precision = Precision::double_;
     bool standalone = false;
     bool no_support = false;
@@ -90,7 +90,7 @@ void print_use(const KernelSource& source, const EmitCommand& options) {
 
 void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
-    apply(options.overrides, scene);
+    if (options.points) scene.method.points = *options.points;
     const KernelSource source =
         emit(derive(scene), {options.precision, options.standalone ? kernel_hpp_text : std::string()});
 
@@ -124,7 +124,7 @@ void add_emit(CLI::App& program) {
     command->add_option("-o,--output", options->folder, "folder for NAME.hpp and the kernel.hpp that it includes")
         ->required()
         ->type_name("FOLDER");
-    command->add_option("--points", options->overrides.points, "Lobatto points, 2 to 5, instead of the scene's")
+    command->add_option("--points", options->points, "Lobatto points, 2 to 5, instead of the scene's")
         ->check(CLI::Range(2, 5));
     const std::map<std::string, Precision> precisions = {{"float", Precision::single},
                                                          {"double", Precision::double_},
