@@ -23,7 +23,7 @@ struct SceneText {
     std::string name, lagrangian;
     std::vector<std::string> coordinates, parameters;
     std::string title = "a test";
-    std::string unit;
+    std::string unit = "";
 };
 
 Derivation derivation_of(const SceneText& scene, int points) {
@@ -281,7 +281,7 @@ TEST_CASE("titles and units cannot break out of the comments they stand in") {
     derivation.scene.title = "one\nint broken = ; // two \\";
     derivation.scene.coordinates[0].unit = "m*/\r\nint broken = ;";
     derivation.scene.parameters[0].unit = "kg \\";
-    derivation.scene.lagrangian_text = "L ??/";
+    derivation.scene.lagrangian_text = "L \\";
     const KernelSource source = emit(derivation);
     CHECK(source.header.find("\nint broken") == std::string::npos);
     CHECK(complaints(source) == "");
