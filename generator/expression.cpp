@@ -96,7 +96,7 @@ private:
             fail(at, fmt::format("{} has no finite real value here: {}", scope_.formula, error.what()));
         } catch (const InputError&) {
             throw;
-        } catch (const std::exception&) {  // a pole that GiNaC knows, such as tan(pi/2)
+        } catch (const std::exception&) {  // a pole that only GiNaC sees
             fail(at, fmt::format("{} has no finite real value here: the result of {} is not finite", scope_.formula,
                                  at.text));
         }
@@ -167,6 +167,7 @@ private:
         }
         if (base.value && base.value->is_zero() && exponent.value && exponent.value->is_negative())
             fail(at, fmt::format("division by zero in {}", scope_.formula));
+        if (base.expression.is_zero() && !exponent.value) fail(at, "0 to a power that is not a number");
         return compute(
             at, {base, exponent}, [&] { return GiNaC::pow(base.expression, exponent.expression); },
             [](const std::vector<numeric>& v) { return real_power(v[0], v[1]); });

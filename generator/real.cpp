@@ -117,7 +117,8 @@ numeric real_product(const std::vector<numeric>& factors) {
 numeric real_power(const numeric& base, const numeric& exponent) {
     if (base.is_zero()) {
         if (exponent.is_negative()) throw NoValue("it divides by zero");
-        return exponent.is_zero() ? 1 : 0;
+        if (exponent.is_zero()) throw NoValue("0 to the power 0 is not defined");
+        return 0;
     }
     return checked(
         [&] {
@@ -131,7 +132,11 @@ numeric real_power(const numeric& base, const numeric& exponent) {
 
 numeric real_function(const Function& function, const numeric& argument) {
     const std::string description = fmt::format("{} of {}", function.name, shown(argument));
-    return checked([&] { return function.value(argument); }, description);
+    const numeric result = checked([&] { return function.value(argument); }, description);
+    // Next to a pole of tan, 60 digits of the argument give a large number instead of none.
+    static const numeric pole = GiNaC::pow(numeric(10), numeric(digits - 10));
+    if (function.name == "tan" && abs(result) > pole) throw NoValue(description + " is not finite");
+    return result;
 }
 
 numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {
