@@ -34,9 +34,13 @@ std::string shown(const numeric& number) {
     return number.is_zero() ? "0" : fmt::format("{:.6g}", number.to_double());
 }
 
+[[noreturn]] void fail_beyond_bound() {
+    throw NoValue(fmt::format("a number beyond 2^{} occurs", largest_magnitude));
+}
+
 numeric bounded(const numeric& number) {
     static const numeric bound = GiNaC::pow(numeric(2), numeric(largest_magnitude));
-    if (abs(number) > bound) throw NoValue(fmt::format("a number beyond 2^{} occurs", largest_magnitude));
+    if (abs(number) > bound) fail_beyond_bound();
     return number;
 }
 
@@ -131,6 +135,13 @@ numeric real_power(const numeric& base, const numeric& exponent) {
 }
 
 numeric real_function(const Function& function, const numeric& argument) {
+    // Far out CLN throws, or even answers tanh(cosh(373)) = 0; but there these functions are 0, 1, -1 or too large.
+    static const numeric far = 1'000'000;
+    if (abs(argument) > far) {
+        if (function.name == "tanh") return argument.csgn();
+        if (function.name == "exp" && argument.is_negative()) return 0;
+        if (function.name == "exp" || function.name == "sinh" || function.name == "cosh") fail_beyond_bound();
+    }
     const std::string description = fmt::format("{} of {}", function.name, shown(argument));
     const numeric result = checked([&] { return function.value(argument); }, description);
     // Next to a pole of tan, 60 digits of the argument give a large number instead of none.

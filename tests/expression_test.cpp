@@ -188,6 +188,13 @@ TEST_CASE("what has no finite real value is refused where it stands") {
     check_error("sin(exp(exp(20)))", 5, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");
 }
 
+TEST_CASE("functions keep their value far out") {
+    CHECK(parse("1/tanh(cosh(373))").is_equal(1 / tanh(cosh(ex(373)))));  // CLN answers 0 for this tanh
+    CHECK(parse("1/tanh(-10^100)").is_equal(1 / tanh(-pow(ex(10), 100))));
+    CHECK(parse("1 + exp(-10^30)").is_equal(1 + exp(-pow(ex(10), 30))));
+    check_error("cosh(-10^30)", 1, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");
+}
+
 TEST_CASE("sizes are bounded before anything large is computed") {
     const std::string number = "an exact number of more than 4096 bits (about 1228 digits) occurs here";
     check_error("9^9^9", 2, number);
