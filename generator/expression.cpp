@@ -77,8 +77,7 @@ private:
         fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
     }
 
-    // Computes an expression; whatever GiNaC throws, and whatever is too large or not real, is an error at the
-    // operator.
+    // Computes an expression; what GiNaC throws, and what is too large or not real, is an error at the operator.
     template <typename Compute>
     Operand compute(const Token& at, const std::vector<Operand>& operands, const Compute& expression,
                     const std::function<numeric(const std::vector<numeric>&)>& value) const {
