@@ -64,8 +64,7 @@ Text locate_string(Cursor& cursor, std::string_view decoded) {
     return text;
 }
 
-// The characters of a number as they stand in the file, without the underscores and the plus sign that formulas do not
-// know.
+// The characters of a number as written, without underscores and the plus sign in front.
 Text locate_number(Cursor& cursor) {
     Text text;
     for (; cursor.is_any_of("0123456789abcdefABCDEF_+-.xXoO"); cursor.advance()) {

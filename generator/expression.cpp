@@ -77,8 +77,7 @@ private:
         fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
     }
 
-    // Computes an expression; whatever GiNaC throws, and whatever is too large or not real, is an error at the
-    // operator.
+    // Computes an expression; what GiNaC throws, and what is too large or not real, is an error at the operator.
     template <typename Compute>
     Operand compute(const Token& at, const std::vector<Operand>& operands, const Compute& expression,
                     const std::function<numeric(const std::vector<numeric>&)>& value) const {
@@ -96,7 +95,7 @@ private:
             fail(at, fmt::format("{} has no finite real value here: {}", scope_.formula, error.what()));
         } catch (const InputError&) {
             throw;
-        } catch (const std::exception&) {  // a pole that GiNaC knows, such as tan(pi/2)
+        } catch (const std::exception&) {  // a pole that only GiNaC sees
             fail(at, fmt::format("{} has no finite real value here: the result of {} is not finite", scope_.formula,
                                  at.text));
         }
@@ -167,6 +166,7 @@ private:
         }
         if (base.value && base.value->is_zero() && exponent.value && exponent.value->is_negative())
             fail(at, fmt::format("division by zero in {}", scope_.formula));
+        if (base.expression.is_zero() && !exponent.value) fail(at, "0 to a power that is not a number");
         return compute(
             at, {base, exponent}, [&] { return GiNaC::pow(base.expression, exponent.expression); },
             [](const std::vector<numeric>& v) { return real_power(v[0], v[1]); });

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Found by fuzzing, and none of it valid in a scene, but for characters beyond ASCII in quotes and comments:
 // - a dotted key of very many parts: toml++ nests a table for each, and destroys them recursively;
-// - anything but a key after the [ of a table's header, and some signs in a list: assumed not to happen, undefined
-// behaviour;
-// - a date followed by two blanks: assumed not to happen;
+// - anything but a key after the [ of a table's header: assumed not to happen, so undefined behaviour;
+// - some signs in a list, and a date followed by two blanks: the same;
 // - some characters beyond ASCII where white space might stand: the test for white space runs into unreachable code.
 #include "generator/toml_guard.hpp"
 

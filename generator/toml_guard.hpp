@@ -8,8 +8,8 @@
 
 namespace lobatto {
 
-// The text with every character beyond ASCII replaced by '?', so that lines and columns stay. Throws InputError for
-// what toml++ must not see.
+// The text with every character beyond ASCII replaced by '?', so that lines and columns stay.
+// Throws InputError for what toml++ must not see.
 std::string guarded_toml(const Source& source);
 
 }  // namespace lobatto

@@ -182,8 +182,17 @@ TEST_CASE("what has no finite real value is refused where it stands") {
     check_error("(-8)^(1/3)", 5,
                 "the Lagrangian has no finite real value here: -8 to the power 0.333333 is not a real number");
     check_error("acos(2)", 1, "the Lagrangian has no finite real value here: acos of 2 is not a real number");
-    check_error("tan(pi/2)", 1, "the Lagrangian has no finite real value here: the result of tan is not finite");
+    check_error("tan(pi/2)", 1, "the Lagrangian has no finite real value here: tan of 1.5708 is not finite");
+    check_error("(q - q)^0", 8, "the Lagrangian has no finite real value here: 0 to the power 0 is not defined");
+    check_error("0^q", 2, "0 to a power that is not a number");
     check_error("sin(exp(exp(20)))", 5, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");
+}
+
+TEST_CASE("functions keep their value far out") {
+    CHECK(parse("1/tanh(cosh(373))").is_equal(1 / tanh(cosh(ex(373)))));  // CLN answers 0 for this tanh
+    CHECK(parse("1/tanh(-10^100)").is_equal(1 / tanh(-pow(ex(10), 100))));
+    CHECK(parse("1 + exp(-10^30)").is_equal(1 + exp(-pow(ex(10), 30))));
+    check_error("cosh(-10^30)", 1, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");
 }
 
 TEST_CASE("sizes are bounded before anything large is computed") {

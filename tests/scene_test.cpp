@@ -107,6 +107,29 @@ TEST_CASE("the oscillator scene starts with a momentum and steps by a fraction o
     CHECK(abs(scene.evaluate(scene.run.step - Pi / 10, "the step", {1, 1})) < pow(numeric(10), -58));
 }
 
+TEST_CASE("the example and the error of docs/scene_format.md are true") {
+    const std::string page = Source::read(std::string(LOBATTO_SOURCE_DIR) + "/docs/scene_format.md").content();
+    const auto block = [&](const std::string& kind) {
+        const std::size_t begin = page.find("```" + kind + "\n") + kind.size() + 4;
+        return page.substr(begin, page.find("```", begin) - begin);
+    };
+    const Scene scene = read(block("toml"));
+    CHECK(scene.title == "Two masses on springs");
+    CHECK(scene.coordinates.size() == 2);
+    CHECK(scene.parameters.size() == 3);
+    CHECK(scene.constants.size() == 1);
+    // ten periods of twenty steps
+    CHECK(abs(scene.evaluate(scene.run.until / scene.run.step, "the number of steps") - 200) < pow(numeric(10), -50));
+    try {
+        lobatto::read_scene(Source("pendulum.toml",
+                                   "\n\n\nlagrangian = \"m*q'^2/2 - m*omgea^2*(1 - cos(q))\"\n[coordinates]\n"
+                                   "q = { position = 1, velocity = 0 }\n[parameters]\nm = 1\nomega = 1\n"));
+        FAIL("read");
+    } catch (const InputError& error) {
+        CHECK(error.what() + std::string("\n") == block("text"));
+    }
+}
+
 TEST_CASE("names keep the order of the file, whatever their alphabet") {
     const Scene scene = read(
         "lagrangian = \"z'^2 + a'^2 + b'^2 - w*c*y*z\"\n"
