@@ -378,11 +378,22 @@ private:
     int n_, s_;
 };
 
+// A struct cannot have the name of one of its members.
+std::string struct_name(const std::string& scene) {
+    static const std::set<std::string> members = {
+        "name",    "digest",    "coordinates",  "points", "order", "unknowns", "linear",    "parameter_count",
+        "entries", "entry_row", "entry_column", "c",      "b",     "A",        "parameter", "prepare"};
+    const auto& functions = declarations();
+    const bool is_function =
+        std::any_of(functions.begin(), functions.end(), [&](const Declaration& d) { return d.program == scene; });
+    return is_function || members.contains(scene) ? scene + "_" : identifier(scene);
+}
+
 }  // namespace
 
 KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options) {
     KernelSource source;
-    source.name = identifier(derivation.scene.name);
+    source.name = struct_name(derivation.scene.name);
     source.report = optimise(programs);
     const Emitter emitter(derivation, programs, options);
     // The digest of the text with the digest left out, put in its place.

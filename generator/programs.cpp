@@ -183,7 +183,7 @@ private:
             return local(name, g().from(e, {{exact.z, z}}));
         };
         const Id inverse_delta = g().power(polynomial("delta", exact.delta), -1);
-        const Id a = polynomial("a", exact.a), b = polynomial("b", exact.b), c = polynomial("c", exact.c);
+        const Id a = polynomial("phi_a", exact.a), b = polynomial("phi_b", exact.b), c = polynomial("phi_c", exact.c);
         const Ids position = {a, g().multiply({h_by_m, c}),
                               g().multiply({h_, h_by_m, force, g().from(exact.e_q, {{exact.z, z}})})};
         const Ids momentum = {g().multiply({g().power(h_by_m, -1), b}), a,
