@@ -146,8 +146,13 @@ Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& 
         result = there_and_back(kernel, start.parameters, start.q, start.p, start.step, steps);
         if (result.rounding < 1e-6) break;
     }
-    return at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
-                   "the step is not its own inverse with -h");
+    Row row = at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
+                      "the step is not its own inverse with -h");
+    if (!(result.rounding < 1e-6)) {
+        row.holds = false;
+        row.meaning = "rounding swamps even one step; the step is too long for this motion";
+    }
+    return row;
 }
 
 void momenta(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start, const Scene& scene) {
@@ -155,14 +160,20 @@ void momenta(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& 
     for (const Coordinate& coordinate : scene.coordinates) names.push_back(coordinate.name);
     const auto symmetries = find_symmetries(kernel, start.parameters, start.q, start.step, names);
     if (symmetries.empty()) rows.push_back({"no linear symmetry, no momentum to conserve", "none found", "", true, ""});
+    std::vector<Row> found;
+    double worst = 0, bound = 0;
+    const std::string meaning = "the momentum that belongs to this symmetry is not conserved";
     for (const Symmetry& symmetry : symmetries) {
         const auto [steps, variation] =
             momentum_variation(kernel, symmetry, start.parameters, start.q, start.p, start.step, short_run);
-        // Each step rounds a few times, in the worst case always the same way.
-        rows.push_back(at_most(fmt::format("{}: {}", symmetry.kind, symmetry.momentum), variation,
-                               8 * 0x1p-53 * static_cast<double>(steps),
-                               "the momentum that belongs to this symmetry is not conserved"));
+        worst = std::max(worst, variation);
+        bound = 8 * 0x1p-53 * static_cast<double>(steps);  // each step rounds a few times, at worst always the same way
+        found.push_back(at_most(symmetry.kind + ": " + symmetry.momentum, variation, bound, meaning));
     }
+    constexpr std::size_t most_rows = 6;
+    if (found.size() > most_rows)
+        found = {at_most(fmt::format("momenta of {} linear symmetries", found.size()), worst, bound, meaning)};
+    rows.insert(rows.end(), found.begin(), found.end());
 }
 
 void energy(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start) {

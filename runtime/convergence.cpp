@@ -45,22 +45,21 @@ std::optional<States> states_with(Stepper<Quadruple>& stepper, const QuadrupleSt
     return states;
 }
 
-// How far each coordinate and momentum moves from its start.
-States ranges(const States& states, const QuadrupleStart& start) {
-    States from = start.q;
-    from.insert(from.end(), start.p.begin(), start.p.end());
-    States range(from.size(), Quadruple(0));
-    for (std::size_t i = 0; i < states.size(); ++i)
-        range[i % from.size()] = std::max(range[i % from.size()], size(states[i] - from[i % from.size()]));
-    return range;
-}
-
-double error_of(const States& states, const States& reference, const States& range) {
-    Quadruple error = 0;
-    for (std::size_t i = 0; i < states.size(); ++i)
-        if (const Quadruple& scale = range[i % range.size()]; scale > 0)
-            error = std::max(error, size(states[i] - reference[i]) / scale);
-    return static_cast<double>(error);
+// The largest error of the positions relative to the farthest that one moves, or of the momenta likewise.
+double error_of(const States& states, const States& reference, const QuadrupleStart& start) {
+    const std::size_t n = start.q.size();
+    double worst = 0;
+    for (const bool momenta : {false, true}) {
+        Quadruple error = 0, range = 0;
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            if ((i / n % 2 == 1) != momenta) continue;
+            const Quadruple from = momenta ? start.p[i % n] : start.q[i % n];
+            range = std::max(range, size(reference[i] - from));
+            error = std::max(error, size(states[i] - reference[i]));
+        }
+        if (range > 0) worst = std::max(worst, static_cast<double>(error / range));
+    }
+    return worst;
 }
 
 }  // namespace
@@ -75,12 +74,11 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
             coarse /= 2;
             continue;
         }
-        const States range = ranges(*reference, start);
         Convergence measured;
         for (int rung = 0; rung < rungs; ++rung) {
             const std::optional<States> states = states_with(stepper, start, coarse, 1 << rung);
             if (!states) break;
-            ConvergenceRow row{static_cast<double>(coarse) / (1 << rung), error_of(*states, *reference, range), 0};
+            ConvergenceRow row{static_cast<double>(coarse) / (1 << rung), error_of(*states, *reference, start), 0};
             if (row.error < rounding_error) break;
             if (rung > 0) row.order = std::log2(measured.rows.back().error / row.error);
             measured.rows.push_back(row);

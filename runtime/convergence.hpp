@@ -16,8 +16,8 @@ struct QuadrupleStart {
 
 struct ConvergenceRow {
     double step = 0;
-    double error = 0;  // the largest at eight times; against a step 8 times the smallest of the ladder, each coordinate
-                       // and momentum relative to its range
+    double error = 0;  // the largest at eight times; against a step 1/8 of the smallest of the ladder; positions
+                       // relative to the farthest that one moves, momenta likewise
     double order = 0;  // log2 of the error before by this one; 0 in the first row
 };
 

@@ -70,25 +70,35 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
         real time;
         if (stepper.prepare(parameters, h) != LOBATTO_OK || stepper.start(0, position, momentum) != LOBATTO_OK ||
             stepper.advance(call) != LOBATTO_OK)
-            throw ComputationError("the motion cannot be reversed: a step fails on the way");
+            return false;
         stepper.state(time, position, momentum);
+        return true;
     };
     position = q;
     momentum = p;
-    travel(step);
-    travel(-step);
+    if (!travel(step) || !travel(-step)) {
+        result.distance = result.rounding = std::numeric_limits<double>::infinity();
+        return result;
+    }
     const std::vector<real> end = joined(position, momentum);
-    // A disturbance e_j of the size of rounding in component j, anywhere on the way, returns as the inverse flow's
-    // image, whose entries are those of the flow itself: F^-1 = -J F^T J.
-    for (std::size_t i = 0; i < rows; ++i) {
-        if (!(range[i] > 0)) continue;
-        result.distance = std::max(result.distance, static_cast<double>(size(end[i] - start[i]) / range[i]));
-        real growth = largest[i];
-        for (const std::vector<real>& F : flows)
-            for (std::size_t j = 0; j < rows; ++j)
-                growth = std::max(growth, size(F[((j + n) % rows) * rows + (i + n) % rows]) * largest[j]);
-        result.rounding = std::max(result.rounding, rounding_of<real>() * 2.0 * static_cast<double>(result.steps) *
-                                                        static_cast<double>(growth / range[i]));
+    // Rounding in component j, anywhere on the way, returns as the inverse flow's image, whose entries are those of the
+    // flow itself: F^-1 = -J F^T J.
+    for (const std::size_t block : {std::size_t(0), n}) {
+        real moved = 0, missed = 0, growth = 0;
+        for (std::size_t i = block; i < block + n; ++i) {
+            moved = std::max(moved, range[i]);
+            missed = std::max(missed, size(end[i] - start[i]));
+            growth = std::max(growth, largest[i]);
+            for (const std::vector<real>& F : flows)
+                for (std::size_t j = 0; j < rows; ++j)
+                    growth = std::max(growth, size(F[((j + n) % rows) * rows + (i + n) % rows]) * largest[j]);
+        }
+        if (!(moved > 0)) continue;
+        constexpr double roundings = 16;  // of a step, all the same way; measured: 0.8 on the linear oscillator
+        result.distance = std::max(result.distance, static_cast<double>(missed / moved));
+        result.rounding =
+            std::max(result.rounding, rounding_of<real>() * roundings * static_cast<double>(result.steps) *
+                                          static_cast<double>(growth / moved));
     }
     return result;
 }

@@ -14,8 +14,8 @@ namespace lobatto {
 // steps, times what the motion makes of a small disturbance (the norm of the flow's derivative).
 struct Return {
     std::int64_t steps = 0;  // one way; fewer than asked for when a step failed
-    double distance = 0;     // of each coordinate and momentum relative to its range, the largest
-    double rounding = 0;
+    double distance = 0;     // of positions relative to the farthest that one moves, or of momenta likewise
+    double rounding = 0;     // both infinite when a step fails on the way
 };
 template <class real>
 Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters, const std::vector<real>& q,

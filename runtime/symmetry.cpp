@@ -62,9 +62,11 @@ Symmetry symmetry_of(const MatrixXd& B, const VectorXd& d, const std::vector<std
         append(symmetry.momentum, d(k), "p_" + name(k));
         if (B.row(k).any()) moved.push_back(k);
     }
-    // Grouped so that a plane rotation reads x*p_y - y*p_x.
-    for (Eigen::Index k = n; k-- > 0;)
-        for (Eigen::Index l = 0; l < n; ++l) append(symmetry.momentum, B(k, l), name(l) + "*p_" + name(k));
+    for (Eigen::Index k = 0; k < n; ++k)
+        for (Eigen::Index l = k; l < n; ++l) {  // in pairs, so that a plane rotation reads x*p_y - y*p_x
+            append(symmetry.momentum, B(l, k), name(k) + "*p_" + name(l));
+            if (k != l) append(symmetry.momentum, B(k, l), name(l) + "*p_" + name(k));
+        }
     if (moved.empty())
         symmetry.kind = "translation";
     else if (moved.size() == 2 && B(moved[0], moved[0]) == 0 && B(moved[0], moved[1]) == -B(moved[1], moved[0]))
