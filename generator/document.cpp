@@ -8,99 +8,66 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <tuple>
+
+#include "generator/cursor.hpp"
+#include "generator/toml_guard.hpp"
 
 namespace lobatto {
 namespace {
-
-constexpr int longest_key = 16;  // parts of a dotted key: toml++ nests a table for each, without a bound
 
 Position position_of(const toml::source_region& region) {
     return {static_cast<int>(region.begin.line), static_cast<int>(region.begin.column)};
 }
 
-// A place in the raw text that moves character by character and knows its line and column.
-class Cursor {
-public:
-    explicit Cursor(std::string_view content) : content_(content) { starts_.push_back(0); }
-
-    void move_to(Position target) {
-        if (target.line != position_.line || target.column < position_.column) {
-            while (starts_.size() < static_cast<std::size_t>(target.line))
-                starts_.push_back(content_.find('\n', starts_.back()) + 1);
-            offset_ = starts_[static_cast<std::size_t>(target.line - 1)];
-            position_ = {target.line, 1};
-        }
-        while (position_.column < target.column) advance();
-    }
-    void advance() {
-        if (content_[offset_] == '\n') {
-            ++position_.line;
-            position_.column = 0;
-        }
-        offset_ += character_length(content_.substr(offset_));
-        ++position_.column;
-    }
-    void advance(std::size_t characters) {
-        for (; characters > 0; --characters) advance();
-    }
-    std::string_view rest() const { return content_.substr(offset_); }
-    char front() const { return offset_ < content_.size() ? content_[offset_] : '\0'; }
-    Position position() const { return position_; }
-
-private:
-    std::string_view content_;
-    std::vector<std::size_t> starts_;  // of the lines seen so far
-    std::size_t offset_ = 0;
-    Position position_;
-};
-
-// What the escape at the cursor (after the backslash) stands for is known from the value; how long it is, from its
-// letter.
+// Of the letter after a backslash and what belongs to it.
 std::size_t escape_length(char letter) {
     return letter == 'u' ? 5 : letter == 'U' ? 9 : 1;
 }
 
-// The places of all bytes of a string value: walks through quotes, escapes, folded line ends and CRLF beside the
-// decoded value.
-Text locate_string(Cursor& cursor, const std::string& value) {
-    Text text{value, {}};
-    text.at.reserve(value.size() + 1);
+// A string value and the places of all its bytes: walks through quotes, escapes, folded line ends and CRLF beside the
+// value as toml++ decoded it from the guarded text, one byte a character there unless it was an escape.
+Text locate_string(Cursor& cursor, std::string_view decoded) {
+    Text text;
     const char quote = cursor.front();
     assert(quote == '"' || quote == '\'');
     const bool multiline = cursor.rest().starts_with(std::string(3, quote));
     cursor.advance(multiline ? 3 : 1);
     if (multiline) {
-        if (cursor.front() == '\r') cursor.advance();
+        cursor.skip("\r");
         if (cursor.front() == '\n') cursor.advance();
     }
-    while (text.at.size() < value.size()) {
+    while (!decoded.empty()) {
         const Position here = cursor.position();
-        const std::string_view rest = std::string_view(value).substr(text.at.size());
+        std::size_t length = 1;
         if (quote == '"' && cursor.front() == '\\') {
             cursor.advance();
-            if (multiline && std::string_view(" \t\r\n").find(cursor.front()) != std::string_view::npos) {
-                while (std::string_view(" \t\r\n").find(cursor.front()) != std::string_view::npos) cursor.advance();
+            if (cursor.is_any_of(" \t\r\n")) {
+                cursor.skip(" \t\r\n");
                 continue;
             }
             cursor.advance(escape_length(cursor.front()));
+            length = character_length(decoded);
+            text.value += decoded.substr(0, length);
         } else {
             if (cursor.front() == '\r') cursor.advance();
-            assert(cursor.front() == rest.front());
+            const std::string_view written = cursor.rest().substr(0, character_length(cursor.rest()));
+            assert(written.size() > 1 || written.front() == decoded.front());
+            text.value += written;
             cursor.advance();
         }
-        text.at.insert(text.at.end(), character_length(rest), here);
+        text.at.resize(text.value.size(), here);
+        decoded.remove_prefix(length);
     }
     text.at.push_back(cursor.position());
     return text;
 }
 
-// The characters of a number as they stand in the file, without the underscores and the plus sign that formulas do not
-// know.
+// The characters of a number as written, without underscores and the plus sign in front.
 Text locate_number(Cursor& cursor) {
     Text text;
-    const std::string_view digits = "0123456789abcdefABCDEF_+-.xXoO";
-    for (; digits.find(cursor.front()) != std::string_view::npos; cursor.advance()) {
+    for (; cursor.is_any_of("0123456789abcdefABCDEF_+-.xXoO"); cursor.advance()) {
         const bool leading_plus = cursor.front() == '+' && text.value.empty();
         if (cursor.front() == '_' || leading_plus) continue;
         text.value += cursor.front();
@@ -159,42 +126,21 @@ Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
             value.kind = Value::Kind::boolean;
             value.boolean = **node.as_boolean();
             break;
-        case toml::node_type::table:
+        default:  // the guard leaves only tables
+            assert(node.is_table());
             value.entries = convert_entries(source, cursor, *node.as_table());
-            break;
-        default:
-            value.kind = Value::Kind::other;
             break;
     }
     return value;
 }
 
-// Refuses keys of very many parts before toml++ nests a table for each. Dots are counted outside strings and comments,
-// from one
-// '=', ',' or line end to the next.
-void bound_dotted_keys(const Source& source) {
-    Cursor cursor(source.content());
-    int dots = 0;
-    while (!cursor.rest().empty()) {
-        const char c = cursor.front();
-        if (c == '"' || c == '\'') {
-            const bool multiline = cursor.rest().starts_with(std::string(3, c));
-            const std::string end = multiline ? std::string(3, c) : std::string(1, c);
-            cursor.advance(end.size());
-            while (!cursor.rest().empty() && !cursor.rest().starts_with(end) && (multiline || cursor.front() != '\n'))
-                cursor.advance(c == '"' && cursor.front() == '\\' && cursor.rest().size() > 1 ? 2 : 1);
-            for (std::size_t i = 0; i < end.size() && cursor.front() == c; ++i) cursor.advance();
-            continue;
-        }
-        if (c == '#')
-            while (!cursor.rest().empty() && cursor.front() != '\n') cursor.advance();
-        if (cursor.rest().empty()) break;
-        dots = c == '.' ? dots + 1 : c == '=' || c == ',' || c == '\n' || c == '#' ? 0 : dots;
-        if (dots >= longest_key)
-            source.fail(cursor.position(),
-                        fmt::format("a key with more than {} parts; no key of a scene has more than 3", longest_key));
-        cursor.advance();
-    }
+// toml++ says "Error while parsing X: Y"; the most likely reason of some is a formula without quotes.
+std::string explanation(std::string_view description) {
+    constexpr std::string_view prefix = "Error while parsing ";
+    if (description.starts_with(prefix)) description.remove_prefix(prefix.size());
+    const bool formula = description.find("could not determine value type") != std::string_view::npos ||
+                         description.find("expected digit") != std::string_view::npos;
+    return fmt::format("not valid TOML: {}{}", description, formula ? "; a formula must stand in quotes" : "");
 }
 
 }  // namespace
@@ -210,23 +156,21 @@ std::string Value::kind_name() const {
         case Kind::boolean:
             return "true or false";
         case Kind::table:
-            return "a table";
-        case Kind::other:
             break;
     }
-    return "a list, a date or a time";
+    return "a table";
 }
 
 Value read_document(const Source& source) {
-    bound_dotted_keys(source);
+    const std::string guarded = guarded_toml(source);
     try {
-        const toml::table root = toml::parse(std::string_view(source.content()));
+        const toml::table root = toml::parse(std::string_view(guarded));
         Cursor cursor(source.content());
         Value document;
         document.entries = convert_entries(source, cursor, root);
         return document;
     } catch (const toml::parse_error& error) {
-        source.fail(position_of(error.source()), fmt::format("not valid TOML: {}", error.description()));
+        source.fail(position_of(error.source()), explanation(error.description()));
     }
 }
 

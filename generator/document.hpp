@@ -12,7 +12,7 @@ namespace lobatto {
 struct Entry;
 
 struct Value {
-    enum class Kind { text, integer, real, boolean, table, other };
+    enum class Kind { text, integer, real, boolean, table };
     Kind kind = Kind::table;
     Position at;  // of its first character; of a [table]: its bracket
     Text text;    // text: the value; integer, real: the digits as a formula, positions kept

@@ -157,10 +157,9 @@ private:
                 text += wrapped(fmt::format("// Structure    {}: {}", finding.name, comment_safe(finding.reason)),
                                 "//              ");
         text += fmt::format(
-            "// Operations   {} additions, {} multiplications, {} divisions, {} functions over all functions below ({} "
-            "in all, {} as derived)\n",
-            now.additions, now.multiplications, now.divisions, now.functions, now.total(),
-            report.front().after.total());
+            "// Operations   {} in all, {} as derived: {} additions, {} multiplications, {} divisions, {} functions\n",
+            now.total(), report.front().after.total(), now.additions, now.multiplications, now.divisions,
+            now.functions);
         return text;
     }
 
@@ -184,22 +183,17 @@ private:
         text += fmt::format(
             "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n",
             name, digest);
-        text += fmt::format("    static constexpr int coordinates = {};      // n\n", n_);
-        text += fmt::format(
-            "    static constexpr int points = {};           // s, nodes of a step, both ends included\n", s_);
-        text +=
-            fmt::format("    static constexpr int order = {};            // of accuracy in h\n", d_.quadrature.order());
-        text += fmt::format(
-            "    static constexpr int unknowns = {};         // N = n (s - 2) of the stage equations; 0: none to "
-            "solve\n",
-            N);
-        text += fmt::format("    static constexpr bool linear = {};      // the step is an affine map\n",
-                            d_.structure.linear);
-        text += fmt::format("    static constexpr int parameter_count = {};\n", d_.scene.parameters.size());
+        const auto line = [&text](const std::string& declaration, const std::string& comment) {
+            text += fmt::format("    {:<42}  // {}\n", "static constexpr " + declaration + ";", comment);
+        };
         const auto& entries = d_.structure.entries;
-        text += fmt::format(
-            "    static constexpr int entries = {};          // of M^-1 V'' that are not identically zero\n",
-            entries.size());
+        line(fmt::format("int coordinates = {}", n_), "n");
+        line(fmt::format("int points = {}", s_), "s, nodes of a step, both ends included");
+        line(fmt::format("int order = {}", d_.quadrature.order()), "of accuracy in h");
+        line(fmt::format("int unknowns = {}", N), "N = n (s - 2) of the stage equations; 0: none to solve");
+        line(fmt::format("bool linear = {}", d_.structure.linear), "the step is an affine map");
+        line(fmt::format("int parameter_count = {}", d_.scene.parameters.size()), "in the order of the scene");
+        line(fmt::format("int entries = {}", entries.size()), "of M^-1 V'' that are not identically zero");
         std::string rows, columns;
         for (const auto& [row, column] : entries) {
             rows += (rows.empty() ? "" : ", ") + std::to_string(row);
@@ -238,14 +232,21 @@ private:
 
     std::string parameters() const {
         std::string text = "\n    // Values of the scene; change them before prepare().\n    struct Parameters {\n";
+        std::vector<std::string> lines;
+        std::size_t widest = 0;
         for (const Parameter& parameter : d_.scene.parameters) {
             Graph graph;
             const Id value =
                 graph.constant(cln::the<cln::cl_R>(d_.scene.evaluate(parameter.value, parameter.name).to_cl_N()));
-            text += fmt::format("        real {} = {};", identifier(parameter.name),
-                                formula(graph, value, Notation::cpp, {}, options_.precision));
-            if (!parameter.unit.empty()) text += "  // [" + comment_safe(parameter.unit) + "]";
-            text += "\n";
+            lines.push_back(fmt::format("real {} = {};", identifier(parameter.name),
+                                        formula(graph, value, Notation::cpp, {}, options_.precision)));
+            widest = std::max(widest, lines.back().size());
+        }
+        for (std::size_t i = 0; i < lines.size(); ++i) {
+            const std::string unit = comment_safe(d_.scene.parameters[i].unit);
+            text += unit.empty()
+                        ? fmt::format("        {}\n", lines[i])
+                        : fmt::format("        {:<{}}  // [{}]\n", lines[i], std::min<std::size_t>(widest, 60), unit);
         }
         text += "    };\n    static real& parameter(Parameters& p, int index) {\n";
         if (d_.scene.parameters.empty()) {
@@ -265,12 +266,15 @@ private:
         std::string text =
             "\n    // What depends on parameters and step size only, computed once by prepare().\n    struct "
             "Coefficients {\n";
+        std::size_t widest = 0;
+        for (const Id id : hoisted_.order) widest = std::max(widest, hoisted_.names.at(id).size());
+        widest = std::min<std::size_t>(widest, 20);
         for (const Id id : hoisted_.order) {
-            const std::string line = fmt::format("        real {};", hoisted_.names.at(id));
+            const std::string line = fmt::format("        {:<{}}", "real " + hoisted_.names.at(id) + ";", widest + 6);
             const Op op = p_.graph[id].op;
             text +=
                 op == Op::input
-                    ? line + "\n"
+                    ? line.substr(0, line.find(';') + 1) + "\n"
                     : wrapped(line + "  // " +
                                   formula(p_.graph, id, Notation::text, [&](Id other) { return field_name(other); }),
                               "        //     ");
@@ -319,6 +323,7 @@ private:
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");
+        if (d_.structure.linear && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi);\n";
         if (d_.structure.linear && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else
@@ -338,7 +343,8 @@ private:
             text += (text.empty() ? "" : ", ") + std::string(type);
             if (mentions(body, parameter)) text += std::string(" ") + parameter;
         }
-        return fmt::format("    static {} {}({}) {{\n", result, name, text);
+        return wrapped(fmt::format("    static {} {}({}) {{", result, name, text),
+                       std::string(name.size() + result.size() + 13, ' '));
     }
 
     std::string function(const Declaration& declaration) const {
@@ -379,8 +385,11 @@ KernelSource emit_kernel(const Derivation& derivation, Programs programs, const 
     source.name = identifier(derivation.scene.name);
     source.report = optimise(programs);
     const Emitter emitter(derivation, programs, options);
-    source.digest = digest_of(emitter.header(source.name, "", source.report));
-    source.header = emitter.header(source.name, source.digest, source.report);
+    // The digest of the text with the digest left out, put in its place.
+    source.header = emitter.header(source.name, "", source.report);
+    source.digest = digest_of(source.header);
+    const std::string empty = "digest = \"\"";
+    source.header.replace(source.header.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
     return source;
 }
 

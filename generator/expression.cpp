@@ -31,8 +31,9 @@ struct Operand {
     std::optional<numeric> value;  // present when the expression is constant
 };
 
+// b bits: 2^(b-1) <= max(|numerator|, denominator) < 2^b.
 int bits(const numeric& number) {
-    return std::max(number.numer().int_length(), number.denom().int_length());
+    return std::max(abs(number.numer()).int_length(), number.denom().int_length());
 }
 
 // The largest exact number in an expression, and the largest exponent of anything but a number.
@@ -76,8 +77,7 @@ private:
         fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
     }
 
-    // Computes an expression; whatever GiNaC throws, and whatever is too large or not real, is an error at the
-    // operator.
+    // Computes an expression; what GiNaC throws, and what is too large or not real, is an error at the operator.
     template <typename Compute>
     Operand compute(const Token& at, const std::vector<Operand>& operands, const Compute& expression,
                     const std::function<numeric(const std::vector<numeric>&)>& value) const {
@@ -95,7 +95,7 @@ private:
             fail(at, fmt::format("{} has no finite real value here: {}", scope_.formula, error.what()));
         } catch (const InputError&) {
             throw;
-        } catch (const std::exception&) {  // a pole that GiNaC knows, such as tan(pi/2)
+        } catch (const std::exception&) {  // a pole that only GiNaC sees
             fail(at, fmt::format("{} has no finite real value here: the result of {} is not finite", scope_.formula,
                                  at.text));
         }
@@ -166,6 +166,7 @@ private:
         }
         if (base.value && base.value->is_zero() && exponent.value && exponent.value->is_negative())
             fail(at, fmt::format("division by zero in {}", scope_.formula));
+        if (base.expression.is_zero() && !exponent.value) fail(at, "0 to a power that is not a number");
         return compute(
             at, {base, exponent}, [&] { return GiNaC::pow(base.expression, exponent.expression); },
             [](const std::vector<numeric>& v) { return real_power(v[0], v[1]); });

@@ -35,8 +35,8 @@ struct ExpressionLimits {
 };
 
 // Grammar: + - * / ^ (right-associative; -x^2 is -(x^2), 2^-1 is allowed), parentheses, numbers (0.1 is exactly 1/10),
-// pi, and the functions sqrt sin cos tan exp log sinh cosh tanh asin acos atan. Throws InputError. `used` collects the
-// names that occur.
+// pi, and the functions sqrt sin cos tan exp log sinh cosh tanh asin acos atan. Throws InputError.
+// `used` collects the names that occur.
 GiNaC::ex parse_expression(const Source& source, const Text& text, const Scope& scope,
                            std::map<std::string, bool>* used = nullptr);
 

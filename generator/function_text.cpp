@@ -8,6 +8,8 @@
 #include <cctype>
 #include <set>
 
+#include "generator/programs.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -161,10 +163,11 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     for (const auto& [id, count] : uses) {
         if (graph[id].op != Op::input || graph[id].stage <= Stage::step_size) continue;
         const Input& input = graph.input_of(id);
-        if (input.name == input.code || !is_identifier(input.name) || taken.contains(input.name)) continue;
-        local[id] = input.name;
-        aliases += fmt::format("        const real {} = {};\n", input.name, input.code);
-        taken.insert(input.name);
+        if (input.name == input.code || !is_identifier(input.name)) continue;
+        const std::string name = identifier(input.name);
+        if (!taken.insert(name).second) continue;
+        local[id] = name;
+        aliases += fmt::format("        const real {} = {};\n", name, input.code);
     }
     std::map<Id, std::string> suggested;
     for (const auto& [id, name] : programs.names) suggested.emplace(id, name);

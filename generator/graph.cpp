@@ -5,23 +5,12 @@
 #include <cln/cln.h>
 
 #include <algorithm>
-#include <sstream>
 
 namespace lobatto {
 
 bool is_rational(const cln::cl_R& value) {
     return cln:: instanceof (value, cln::cl_RA_ring);
 }
-
-namespace {
-
-std::string key_of(const cln::cl_R& value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
-}
-
-}  // namespace
 
 Id Graph::intern(Node node) {
     std::string key;
@@ -37,11 +26,16 @@ Id Graph::intern(Node node) {
 }
 
 Id Graph::constant(const cln::cl_R& value, const std::string& label) {
-    const auto [place, is_new] = known_.emplace("constant " + key_of(value), size());
-    if (!is_new) return place->second;
+    // The same object of CLN, kept alive here, is the same value: most constants come from another graph.
+    if (const auto known = constant_words_.find(value.word); known != constant_words_.end()) return known->second;
+    std::vector<Id>& same_hash = constant_ids_[cln::equal_hashcode(value)];
+    for (const Id id : same_hash)
+        if (is_rational(value) == is_rational(constant_of(id).value) && constant_of(id).value == value) return id;
+    same_hash.push_back(size());
+    constant_words_.emplace(value.word, size());
     constants_.push_back({value, label});
     nodes_.push_back({Op::constant, Stage::constant, static_cast<int>(constants_.size()) - 1, {}});
-    return place->second;
+    return size() - 1;
 }
 
 Id Graph::number(long numerator, long denominator) {

@@ -125,11 +125,16 @@ public:
 
 private:
     Id intern(Node node);
+    bool leads_with_minus(Id id) const;
+    Id negate_terms(Id sum);
+    void append_factor(std::vector<Id>& factors, Id base, int exponent);
 
     std::vector<Node> nodes_;
     std::vector<Constant> constants_;
     std::vector<Input> inputs_;
     std::unordered_map<std::string, Id> known_;
+    std::unordered_map<std::uintptr_t, Id> constant_words_;            // by identity
+    std::unordered_map<std::uint32_t, std::vector<Id>> constant_ids_;  // by the hash of the value
 };
 
 // The value of a constant operation, to number_digits.

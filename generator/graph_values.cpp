@@ -2,6 +2,8 @@
 // The graph's two bridges: from GiNaC expressions, and to numbers of 60 digits (CLN).
 #include <cln/cln.h>
 
+#include <algorithm>
+
 #include <optional>
 
 #include "generator/graph.hpp"
@@ -110,6 +112,36 @@ std::vector<cln::cl_R> Graph::evaluate(const std::vector<cln::cl_R>& inputs, con
     return values;
 }
 
+// Whether a sum is the negative of its preferred form: the rational constant in it positive, else its first term.
+bool Graph::leads_with_minus(Id id) const {
+    const Node& node = (*this)[id];
+    if (node.op != Op::add) return false;
+    const Id last = node.operands.back();
+    const bool has_constant = is_constant(last) && is_rational(constant_of(last).value);
+    const Id leader = has_constant ? last : node.operands.front();
+    const Node& term = (*this)[leader];
+    const std::vector<Id> factors = term.op == Op::multiply ? term.operands : std::vector<Id>{leader};
+    return std::count_if(factors.begin(), factors.end(),
+                         [this](Id f) { return is_constant(f) && cln::minusp(constant_of(f).value); }) %
+               2 !=
+           0;
+}
+
+Id Graph::negate_terms(Id sum) {
+    std::vector<Id> terms = (*this)[sum].operands;
+    for (Id& term : terms) term = negate(term);
+    return add(std::move(terms));
+}
+
+// GiNaC chooses between (a - b) (c - d) and (b - a) (d - c) by address; here each sum has a sign of its own.
+void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
+    if (leads_with_minus(base)) {
+        base = negate_terms(base);
+        if (exponent % 2 != 0) factors.push_back(number(-1));
+    }
+    factors.push_back(power(base, exponent));
+}
+
 Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
     std::map<GiNaC::ex, Id, GiNaC::ex_is_less> done;
     const auto convert = [&](const auto& self, const GiNaC::ex& e) -> Id {
@@ -127,19 +159,24 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
             id = static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(place->second).to_int());
         } else if (e.is_equal(GiNaC::Pi)) {
             id = constant(cln::pi(format), "pi");
-        } else if (GiNaC::is_a<GiNaC::add>(e) || GiNaC::is_a<GiNaC::mul>(e)) {
-            std::vector<Id> operands;
-            for (const auto& operand : e) operands.push_back(self(self, operand));
-            id = GiNaC::is_a<GiNaC::add>(e) ? add(std::move(operands)) : multiply(std::move(operands));
+        } else if (GiNaC::is_a<GiNaC::add>(e)) {
+            std::vector<Id> terms;
+            for (const auto& term : e) terms.push_back(self(self, term));
+            id = add(std::move(terms));
+        } else if (GiNaC::is_a<GiNaC::mul>(e)) {
+            std::vector<Id> factors;
+            for (const auto& factor : e) append_factor(factors, self(self, factor), 1);
+            id = multiply(std::move(factors));
         } else if (GiNaC::is_a<GiNaC::power>(e)) {
             const Id base = self(self, e.op(0));
             const GiNaC::ex exponent = e.op(1);
             if (exponent.info(GiNaC::info_flags::integer)) {
-                id = power(base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
+                std::vector<Id> factors;
+                append_factor(factors, base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
+                id = multiply(std::move(factors));
             } else if ((2 * exponent).info(GiNaC::info_flags::integer)) {
-                // x^(k/2) with k odd: sqrt(x) x^((k-1)/2), one root for all such powers.
-                const int k = GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int();
-                id = multiply({function(Op::sqrt, base), power(base, (k - 1) / 2)});
+                // x^(k/2) with k odd is sqrt(x)^k: one root for all such powers.
+                id = power(function(Op::sqrt, base), GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int());
             } else {
                 id = raise(base, self(self, exponent));
             }

@@ -319,11 +319,20 @@ std::string latex_name(const std::string& name) {
     else if (stem.size() > 1)
         stem = "\\mathrm{" + stem + "}";
     if (velocity) stem = "\\dot{" + stem + "}";
-    if (!subscript.empty()) {
-        std::string safe;
-        for (const char c : subscript) safe += c == '_' ? std::string("\\_") : std::string(1, c);
-        stem += "_{" + safe + "}";
+    // Subscripts of subscripts stand side by side: p_theta_left becomes p_{\theta,\mathrm{left}}.
+    std::string below;
+    for (std::size_t begin = 0; begin < subscript.size();) {
+        const std::size_t end = std::min(subscript.find('_', begin), subscript.size());
+        const std::string part = subscript.substr(begin, end - begin);
+        const auto letter = greek.find(part);
+        const bool is_word = part.find_first_of("0123456789") == std::string::npos && part.size() > 1;
+        if (!part.empty())
+            below += (below.empty() ? "" : ",") + (letter != greek.end() ? letter->second
+                                                   : is_word             ? "\\mathrm{" + part + "}"
+                                                                         : part);
+        begin = end + 1;
     }
+    if (!below.empty()) stem += "_{" + below + "}";
     return stem;
 }
 

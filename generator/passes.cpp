@@ -151,10 +151,17 @@ Id raised(Graph& graph, Id base, int exponent) {
 }
 
 Programs multiply_powers(const Programs& programs) {
-    return rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+    // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...
+    std::map<Id, std::set<int>> negative;
+    for (const Id id : programs.graph.topological(roots_of(programs)))
+        if (programs.graph[id].op == Op::power && programs.graph[id].index < 0)
+            negative[programs.graph[id].operands[0]].insert(programs.graph[id].index);
+    return rewrite(programs, [&negative](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
-        return node.op == Op::power ? raised(graph, operands.front(), node.index)
-                                    : same(graph, node, std::move(operands));
+        if (node.op != Op::power) return same(graph, node, std::move(operands));
+        if (node.index < 0 && negative[node.operands[0]].size() > 1)
+            return raised(graph, graph.raw(Op::power, {operands.front()}, -1), -node.index);
+        return raised(graph, operands.front(), node.index);
     });
 }
 
@@ -379,13 +386,16 @@ double disagreement(const std::vector<cln::cl_R>& before, const std::vector<cln:
 
 Operations count(const Graph& graph, const std::vector<Id>& nodes) {
     Operations operations;
-    std::set<Id> pairs;
+    std::map<Id, int> uses;
+    for (const Id id : nodes)
+        for (const Id operand : graph[id].operands) ++uses[operand];
     for (const Id id : nodes) {
         const Node& node = graph[id];
         if (node.stage == Stage::constant) continue;
-        // A reciprocal known earlier is hoisted: then it is a factor like others.
+        // A reciprocal known earlier is hoisted, one used twice has a name: then it is a factor like others.
         const auto is_reciprocal = [&](Id operand) {
-            return graph[operand].op == Op::power && graph[operand].index < 0 && graph[operand].stage == node.stage;
+            return graph[operand].op == Op::power && graph[operand].index < 0 && graph[operand].stage == node.stage &&
+                   uses[operand] == 1;
         };
         switch (node.op) {
             case Op::constant:

@@ -3,6 +3,7 @@
 // (docs/derivation.md).
 #include "generator/programs.hpp"
 
+#include <algorithm>
 #include <numeric>
 
 #include "generator/pipeline.hpp"
@@ -175,7 +176,10 @@ private:
         const Id force = g().negate(convert(d_.system.gradient[0].subs(d_.system.q[0] == 0)));
         // The polynomials as locals of prepare(): each is an input to what follows.
         Program prepare_map{"prepare_map", {}};
-        const auto local = [&](const std::string& name, Id value) {
+        const auto local = [&](std::string name, Id value) {
+            const auto& inputs = g().inputs();  // a parameter may have the name already
+            while (std::any_of(inputs.begin(), inputs.end(), [&](const Input& other) { return other.code == name; }))
+                name += "_";
             prepare_map.outputs.push_back({"const real " + name, value});
             return g().input({name, name, Stage::step_size});
         };

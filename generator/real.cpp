@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// Every operation runs at 60 digits and passes through `checked`.
 #include "generator/real.hpp"
 
 #include <fmt/format.h>
@@ -15,8 +16,8 @@ using GiNaC::is_a;
 using GiNaC::numeric;
 
 constexpr long digits = 60;
-constexpr int largest_magnitude =
-    4096;  // |value| <= 2^4096, about 1e1233: beyond it sin() would need millions of digits of pi
+// |value| <= 2^4096, about 1e1233; beyond it sin() would need millions of digits of pi.
+constexpr int largest_magnitude = 4096;
 
 // GiNaC keeps the number of digits in one global.
 class Precision {
@@ -34,9 +35,13 @@ std::string shown(const numeric& number) {
     return number.is_zero() ? "0" : fmt::format("{:.6g}", number.to_double());
 }
 
+[[noreturn]] void fail_beyond_bound() {
+    throw NoValue(fmt::format("a number beyond 2^{} occurs", largest_magnitude));
+}
+
 numeric bounded(const numeric& number) {
     static const numeric bound = GiNaC::pow(numeric(2), numeric(largest_magnitude));
-    if (abs(number) > bound) throw NoValue(fmt::format("a number beyond 2^{} occurs", largest_magnitude));
+    if (abs(number) > bound) fail_beyond_bound();
     return number;
 }
 
@@ -47,9 +52,9 @@ numeric checked(const Operation& operation, const std::string& description) {
     numeric result;
     try {
         result = operation();
-    } catch (const GiNaC::pole_error&) {
-        throw NoValue(description + " is not finite");
-    } catch (const std::runtime_error&) {  // overflow in CLN, division by zero
+    } catch (const NoValue&) {
+        throw;
+    } catch (const std::exception&) {  // a pole, an overflow in CLN, a division by zero
         throw NoValue(description + " is not finite");
     }
     if (!result.is_real()) throw NoValue(description + " is not a real number");
@@ -66,12 +71,12 @@ std::vector<numeric> each_operand(const ex& expression, const Visit& visit) {
 }  // namespace
 
 const std::vector<Function>& functions() {
-#define LOBATTO_FUNCTION(name)                                                                                        \
-    Function {                                                                                                        \
-#name,                                                                                                        \
-            [](const ex& x) -> ex { return GiNaC::name(x); },                                                         \
-                                                           [](const numeric& x) -> numeric { return GiNaC::name(x); } \
-    }
+    // clang-format off
+#define LOBATTO_FUNCTION(name) \
+    Function{#name, \
+             [](const ex& x) -> ex { return GiNaC::name(x); }, \
+             [](const numeric& x) -> numeric { return GiNaC::name(x); }}
+    // clang-format on
     static const std::vector<Function> all = {LOBATTO_FUNCTION(sqrt), LOBATTO_FUNCTION(sin),  LOBATTO_FUNCTION(cos),
                                               LOBATTO_FUNCTION(tan),  LOBATTO_FUNCTION(exp),  LOBATTO_FUNCTION(log),
                                               LOBATTO_FUNCTION(sinh), LOBATTO_FUNCTION(cosh), LOBATTO_FUNCTION(tanh),
@@ -117,21 +122,33 @@ numeric real_product(const std::vector<numeric>& factors) {
 numeric real_power(const numeric& base, const numeric& exponent) {
     if (base.is_zero()) {
         if (exponent.is_negative()) throw NoValue("it divides by zero");
-        return exponent.is_zero() ? 1 : 0;
+        if (exponent.is_zero()) throw NoValue("0 to the power 0 is not defined");
+        return 0;
     }
     return checked(
         [&] {
             // An exponent that happens to be whole is taken as such: (-2)^n is real for n = 3.
-            const bool small = abs(exponent) < numeric(largest_magnitude);
-            const numeric whole = small ? numeric(static_cast<long>(std::lround(exponent.to_double()))) : exponent;
+            const bool small = abs(exponent) < numeric(1'000'000'000);
+            const numeric whole = small ? numeric(std::lround(exponent.to_double())) : exponent;
             return GiNaC::pow(base, whole == exponent ? whole : exponent);
         },
         fmt::format("{} to the power {}", shown(base), shown(exponent)));
 }
 
 numeric real_function(const Function& function, const numeric& argument) {
+    // Far out CLN throws, or even answers tanh(cosh(373)) = 0; but there these functions are 0, 1, -1 or too large.
+    static const numeric far = 1'000'000;
+    if (abs(argument) > far) {
+        if (function.name == "tanh") return argument.csgn();
+        if (function.name == "exp" && argument.is_negative()) return 0;
+        if (function.name == "exp" || function.name == "sinh" || function.name == "cosh") fail_beyond_bound();
+    }
     const std::string description = fmt::format("{} of {}", function.name, shown(argument));
-    return checked([&] { return function.value(argument); }, description);
+    const numeric result = checked([&] { return function.value(argument); }, description);
+    // Next to a pole of tan, 60 digits of the argument give a large number instead of none.
+    static const numeric pole = GiNaC::pow(numeric(10), numeric(digits - 10));
+    if (function.name == "tan" && abs(result) > pole) throw NoValue(description + " is not finite");
+    return result;
 }
 
 numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {

@@ -40,7 +40,9 @@ public:
           root_(source, document_.entries, {1, 1}, "a scene",
                 {"title", "lagrangian", "coordinates", "parameters", "method", "run", "output"}) {}
 
+    // Parameters before coordinates before formulas: each formula needs the names in it.
     Scene run() {
+        scene_.source = source_;
         scene_.path = source_.path();
         scene_.name = identifier_of_file(source_.path());
         scene_.title = scene_.name;
@@ -165,6 +167,7 @@ private:
         if (entry.value.kind != Value::Kind::text)
             fail(entry.value.at,
                  fmt::format("the Lagrangian must be a formula in quotes, not {}", entry.value.kind_name()));
+        scene_.lagrangian_at = entry.value.text.at.front();
         scene_.lagrangian = parse_expression(source_, entry.value.text, {names_, "the Lagrangian", true, true}, &used_);
         scene_.lagrangian_text = collapsed(entry.value.text.value);
         for (const Coordinate& coordinate : scene_.coordinates)
@@ -226,8 +229,7 @@ private:
         if (!h.is_positive())
             fail(length.value.at, fmt::format("{} is {}; it must be positive", scope.formula, shown(h)));
         if (per_period != nullptr) {
-            const long long count =
-                integer_of(source_, *per_period, 1, most_steps, "steps_per_period must be at least 1 and at most 9e15");
+            const long long count = integer_of(source_, *per_period, 1, most_steps, "at least 1 and at most 9e15");
             scene_.run.step = scene_.run.step / GiNaC::numeric(static_cast<long>(count));
             h = h / GiNaC::numeric(static_cast<long>(count));
         }
@@ -249,9 +251,9 @@ private:
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
                           "[output]", {"every", "energy"});
         if (const Entry* every = table.find("every"))
-            scene_.outputs.every = static_cast<long>(integer_of(
-                source_, *every, 1, most_steps,
-                "every must be at least 1 and at most 9e15: each state whose step is a multiple of it is kept"));
+            scene_.outputs.every = static_cast<long>(
+                integer_of(source_, *every, 1, most_steps,
+                           "at least 1 and at most 9e15: states whose step is a multiple of it are kept"));
         if (const Entry* energy = table.find("energy")) scene_.outputs.energy = boolean_of(source_, *energy);
     }
 
@@ -265,11 +267,14 @@ private:
 
     Scope of_parameters(const std::string& formula) const { return {names_, formula, false, false}; }
 
-    // A formula whose value with the parameters of the scene must be a finite real number.
+    // A formula whose value with the parameters of the scene must be a real number that a double can hold.
     GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr) {
+        static const GiNaC::numeric largest_value = GiNaC::pow(GiNaC::numeric(10), GiNaC::numeric(300));
         const GiNaC::ex expression = parse_expression(source_, formula_of(source_, entry), scope, &used_);
         try {
             const GiNaC::numeric number = real_value(expression, parameter_values_);
+            if (!number.is_zero() && (abs(number) > largest_value || abs(number) < 1 / largest_value))
+                fail(entry.value.at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", scope.formula));
             if (value != nullptr) *value = number;
         } catch (const NoValue& error) {
             fail(entry.value.at, fmt::format("{} has no finite real value: {}", scope.formula, error.what()));

@@ -46,9 +46,11 @@ struct Outputs {
 enum class Start { velocity, momentum };
 
 struct Scene {
-    std::string path;   // as given
-    std::string name;   // stem of the file as a C identifier: pendulum
-    std::string title;  // one line
+    Source source{"", ""};   // the file, for errors found after reading
+    Position lagrangian_at;  // where the Lagrangian stands in it
+    std::string path;        // as given
+    std::string name;        // stem of the file as a C identifier: pendulum
+    std::string title;       // one line
     std::vector<Coordinate> coordinates;
     std::vector<Parameter> parameters;        // run-time parameters, in the order of the file
     std::vector<Parameter> constants;         // declared constant: already substituted everywhere

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Reading a file of input, and the layout of an error: place, message, line, caret. Nothing of a file reaches a
-// terminal raw.
+// Files of input and the layout of errors: place, message, line, caret. Nothing of a file reaches a terminal raw.
 #include "generator/source.hpp"
 
 #include <fmt/format.h>
@@ -19,8 +18,7 @@ constexpr std::size_t largest_file = 1'000'000;  // bytes
 constexpr std::size_t widest_line = 200;         // characters; longer lines are shown as a window around the caret
 constexpr std::string_view replacement = "\uFFFD";
 
-// The number of bytes of the UTF-8 code point at the front of a text, and its value; a wrong byte counts as one
-// character without a value.
+// The UTF-8 code point at the front of a text, in bytes and by value; a wrong byte is one character without a value.
 struct CodePoint {
     std::size_t length = 1;
     std::uint32_t value = 0xFFFD;

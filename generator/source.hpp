@@ -44,8 +44,8 @@ private:
 // Text of a user, safe to print: control characters, invisible marks and bytes that are not UTF-8 become U+FFFD.
 std::string printable(std::string_view text);
 bool is_printable(std::string_view text);  // nothing to replace
-std::size_t character_length(
-    std::string_view text);  // bytes of the first character (code point, or wrong byte); text is not empty
+// Bytes of the first character, a code point or a wrong byte; text is not empty.
+std::size_t character_length(std::string_view text);
 
 // A string value of a file; at[i] is where byte i of the value stands in the file (size value.size() + 1: one past the
 // end too), whatever quoting and escapes the file uses.

@@ -57,7 +57,7 @@ Structure find_structure(const System& system) {
         for (unsigned j = 0; j <= i && structure.linear; ++j)
             if (has_any(system.hessian(i, j).expand(), system.q)) {
                 structure.linear = false;
-                nonlinear = "d2V/d" + system.q[i].get_name() + " d" + system.q[j].get_name() + " = " +
+                nonlinear = "d2V/d" + system.q[i].get_name() + "d" + system.q[j].get_name() + " = " +
                             canonical_text(system.hessian(i, j)) + " depends on the position";
             }
     structure.findings.push_back(

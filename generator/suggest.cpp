@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// The nearest of some names, by the letters to change.
 #include "generator/suggest.hpp"
 
 #include <fmt/format.h>

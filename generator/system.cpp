@@ -19,36 +19,29 @@ bool depends_on(const ex& expression, const std::vector<GiNaC::symbol>& symbols)
 }
 
 [[noreturn]] void refuse(const Scene& scene, const std::string& reason) {
-    throw InputError(scene.path + ": the Lagrangian of '" + scene.title + "' cannot be treated: " + reason);
+    scene.source.fail(scene.lagrangian_at, "the Lagrangian " + reason);
 }
 
-// The determinant by fraction-free elimination, and where it vanishes a direction of the kernel.
-void require_regular(const Scene& scene, const System& system) {
+constexpr const char* treated = "; this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M";
+
+// A direction in the velocities that no kinetic energy opposes, in words: a' = -1, b' = 1.
+std::string free_direction(const System& system) {
     const unsigned n = static_cast<unsigned>(system.n);
-    if (!system.mass.determinant().normal().is_zero()) return;
-    std::string direction;
-    for (const unsigned k : {n}) {
-        GiNaC::matrix unknowns(k, 1), zero(k, 1);
-        std::vector<GiNaC::symbol> x;
-        for (unsigned i = 0; i < k; ++i) {
-            x.emplace_back("x" + std::to_string(i));
-            unknowns(i, 0) = x.back();
-        }
-        const GiNaC::matrix kernel = system.mass.solve(unknowns, zero);
-        GiNaC::exmap ones;
-        for (const auto& symbol : x) ones[symbol] = 1;
-        for (unsigned i = 0; i < k; ++i) {
-            const ex component = kernel(i, 0).subs(ones).normal();
-            if (component.is_zero()) continue;
-            if (!direction.empty()) direction += ", ";
-            direction += system.v[i].get_name() + " = " + canonical_text(component);
-        }
+    GiNaC::matrix unknowns(n, 1), zero(n, 1);
+    GiNaC::exmap ones;
+    for (unsigned i = 0; i < n; ++i) {
+        const GiNaC::symbol x;
+        unknowns(i, 0) = x;
+        ones[x] = 1;
     }
-    refuse(scene,
-           "it is degenerate: the matrix of its second derivatives in the velocities is singular, so the velocities do "
-           "not follow from the "
-           "momenta. No kinetic energy opposes the direction (" +
-               direction + "). Add the missing mass, or remove a coordinate.");
+    const GiNaC::matrix kernel = system.mass.solve(unknowns, zero);
+    std::string direction;
+    for (unsigned i = 0; i < n; ++i) {
+        const ex component = kernel(i, 0).subs(ones).normal();
+        if (component.is_zero()) continue;
+        direction += (direction.empty() ? "" : ", ") + system.v[i].get_name() + " = " + canonical_text(component);
+    }
+    return direction;
 }
 
 }  // namespace
@@ -70,25 +63,27 @@ System build_system(const Scene& scene) {
     for (unsigned i = 0; i < n; ++i) {
         const ex momentum = scene.lagrangian.diff(system.v[i]);
         const ex at_zero = momentum.subs(at_rest).expand();
+        const std::string velocity = system.v[i].get_name();
         if (!at_zero.is_zero())
-            refuse(scene, "it has the term (" + canonical_text(at_zero) + ")*" + system.v[i].get_name() +
-                              ", linear in a velocity (a magnetic or gyroscopic term); this version treats L = 1/2 "
-                              "q'^T M q' - V(q) with a constant mass matrix M.");
+            refuse(scene, "has the term (" + canonical_text(at_zero) + ")*" + velocity +
+                              ", linear in a velocity (magnetic or gyroscopic)" + treated);
         for (unsigned j = 0; j <= i; ++j) {
             const ex entry = momentum.diff(system.v[j]).expand();
-            if (depends_on(entry, system.v))
-                refuse(scene, "it is not quadratic in the velocities (d2L/d" + system.v[i].get_name() + " d" +
-                                  system.v[j].get_name() + " = " + canonical_text(entry) +
-                                  "); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
+            const std::string second =
+                "d2L/d" + velocity + "d" + system.v[j].get_name() + " = " + canonical_text(entry);
+            if (depends_on(entry, system.v)) refuse(scene, "is not quadratic in the velocities: " + second + treated);
             if (depends_on(entry, system.q))
-                refuse(scene, "its mass matrix depends on the position (d2L/d" + system.v[i].get_name() + " d" +
-                                  system.v[j].get_name() + " = " + canonical_text(entry) +
-                                  "); this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M.");
+                refuse(scene, "has a mass matrix that depends on the position: " + second + treated);
             system.mass(i, j) = entry;
             system.mass(j, i) = entry;
         }
     }
-    require_regular(scene, system);
+    if (system.mass.determinant().normal().is_zero())
+        refuse(scene,
+               "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities do not "
+               "follow from momenta. No kinetic energy "
+               "opposes the direction " +
+                   free_direction(system) + "; add the missing mass, or remove a coordinate");
 
     system.potential = -scene.lagrangian.subs(at_rest);
     system.hessian = GiNaC::matrix(n, n);

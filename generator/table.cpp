@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// Types and keys of the values in a table.
 #include "generator/table.hpp"
 
 #include <fmt/format.h>

@@ -33,8 +33,7 @@ const Text& formula_of(const Source& source, const Entry& entry);  // a number, 
 long long integer_of(const Source& source, const Entry& entry, long long least, long long most,
                      const std::string& range);
 bool boolean_of(const Source& source, const Entry& entry);
-// A title or unit: it goes into comments, tables and CSV headers as it is, so it is one line without quotes and
-// backslashes.
+// A title or unit: copied to comments, tables and CSV headers, so one line without quotes and backslashes.
 std::string label_of(const Source& source, const Entry& entry, std::size_t longest);
 
 }  // namespace lobatto

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// The characters of a formula, one after the other.
 #include "generator/token.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
+#include <iterator>
 
 namespace lobatto {
 namespace {
@@ -23,52 +24,27 @@ bool is_blank(char c) {
 }
 
 // What people paste or type by habit, and what a formula has in its place.
-constexpr std::pair<std::string_view, std::string_view> mends[] = {
-    {"−", "write - instead"},
-    {"–", "write - instead"},
-    {"—", "write - instead"},
-    {"×", "write * instead"},
-    {"·", "write * instead"},
-    {"⋅", "write * instead"},
-    {"∙", "write * instead"},
-    {"÷", "write / instead"},
-    {"∕", "write / instead"},
-    {"²", "write ^2 instead"},
-    {"³", "write ^3 instead"},
-    {"⁴", "write ^4 instead"},
-    {"½", "write 1/2 instead"},
-    {"√", "write sqrt(...)"},
-    {"π", "write pi instead"},
-    {"′", "write ' instead"},
-    {"’", "write ' instead"},
-    {"‘", "write ' instead"},
-    {"`", "write ' instead"},
-    {"´", "write ' instead"},
-    {"″", "write q' for the velocity of q"},
-    {"\"", "write q' for the velocity of q"},
-    {"\u0307", "write q' for the velocity of q"},
-    {"α", "write alpha"},
-    {"β", "write beta"},
-    {"γ", "write gamma"},
-    {"δ", "write delta"},
-    {"ε", "write epsilon"},
-    {"θ", "write theta"},
-    {"κ", "write kappa"},
-    {"λ", "write lambda"},
-    {"μ", "write mu"},
-    {"ρ", "write rho"},
-    {"σ", "write sigma"},
-    {"φ", "write phi"},
-    {"ω", "write omega"},
-    {"Ω", "write Omega"},
-    {"\u00A0", "this is a no-break space: type a plain one"},
-    {",", "decimals have a point, and every function one argument"},
-    {"[", "write ( instead"},
-    {"]", "write ) instead"},
-    {"{", "write ( instead"},
-    {"}", "write ) instead"},
-    {"=", "a formula is one side only"},
-    {"_", "a name begins with a letter"}};
+struct Mend {
+    std::string_view characters, mend;
+};
+constexpr Mend mends[] = {{"−–—", "write - instead"},
+                          {"×·⋅∙", "write * instead"},
+                          {"÷∕", "write / instead"},
+                          {"²", "write ^2 instead"},
+                          {"³", "write ^3 instead"},
+                          {"⁴", "write ^4 instead"},
+                          {"½", "write 1/2 instead"},
+                          {"√", "write sqrt(...)"},
+                          {"π", "write pi instead"},
+                          {"′’‘`´", "write ' instead"},
+                          {"″\"\u0307", "write q' for the velocity of q"},
+                          {"αβγδεζηθικλμνξρστυφχψωΓΔΘΛΞΠΣΦΨΩ", "write the name of the letter, such as alpha"},
+                          {"[{", "write ( instead"},
+                          {"]}", "write ) instead"},
+                          {",", "decimals have a point, and every function one argument"},
+                          {"=", "a formula is one side only"},
+                          {"_", "a name begins with a letter"},
+                          {"\u00A0", "this is a no-break space: type a plain one"}};
 
 class Lexer {
 public:
@@ -142,11 +118,12 @@ private:
     }
 
     [[noreturn]] void refuse_character() const {
-        const std::string_view rest = value_.substr(next_);
-        for (const auto& [character, mend] : mends)
-            if (rest.starts_with(character))
-                fail(next_, fmt::format("unexpected character '{}' in {}: {}", character, formula_, mend));
-        fail(next_, fmt::format("unexpected character '{}' in {}", rest.substr(0, character_length(rest)), formula_));
+        const std::string_view character = value_.substr(next_, character_length(value_.substr(next_)));
+        const auto found = std::find_if(std::begin(mends), std::end(mends), [&](const Mend& row) {
+            return row.characters.find(character) != std::string_view::npos;
+        });
+        const std::string mend = found == std::end(mends) ? "" : fmt::format(": {}", found->mend);
+        fail(next_, fmt::format("unexpected character '{}' in {}{}", character, formula_, mend));
     }
 
     const Source& source_;

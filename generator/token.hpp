@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// A formula cut into numbers, names and signs; every character that has no place in a formula is an error with its
-// mend.
+// A formula cut into numbers, names and signs; a character that has no place in a formula is an error with its mend.
 #pragma once
 
 #include <string>

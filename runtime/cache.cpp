@@ -12,7 +12,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <vector>
+#include <set>
 
 #include "runtime/compile.hpp"
 #include "runtime/error.hpp"
@@ -108,23 +108,33 @@ int lock_stem(const std::string& stem, bool wait) {
     }
 }
 
-void unlock_stem(const std::string& stem, int descriptor) {
+// Removes the building folders of an entry, whose lock is held.
+void remove_buildings(const fs::path& stem) {
     std::error_code ignored;
-    fs::remove_all(stem + ".building", ignored);
+    for (const auto& file : fs::directory_iterator(stem.parent_path(), ignored)) {
+        if (file.path().extension() == ".building" && file.path().stem().stem() == stem.filename()) {
+            fs::remove_all(file.path(), ignored);
+        }
+    }
+}
+
+void unlock_stem(const std::string& stem, int descriptor) {
+    remove_buildings(stem);
     ::unlink((stem + ".lock").c_str());
     ::close(descriptor);
 }
 
-// Removes what killed builders left: locks that nobody holds, and their folders.
+// Removes what killed builders left: locks that nobody holds, and building folders whose lock nobody holds.
 void sweep(const fs::path& folder) {
     std::error_code ignored;
-    std::vector<std::string> stems;
+    std::set<fs::path> stems;
     for (const auto& file : fs::directory_iterator(folder, ignored)) {
-        if (file.path().extension() == ".lock") stems.push_back((folder / file.path().stem()).string());
+        if (file.path().extension() == ".lock") stems.insert(file.path().stem());
+        if (file.path().extension() == ".building") stems.insert(file.path().stem().stem());
     }
-    for (const std::string& stem : stems) {
-        const int descriptor = lock_stem(stem, false);
-        if (descriptor >= 0) unlock_stem(stem, descriptor);
+    for (const fs::path& stem : stems) {
+        const int descriptor = lock_stem(folder / stem, false);
+        if (descriptor >= 0) unlock_stem(folder / stem, descriptor);
     }
 }
 
@@ -177,11 +187,14 @@ void write_file(const std::string& path, const std::string& content) {
 CacheEntry::CacheEntry(const std::string& name, std::string key)
     : stem_(fmt::format("{}/{}-{}", cache_folder(), name, sha256(key).substr(0, 32))), key_(std::move(key)) {}
 
+std::string CacheEntry::building_path() const {
+    return fmt::format("{}.{}.building", stem_, ::getpid());
+}
+
 bool CacheEntry::is_valid() const {
     const auto sealed_key = read_private_file(stem_ + ".key");
-    if (!sealed_key || !sealed_key->ends_with("\n" + key_)) return false;
     const auto object = read_private_file(object_path());
-    return object && seal_of(*object) + key_ == *sealed_key;
+    return sealed_key && object && *sealed_key == seal_of(*object) + key_;
 }
 
 void CacheEntry::publish(const std::string& file) const {
@@ -208,8 +221,7 @@ void CacheEntry::keep_failure() const {
 
 CacheEntry::Lock::Lock(const CacheEntry& entry) : stem_(entry.stem_), descriptor_(lock_stem(stem_, true)) {
     sweep(fs::path(stem_).parent_path());
-    std::error_code ignored;
-    fs::remove_all(entry.building_path(), ignored);
+    remove_buildings(stem_);
     if (::mkdir(entry.building_path().c_str(), 0700) != 0) {
         const int error = errno;
         unlock_stem(stem_, descriptor_);

@@ -5,8 +5,8 @@
 //     STEM.so        the object
 //     STEM.key       size and SHA-256 of the object, then the whole key text
 // and, while it is being built, of
-//     STEM.lock      locked by the builder (flock)
-//     STEM.building  the builder's folder, whose files are renamed into place
+//     STEM.lock          locked by the builder (flock)
+//     STEM.PID.building  the builder's folder, whose files are renamed into place
 // and, when its compiler failed, of
 //     STEM.failed    source, command and output of the compiler
 // A process that is killed leaves at most an unlocked .lock and a .building, which the next builder of any entry
@@ -24,7 +24,7 @@ public:
     CacheEntry(const std::string& name, std::string key);
 
     std::string object_path() const { return stem_ + ".so"; }
-    std::string building_path() const { return stem_ + ".building"; }
+    std::string building_path() const;
     std::string failed_path() const { return stem_ + ".failed"; }
 
     // Whether the object is there, belongs to exactly this key text, is whole and unaltered, and only we can write to

@@ -42,7 +42,9 @@ std::string first_lines(const std::string& output) {
         const std::size_t newline = output.find('\n', end);
         end = newline == std::string::npos ? output.size() : newline + 1;
     }
-    return output.substr(0, end) + (end < output.size() ? "[...]\n" : "");
+    std::string lines = output.substr(0, end);
+    if (!lines.empty() && lines.back() != '\n') lines += '\n';
+    return lines + (end < output.size() ? "[...]\n" : "");
 }
 
 std::string how_it_ended(const ProcessResult& result, double seconds_limit) {
@@ -79,12 +81,17 @@ Compiled compile(const Translation& translation) {
     const ProcessResult result = run_process(request);
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     if (!result.succeeded()) {
-        write_file(request.folder + "/command", command + "\n");
-        write_file(request.folder + "/output", result.output);
-        entry.keep_failure();
-        throw MachineError(fmt::format(
-            "the C++ compiler {}.\nCommand: {}\nIts output:\n{}Source, command and whole output are kept in {}",
-            how_it_ended(result, request.seconds_limit), command, first_lines(result.output), entry.failed_path()));
+        std::string kept = "Source, command and whole output are kept in " + entry.failed_path();
+        try {
+            write_file(request.folder + "/command", command + "\n");
+            write_file(request.folder + "/output", result.output);
+            entry.keep_failure();
+        } catch (const MachineError& error) {
+            kept = std::string("Nothing of this could be kept: ") + error.what();
+        }
+        throw MachineError(fmt::format("the C++ compiler {}.\nCommand: {}\nIts output:\n{}{}",
+                                       how_it_ended(result, request.seconds_limit), command, first_lines(result.output),
+                                       kept));
     }
     entry.publish(object);
     return {entry.object_path(), command, false, elapsed.count()};

@@ -43,7 +43,7 @@ struct TrajectoryResult {
     double increment_failed = 0;
     double time = 0;           // of the last good state
     std::vector<double> q, p;  // the last good state
-    double seconds = 0;        // inside the kernel
+    double seconds = 0;        // of processor time inside the kernel
     double energy_start = 0;
     double energy_error_largest =
         0;  // max over the kept states |H - H(0)|, absolute; H in double, so about |H| 2^-53 of it is rounding

@@ -41,11 +41,32 @@ struct HandwrittenPendulum {
     static real& parameter(Parameters& parameters, int i) { return i == 0 ? parameters.m : parameters.omega; }
 
     struct Coefficients {
-        real m, omega_squared, h;
+        real m, omega_squared;
+        real hc[3];       // h xi, h (1 - xi), h
+        real hb[4];       // h b
+        real inner[4];    // h^2 A, 2 x 2
+        real arrival[2];  // h^2 b (1 - c) of the inner nodes
+        real start[8];    // 2 x 4: h^2 A times the cubic through the last step's accelerations at 1 + xi and 2 - xi
     };
 
     static Status prepare(const Parameters& parameters, real h, Coefficients& k) {
-        k = {parameters.m, parameters.omega * parameters.omega, h};
+        k.m = parameters.m;
+        k.omega_squared = parameters.omega * parameters.omega;
+        for (int i = 0; i < 3; ++i) k.hc[i] = h * c[i + 1];
+        for (int i = 0; i < 4; ++i) k.hb[i] = h * b[i];
+        for (int i = 0; i < 4; ++i) k.inner[i] = h * h * A[i];
+        k.arrival[0] = h * h * (5 + root5) / 24;
+        k.arrival[1] = h * h * (5 - root5) / 24;
+        for (int j = 0; j < 4; ++j) {
+            real basis[2] = {1, 1};  // Lagrange's, of node j
+            for (int i = 0; i < 2; ++i) {
+                for (int l = 0; l < 4; ++l) {
+                    if (l != j) basis[i] *= (1 + c[i + 1] - c[l]) / (c[j] - c[l]);
+                }
+            }
+            k.start[j] = k.inner[0] * basis[0] + k.inner[1] * basis[1];
+            k.start[4 + j] = k.inner[2] * basis[0] + k.inner[3] * basis[1];
+        }
         return parameters.m != 0 ? Status::ok : Status::singular_mass;
     }
 
@@ -69,46 +90,31 @@ struct HandwrittenPendulum {
 
     // base: what is known of q_xi, q_{1-xi} and q_r before the inner accelerations are.
     static void drift(const Coefficients& k, const real* q, const real* u, const real* W0, real* v, real* base) {
-        v[0] = u[0] - k.h * b[0] * W0[0];
-        for (int i = 1; i < 4; ++i) base[i - 1] = q[0] + k.h * c[i] * v[0];
-    }
-
-    static void positions(const Coefficients& k, const real* base, const real* W, real* Q) {
-        Q[0] = base[0] - k.h * k.h * (A[0] * W[0] + A[1] * W[1]);
-        Q[1] = base[1] - k.h * k.h * (A[2] * W[0] + A[3] * W[1]);
+        v[0] = u[0] - k.hb[0] * W0[0];
+        for (int i = 0; i < 3; ++i) base[i] = q[0] + k.hc[i] * v[0];
     }
 
     static void simple_start(const Coefficients& k, const real* base, const real* W0, real* Q) {
-        const real W[2] = {W0[0], W0[0]};
-        positions(k, base, W, Q);
+        for (int i = 0; i < 2; ++i) Q[i] = base[i] - (k.inner[2 * i] + k.inner[2 * i + 1]) * W0[0];
     }
 
-    // The cubic through the last step's four accelerations, continued to the times 1 + xi and 2 - xi.
     static void extrapolated_start(const Coefficients& k, const real* base, const real* W_previous, real* Q) {
-        real W[2] = {0, 0};
         for (int i = 0; i < 2; ++i) {
-            for (int j = 0; j < 4; ++j) {
-                real basis = 1;
-                for (int l = 0; l < 4; ++l) {
-                    if (l != j) basis *= (1 + c[i + 1] - c[l]) / (c[j] - c[l]);
-                }
-                W[i] += basis * W_previous[j];
-            }
+            real sum = 0;
+            for (int j = 0; j < 4; ++j) sum += k.start[4 * i + j] * W_previous[j];
+            Q[i] = base[i] - sum;
         }
-        positions(k, base, W, Q);
     }
 
     static void residual(const Coefficients& k, const real* base, const real* Q, const real* W, real* F) {
-        real solved[2];
-        positions(k, base, W, solved);
-        for (int i = 0; i < 2; ++i) F[i] = Q[i] - solved[i];
+        for (int i = 0; i < 2; ++i) F[i] = Q[i] - base[i] + (k.inner[2 * i] * W[0] + k.inner[2 * i + 1] * W[1]);
     }
 
     static void jacobian(const Coefficients& k, const real* S, real* J) {
-        J[0] = 1 + k.h * k.h * A[0] * S[0];
-        J[1] = k.h * k.h * A[1] * S[1];
-        J[2] = k.h * k.h * A[2] * S[0];
-        J[3] = 1 + k.h * k.h * A[3] * S[1];
+        J[0] = 1 + k.inner[0] * S[0];
+        J[1] = k.inner[1] * S[1];
+        J[2] = k.inner[2] * S[0];
+        J[3] = 1 + k.inner[3] * S[1];
     }
 
     static bool correction(const Coefficients& k, const real* base, const real* Q, const real* W, const real* S,
@@ -127,11 +133,11 @@ struct HandwrittenPendulum {
     }
 
     static void arrive(const Coefficients& k, const real* base, const real* W, real* q1) {
-        q1[0] = base[2] - k.h * k.h * ((5 + root5) / 24 * W[0] + (5 - root5) / 24 * W[1]);
+        q1[0] = base[2] - (k.arrival[0] * W[0] + k.arrival[1] * W[1]);
     }
 
     static void finish(const Coefficients& k, const real* v, const real* W, const real* W1, real* u1) {
-        u1[0] = v[0] - k.h * (b[1] * W[0] + b[2] * W[1] + b[3] * W1[0]);
+        u1[0] = v[0] - (k.hb[1] * W[0] + k.hb[2] * W[1]) - k.hb[3] * W1[0];
     }
 };
 

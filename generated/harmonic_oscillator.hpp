@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// harmonic_oscillator: A harmonic oscillator.
+// Written by Lobatto from a scene file; edit the scene, not this file. Formula numbers (D..): docs/derivation.md.
+//
+// Lagrangian   L = m*q'^2/2 - m*omega^2*q^2/2
+// Method       Lobatto, 4 points: order 6, symplectic, symmetric
+// Coordinates  q[0] = q [m]
+// Structure    constant mass matrix: the second derivatives of L in the velocities are free of positions: only the
+//              interior nodes are implicit
+// Structure    diagonal mass matrix: no product of two different velocities occurs
+// Structure    linear system: every second derivative of V is free of positions: the step is one matrix, no iteration
+// Structure    solution in closed form: q'' = -w2*q with w2 = omega^2
+// Operations   47 in all, 53 as derived: 13 additions, 32 multiplications, 2 divisions, 0 functions
+#pragma once
+
+#include "kernel.hpp"
+
+namespace lobatto::kernels {
+
+struct harmonic_oscillator {
+    using real = double;
+
+    static constexpr const char* name = "harmonic_oscillator";
+    static constexpr const char* digest = "1d2c79ad22c743ee";
+    static constexpr int coordinates = 1;       // n
+    static constexpr int points = 4;            // s, nodes of a step, both ends included
+    static constexpr int order = 6;             // of accuracy in h
+    static constexpr int unknowns = 0;          // N = n (s - 2) of the stage equations; 0: none to solve
+    static constexpr bool linear = true;        // the step is an affine map
+    static constexpr int parameter_count = 2;   // in the order of the scene
+    static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
+    static constexpr int entry_row[1] = {0};
+    static constexpr int entry_column[1] = {0};
+
+    // nodes c_1 ... c_s on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1
+    static constexpr real c[4] = {0.0, 0.276393202250021, 0.7236067977499789, 1.0};
+    // weights b_1 ... b_s: 1/12; 5/12; 5/12; 1/12
+    static constexpr real b[4] = {0.08333333333333333, 0.4166666666666667, 0.4166666666666667, 0.08333333333333333};
+    // stage map A_ij over the interior nodes, row-major: 1/60; 11/120 - sqrt(5)/24; sqrt(5)/24 + 11/120; 1/60
+    static constexpr real A[4] = {0.016666666666666666, -0.0015028323958245708, 0.1848361657291579,
+        0.016666666666666666};
+
+    // Values of the scene; change them before prepare().
+    struct Parameters {
+        real m = 1.0;                    // [kg]
+        real omega = 6.283185307179586;  // [rad/s]
+    };
+    static real& parameter(Parameters& p, int index) {
+        switch (index) {
+            case 0: return p.m;
+            default: return p.omega;
+        }
+    }
+
+    // What depends on parameters and step size only, computed once by prepare().
+    struct Coefficients {
+        real m;
+        real inverse_m;      // 1/m
+        real k1;             // inverse_m/2
+        real omega_squared;  // omega*omega
+        real k2;             // m*omega_squared/2
+        real Phi[6];  // rows q1, p1; columns q, p, shift
+    };
+
+    // Values of stage parameter and step size.
+    static Status prepare(const Parameters& p, real h, Coefficients& k) {
+        k.m = p.m;
+        k.inverse_m = 1.0 / p.m;
+        k.k1 = 0.5 * k.inverse_m;
+        k.omega_squared = p.omega * p.omega;
+        k.k2 = 0.5 * p.m * k.omega_squared;
+        const real pivot_1 = p.m;
+        const real z = k.omega_squared * (h * h);
+        const real delta = 1.0 + z * (0.03333333333333333 + 0.0005555555555555556 * z);
+        const real a = 1.0 + z * (z * (0.025555555555555557 - 0.0002777777777777778 * z) - 0.4666666666666667);
+        const real b = z * (z * (0.13333333333333333 + z * (2.3148148148148147e-05 * z - 0.0033333333333333335)) - 1.0);
+        const real c = 1.0 + z * (0.0033333333333333335 * z - 0.13333333333333333);
+        const real t1 = 1.0 / delta;
+        k.Phi[0] = t1 * a;
+        k.Phi[1] = k.inverse_m * h * t1 * c;
+        k.Phi[2] = 0.0;
+        k.Phi[3] = p.m * t1 * b / h;
+        k.Phi[4] = k.Phi[0];
+        k.Phi[5] = k.Phi[2];
+        if (pivot_1 == real(0)) return Status::singular_mass;
+        if (!lobatto::is_finite(k.m, k.inverse_m, k.k1, k.omega_squared, k.k2, k.Phi[0], k.Phi[1], k.Phi[2], k.Phi[3],
+            k.Phi[4], k.Phi[5])) return Status::not_finite;
+        return Status::ok;
+    }
+
+    // (D3) Hamiltonian H(q, p) = p^T M^-1 p / 2 + V(q); q, p: n.
+    static real energy(const Coefficients& k, const real* q, const real* p) {
+        return k.k1 * (p[0] * p[0]) + k.k2 * (q[0] * q[0]);
+    }
+
+    // (D2) p = dL/dq' = M q'; n each.
+    static void momentum(const Coefficients& k, const real* velocity, real* p) {
+        p[0] = k.m * velocity[0];
+    }
+
+    // (D2) q' = M^-1 p; n each.
+    static void velocity(const Coefficients& k, const real* p, real* velocity) {
+        velocity[0] = k.inverse_m * p[0];
+    }
+
+    // (D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, entry_column.
+    static void node(const Coefficients& k, const real* q, real* W, real* S) {
+        W[0] = k.omega_squared * q[0];
+        S[0] = k.omega_squared;
+    }
+
+    // (D1) W = M^-1 grad V(q) alone; n.
+    static void acceleration(const Coefficients& k, const real* q, real* W) {
+        W[0] = k.omega_squared * q[0];
+    }
+
+    // (D20) The whole step: (q1, p1) = Phi (q, p) + shift, the columns of Phi being q, p and the shift.
+    static void propagate(const Coefficients& k, const real* q, const real* p, real* q1, real* p1) {
+        q1[0] = q[0] * k.Phi[0] + p[0] * k.Phi[1];
+        p1[0] = q[0] * k.Phi[3] + p[0] * k.Phi[4];
+    }
+};
+
+}  // namespace lobatto::kernels

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+// pendulum: A plane pendulum.
+// Written by Lobatto from a scene file; edit the scene, not this file. Formula numbers (D..): docs/derivation.md.
+//
+// Lagrangian   L = m*q'^2/2 - m*omega^2*(1 - cos(q))
+// Method       Lobatto, 4 points: order 6, symplectic, symmetric
+// Coordinates  q[0] = q [rad]
+// Structure    constant mass matrix: the second derivatives of L in the velocities are free of positions: only the
+//              interior nodes are implicit
+// Structure    diagonal mass matrix: no product of two different velocities occurs
+// Structure    solution in closed form: q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2
+// Operations   123 in all, 143 as derived: 42 additions, 76 multiplications, 2 divisions, 3 functions
+#pragma once
+
+#include "kernel.hpp"
+
+namespace lobatto::kernels {
+
+struct pendulum {
+    using real = double;
+
+    static constexpr const char* name = "pendulum";
+    static constexpr const char* digest = "ed161bafe8952f14";
+    static constexpr int coordinates = 1;       // n
+    static constexpr int points = 4;            // s, nodes of a step, both ends included
+    static constexpr int order = 6;             // of accuracy in h
+    static constexpr int unknowns = 2;          // N = n (s - 2) of the stage equations; 0: none to solve
+    static constexpr bool linear = false;       // the step is an affine map
+    static constexpr int parameter_count = 2;   // in the order of the scene
+    static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
+    static constexpr int entry_row[1] = {0};
+    static constexpr int entry_column[1] = {0};
+
+    // nodes c_1 ... c_s on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1
+    static constexpr real c[4] = {0.0, 0.276393202250021, 0.7236067977499789, 1.0};
+    // weights b_1 ... b_s: 1/12; 5/12; 5/12; 1/12
+    static constexpr real b[4] = {0.08333333333333333, 0.4166666666666667, 0.4166666666666667, 0.08333333333333333};
+    // stage map A_ij over the interior nodes, row-major: 1/60; 11/120 - sqrt(5)/24; sqrt(5)/24 + 11/120; 1/60
+    static constexpr real A[4] = {0.016666666666666666, -0.0015028323958245708, 0.1848361657291579,
+        0.016666666666666666};
+
+    // Values of the scene; change them before prepare().
+    struct Parameters {
+        real m = 1.0;                    // [kg m^2]
+        real omega = 6.283185307179586;  // [rad/s]
+    };
+    static real& parameter(Parameters& p, int index) {
+        switch (index) {
+            case 0: return p.m;
+            default: return p.omega;
+        }
+    }
+
+    // What depends on parameters and step size only, computed once by prepare().
+    struct Coefficients {
+        real m;
+        real h;
+        real inverse_m;      // 1/m
+        real k1;             // inverse_m/2
+        real omega_squared;  // omega*omega
+        real k2;             // m*omega_squared
+        real h_b1;           // h/12
+        real h_c2;           // (1/2 - sqrt(5)/10)*h
+        real h_c3;           // (sqrt(5)/10 + 1/2)*h
+        real h2_A2;          // (13/120 - sqrt(5)/24)*(h*h)
+        real h2_A3;          // (sqrt(5)/24 + 13/120)*(h*h)
+        real k3;             // (-(sqrt(5)/20 - 7/60))*(h*h)
+        real h2_AE22;        // (29*sqrt(5)/120 - 21/40)*(h*h)
+        real k4;             // (-(3/10 - 3*sqrt(5)/20))*(h*h)
+        real h2_AE24;        // (9/20 - 11*sqrt(5)/60)*(h*h)
+        real k5;             // (-(-sqrt(5)/20 - 7/60))*(h*h)
+        real h2_AE32;        // (3*sqrt(5)/20 + 3/10)*(h*h)
+        real k6;             // (-(-29*sqrt(5)/120 - 21/40))*(h*h)
+        real h2_AE34;        // (11*sqrt(5)/60 + 9/20)*(h*h)
+        real h2_A22;         // (h*h)/60
+        real h2_A23;         // (11/120 - sqrt(5)/24)*(h*h)
+        real h2_A32;         // (sqrt(5)/24 + 11/120)*(h*h)
+        real k7;             // (-(11/120 - sqrt(5)/24)*(sqrt(5)/24 + 11/120))*((h*h)*(h*h))
+        real h2_d2;          // (sqrt(5)/24 + 5/24)*(h*h)
+        real h2_d3;          // (5/24 - sqrt(5)/24)*(h*h)
+        real h_b2;           // 5*h/12
+    };
+
+    // Values of stage parameter and step size.
+    static Status prepare(const Parameters& p, real h, Coefficients& k) {
+        k.m = p.m;
+        k.h = h;
+        k.inverse_m = 1.0 / p.m;
+        k.k1 = 0.5 * k.inverse_m;
+        k.omega_squared = p.omega * p.omega;
+        k.k2 = p.m * k.omega_squared;
+        k.h_b1 = 0.08333333333333333 * h;
+        k.h_c2 = 0.276393202250021 * h;
+        k.h_c3 = 0.7236067977499789 * h;
+        const real t1 = h * h;
+        k.h2_A2 = 0.015163834270842096 * t1;
+        k.h2_A3 = 0.20150283239582456 * t1;
+        k.k3 = 0.004863267791677182 * t1;
+        k.h2_AE22 = 0.015383094562449177 * t1;
+        k.k4 = 0.03541019662496846 * t1;
+        k.h2_AE24 = 0.04005420412503856 * t1;
+        k.k5 = 0.22847006554165616 * t1;
+        k.h2_AE32 = 0.6354101966249684 * t1;
+        k.k6 = 1.0653830945624492 * t1;
+        k.h2_AE34 = 0.8599457958749614 * t1;
+        k.h2_A22 = 0.016666666666666666 * t1;
+        k.h2_A23 = -0.0015028323958245708 * t1;
+        k.h2_A32 = 0.1848361657291579 * t1;
+        k.k7 = 0.0002777777777777778 * (t1 * t1);
+        k.h2_d2 = 0.3015028323958246 * t1;
+        k.h2_d3 = 0.11516383427084209 * t1;
+        k.h_b2 = 0.4166666666666667 * h;
+        const real pivot_1 = p.m;
+        if (pivot_1 == real(0)) return Status::singular_mass;
+        if (!lobatto::is_finite(k.m, k.h, k.inverse_m, k.k1, k.omega_squared, k.k2, k.h_b1, k.h_c2, k.h_c3, k.h2_A2,
+            k.h2_A3, k.k3, k.h2_AE22, k.k4, k.h2_AE24, k.k5, k.h2_AE32, k.k6, k.h2_AE34, k.h2_A22, k.h2_A23, k.h2_A32,
+            k.k7, k.h2_d2, k.h2_d3, k.h_b2)) return Status::not_finite;
+        return Status::ok;
+    }
+
+    // (D3) Hamiltonian H(q, p) = p^T M^-1 p / 2 + V(q); q, p: n.
+    static real energy(const Coefficients& k, const real* q, const real* p) {
+        return k.k1 * (p[0] * p[0]) + k.k2 * (1.0 - lobatto::cos(q[0]));
+    }
+
+    // (D2) p = dL/dq' = M q'; n each.
+    static void momentum(const Coefficients& k, const real* velocity, real* p) {
+        p[0] = k.m * velocity[0];
+    }
+
+    // (D2) q' = M^-1 p; n each.
+    static void velocity(const Coefficients& k, const real* p, real* velocity) {
+        velocity[0] = k.inverse_m * p[0];
+    }
+
+    // (D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, entry_column.
+    static void node(const Coefficients& k, const real* q, real* W, real* S) {
+        real sin_q, cos_q;
+        lobatto::sincos(q[0], sin_q, cos_q);
+        W[0] = k.omega_squared * sin_q;
+        S[0] = k.omega_squared * cos_q;
+    }
+
+    // (D1) W = M^-1 grad V(q) alone; n.
+    static void acceleration(const Coefficients& k, const real* q, real* W) {
+        W[0] = k.omega_squared * lobatto::sin(q[0]);
+    }
+
+    // (D11) v = u - h b_1 W0 and base_i = q + h c_i v, i = 2 ... s, node-major.
+    static void drift(const Coefficients& k, const real* q, const real* u, const real* W0, real* v, real* base) {
+        const real t1 = u[0] - k.h_b1 * W0[0];
+        v[0] = t1;
+        base[0] = q[0] + k.h_c2 * t1;
+        base[1] = q[0] + k.h_c3 * t1;
+        base[2] = q[0] + k.h * t1;
+    }
+
+    // (D14) First guess with constant acceleration: Q_i = base_i - h^2 (sum_j A_ij) W0.
+    static void simple_start(const Coefficients& k, const real* base, const real* W0, real* Q) {
+        Q[0] = base[0] - k.h2_A2 * W0[0];
+        Q[1] = base[1] - k.h2_A3 * W0[0];
+    }
+
+    // (D15) First guess from the polynomial through the accelerations of the step before (s nodes): Q_i = base_i - h^2
+    //     sum_j (A E)_ij W_before_j.
+    static void extrapolated_start(const Coefficients& k, const real* base, const real* W_before, real* Q) {
+        Q[0] = base[0] + k.k3 * W_before[0] - k.h2_AE22 * W_before[1] + k.k4 * W_before[2] - k.h2_AE24 * W_before[3];
+        Q[1] = base[1] + k.k5 * W_before[0] - k.h2_AE32 * W_before[1] + k.k6 * W_before[2] - k.h2_AE34 * W_before[3];
+    }
+
+    // (D12) Interior discrete Euler-Lagrange equations, solved form: F_i = Q_i - base_i + h^2 sum_j A_ij W_j; N.
+    static void residual(const Coefficients& k, const real* base, const real* Q, const real* W, real* F) {
+        F[0] = Q[0] - base[0] + k.h2_A22 * W[0] + k.h2_A23 * W[1];
+        F[1] = Q[1] - base[1] + k.h2_A32 * W[0] + k.h2_A22 * W[1];
+    }
+
+    // (D13) J = dF/dQ = I + h^2 A (x) S; N x N, row-major.
+    static void jacobian(const Coefficients& k, const real* S, real* J) {
+        J[0] = 1.0 + k.h2_A22 * S[0];
+        J[1] = k.h2_A23 * S[1];
+        J[2] = k.h2_A32 * S[0];
+        J[3] = 1.0 + k.h2_A22 * S[1];
+    }
+
+    // (D14) Newton's correction delta = -J^-1 F; false when J is singular.
+    static bool correction(const Coefficients& k, const real* base, const real* Q, const real* W, const real* S, real*
+                           delta) {
+        const real t1 = 1.0 + k.h2_A22 * S[0];
+        const real t2 = 1.0 + k.h2_A22 * S[1];
+        const real inverse_determinant = 1.0 / (k.k7 * S[0] * S[1] + t1 * t2);
+        const real t3 = Q[1] - base[1] + k.h2_A32 * W[0] + k.h2_A22 * W[1];
+        const real t4 = Q[0] - base[0] + k.h2_A22 * W[0] + k.h2_A23 * W[1];
+        delta[0] = inverse_determinant * (k.h2_A23 * S[1] * t3 - t4 * t2);
+        delta[1] = inverse_determinant * (k.h2_A32 * S[0] * t4 - t3 * t1);
+        return lobatto::is_finite(inverse_determinant);
+    }
+
+    // The accelerations at Q + delta, to first order: W_j += S_j delta_j.
+    static void carry(const Coefficients&, const real* S, const real* delta, real* W) {
+        W[0] = W[0] + S[0] * delta[0];
+        W[1] = W[1] + S[1] * delta[1];
+    }
+
+    // (D16) q1 = base_s - h^2 sum_j b_j (1 - c_j) W_j.
+    static void arrive(const Coefficients& k, const real* base, const real* W, real* q1) {
+        q1[0] = base[2] - k.h2_d2 * W[0] - k.h2_d3 * W[1];
+    }
+
+    // (D17) u1 = v - h sum_j b_j W_j - h b_s W1, with u = M^-1 p.
+    static void finish(const Coefficients& k, const real* v, const real* W, const real* W1, real* u1) {
+        u1[0] = (v[0] - k.h_b1 * W1[0]) - k.h_b2 * W[0] - k.h_b2 * W[1];
+    }
+};
+
+}  // namespace lobatto::kernels

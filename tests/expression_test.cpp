@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Formulas: what they mean exactly, and what is said of each mistake, word for word.
+#include "generator/expression.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+
+using GiNaC::ex;
+using GiNaC::numeric;
+using GiNaC::Pi;
+
+namespace {
+
+const GiNaC::symbol m("m"), omega("omega"), q("q"), velocity("q'");
+
+lobatto::Scope scope_of_a_lagrangian() {
+    using Role = lobatto::Name::Role;
+    return {{{"m", {m, Role::parameter}},
+             {"omega", {omega, Role::parameter}},
+             {"q", {q, Role::position}},
+             {"q'", {velocity, Role::velocity}}},
+            "the Lagrangian",
+            true,
+            true};
+}
+
+// A formula that is a whole file of one line.
+ex parse(const std::string& formula, const lobatto::Scope& scope = scope_of_a_lagrangian(),
+         std::map<std::string, bool>* used = nullptr) {
+    lobatto::Text text{formula, {}};
+    lobatto::Position here;
+    for (std::size_t i = 0; i <= formula.size(); ++i) {
+        const bool inside_character = i < formula.size() && (static_cast<unsigned char>(formula[i]) & 0xC0) == 0x80;
+        if (inside_character) --here.column;
+        text.at.push_back(here);
+        ++here.column;
+    }
+    return lobatto::parse_expression(lobatto::Source("formula", formula), text, scope, used);
+}
+
+std::string error_of(const std::string& formula, const lobatto::Scope& scope = scope_of_a_lagrangian()) {
+    try {
+        parse(formula, scope);
+    } catch (const lobatto::InputError& error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+std::string layout(const std::string& formula, int column, const std::string& message) {
+    return "formula:1:" + std::to_string(column) + ": " + message + "\n  1 | " + formula + "\n    | " +
+           std::string(static_cast<std::size_t>(column - 1), ' ') + "^";
+}
+
+void check_error(const std::string& formula, int column, const std::string& message) {
+    CHECK(error_of(formula) == layout(formula, column, message));
+}
+
+std::string repeated(const std::string& piece, int times) {
+    std::string text;
+    for (int i = 0; i < times; ++i) text += piece;
+    return text;
+}
+
+}  // namespace
+
+TEST_CASE("numbers are exact") {
+    CHECK(parse("0.1").is_equal(numeric(1, 10)));
+    CHECK(parse("1.5e-3").is_equal(numeric(3, 2000)));
+    CHECK(parse("2E2").is_equal(200));
+    CHECK(parse(".5").is_equal(numeric(1, 2)));
+    CHECK(parse("007").is_equal(7));
+    CHECK(parse("1/3 + 1/6").is_equal(numeric(1, 2)));
+    CHECK(parse("sqrt(5)^2").is_equal(5));
+    CHECK(parse("sin(pi/6)").is_equal(numeric(1, 2)));
+    CHECK(parse("2*pi").is_equal(2 * Pi));
+}
+
+TEST_CASE("operators bind as in mathematics") {
+    CHECK(parse("-q^2").is_equal(-pow(q, 2)));
+    CHECK(parse("2^-1").is_equal(numeric(1, 2)));
+    CHECK(parse("2^3^2").is_equal(512));
+    CHECK(parse("2^-2^2").is_equal(numeric(1, 16)));
+    CHECK(parse("1 - 2 - 3").is_equal(-4));
+    CHECK(parse("12/2/3").is_equal(2));
+    CHECK(parse("12/2*3").is_equal(18));
+    CHECK(parse("2*-q").is_equal(-2 * q));
+    CHECK(parse("--q - +q").is_zero());
+    CHECK(parse("(q + 1)*2").is_equal(2 * q + 2));
+    CHECK(parse("m*q'^2/2 - m*omega^2*(1 - cos(q))")
+              .is_equal(m * pow(velocity, 2) / 2 - m * pow(omega, 2) * (1 - cos(q))));
+}
+
+TEST_CASE("every function of the grammar means GiNaC's function of that name") {
+    CHECK(parse("sqrt(q)").is_equal(sqrt(q)));
+    CHECK(parse("sin(q)").is_equal(sin(q)));
+    CHECK(parse("cos(q)").is_equal(cos(q)));
+    CHECK(parse("tan(q)").is_equal(tan(q)));
+    CHECK(parse("exp(q)").is_equal(exp(q)));
+    CHECK(parse("log(q)").is_equal(log(q)));
+    CHECK(parse("sinh(q)").is_equal(sinh(q)));
+    CHECK(parse("cosh(q)").is_equal(cosh(q)));
+    CHECK(parse("tanh(q)").is_equal(tanh(q)));
+    CHECK(parse("asin(q)").is_equal(asin(q)));
+    CHECK(parse("acos(q)").is_equal(acos(q)));
+    CHECK(parse("atan(q)").is_equal(atan(q)));
+}
+
+TEST_CASE("the names that occur are collected, even where they cancel") {
+    std::map<std::string, bool> used;
+    parse("0*m + q'^2", scope_of_a_lagrangian(), &used);
+    CHECK(used == std::map<std::string, bool>{{"m", true}, {"q'", true}});
+}
+
+TEST_CASE("missing operators and parentheses are named with their mend") {
+    check_error("2q", 2, "missing operator: write 2*q");
+    check_error("q omega", 3, "missing operator: write q*omega");
+    check_error("m(q + 1)", 2, "missing operator: write m*(");
+    check_error("(q)(q)", 4, "missing operator: write )*(");
+    check_error("2e", 2, "missing operator: write 2*e");
+    check_error("sin q", 1, "sin needs parentheses: write sin(q)");
+    check_error("2*cos", 3, "cos needs parentheses: write cos(...)");
+    check_error("sin^2(q)", 4, "write sin(...)^2 instead of sin^2(...)");
+    check_error("m*(q + 1", 3, "this ( is not closed: add a )");
+    check_error("(q + 1))", 8, "this ) closes nothing: remove it, or add a ( before it");
+    check_error("()", 2, "nothing stands between ( and )");
+}
+
+TEST_CASE("incomplete formulas are named where they break off") {
+    check_error("", 1, "the Lagrangian is empty");
+    check_error("  ", 3, "the Lagrangian is empty");
+    check_error("q +", 4, "the Lagrangian ends after '+': a number, a name or ( is missing");
+    check_error("q*/m", 3, "a number, a name or ( is missing before '/'");
+    check_error("*q", 1, "a number, a name or ( is missing before '*'");
+    check_error("1.2.3", 1, "'1.2.3' is not a number: it has too many points");
+    check_error("q**2", 2, "'**' is not an operator: write ^ for powers");
+}
+
+TEST_CASE("unknown names come with the declared ones and the nearest") {
+    check_error("omgea^2", 1,
+                "unknown name 'omgea' in the Lagrangian; declared: m, omega, q, q'. Did you mean 'omega'?");
+    check_error("ome*q", 1, "unknown name 'ome' in the Lagrangian; declared: m, omega, q, q'. Did you mean 'omega'?");
+    check_error("xyz", 1, "unknown name 'xyz' in the Lagrangian; declared: m, omega, q, q'.");
+    check_error("ln(q)", 1,
+                "unknown function 'ln' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, tanh, "
+                "asin, acos, atan. Write log.");
+    check_error("coss(q)", 1,
+                "unknown function 'coss' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, "
+                "tanh, asin, acos, atan. Did you mean 'cos'?");
+}
+
+TEST_CASE("primes belong to coordinates, one each") {
+    check_error("m*q''", 5, "q'' is an acceleration; a Lagrangian has positions and velocities only");
+    check_error("m'", 1, "m is a parameter and has no velocity; only coordinates have one");
+    check_error("2'", 2, "a prime ' belongs directly after the name of a coordinate");
+    check_error("q '", 3, "a prime ' belongs directly after the name of a coordinate");
+}
+
+TEST_CASE("characters of word processors come with what to type instead") {
+    check_error("q − 1", 3, "unexpected character '−' in the Lagrangian: write - instead");
+    check_error("m × q", 3, "unexpected character '×' in the Lagrangian: write * instead");
+    check_error("m·q", 2, "unexpected character '·' in the Lagrangian: write * instead");
+    check_error("q²", 2, "unexpected character '²' in the Lagrangian: write ^2 instead");
+    check_error("2*π", 3, "unexpected character 'π' in the Lagrangian: write pi instead");
+    check_error("q′", 2, "unexpected character '′' in the Lagrangian: write ' instead");
+    check_error("0,5", 2,
+                "unexpected character ',' in the Lagrangian: decimals have a point, and every function one argument");
+    check_error("q & m", 3, "unexpected character '&' in the Lagrangian");
+    CHECK(error_of("é + \x1b[31m") == layout("é + \uFFFD[31m", 1, "unexpected character 'é' in the Lagrangian"));
+    CHECK(error_of("\xff") == layout("\uFFFD", 1, "unexpected character '\uFFFD' in the Lagrangian"));
+}
+
+TEST_CASE("what has no finite real value is refused where it stands") {
+    check_error("q/0", 2, "division by zero in the Lagrangian");
+    check_error("1/(q - q)", 2, "division by zero in the Lagrangian");
+    check_error("1/(sqrt(2)*sqrt(3) - sqrt(6))", 2, "division by zero in the Lagrangian");
+    check_error("1/(sin(1)^2 + cos(1)^2 - 1)", 2, "division by zero in the Lagrangian");
+    check_error("0^-1", 2, "division by zero in the Lagrangian");
+    check_error("m*log(0)", 3, "the Lagrangian has no finite real value here: log of 0 is not finite");
+    check_error("sqrt(-1)", 1, "the Lagrangian has no finite real value here: sqrt of -1 is not a real number");
+    check_error("(-8)^(1/3)", 5,
+                "the Lagrangian has no finite real value here: -8 to the power 0.333333 is not a real number");
+    check_error("acos(2)", 1, "the Lagrangian has no finite real value here: acos of 2 is not a real number");
+    check_error("tan(pi/2)", 1, "the Lagrangian has no finite real value here: tan of 1.5708 is not finite");
+    check_error("(q - q)^0", 8, "the Lagrangian has no finite real value here: 0 to the power 0 is not defined");
+    check_error("0^q", 2, "0 to a power that is not a number");
+    check_error("sin(exp(exp(20)))", 5, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");
+}
+
+TEST_CASE("functions keep their value far out") {
+    CHECK(parse("1/tanh(cosh(373))").is_equal(1 / tanh(cosh(ex(373)))));  // CLN answers 0 for this tanh
+    CHECK(parse("1/tanh(-10^100)").is_equal(1 / tanh(-pow(ex(10), 100))));
+    CHECK(parse("1 + exp(-10^30)").is_equal(1 + exp(-pow(ex(10), 30))));
+    check_error("cosh(-10^30)", 1, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");
+}
+
+TEST_CASE("sizes are bounded before anything large is computed") {
+    const std::string number = "an exact number of more than 4096 bits (about 1228 digits) occurs here";
+    check_error("9^9^9", 2, number);
+    check_error("2^99999", 2, number);
+    check_error("(-2)^99999", 5, number);
+    check_error("1e999999", 1, number);
+    check_error("1e99999999999999999999", 1, number);
+    check_error("(3^2000*q)^64", 11, number);
+    check_error("1/(2^4000+1) + 1/(2^4000+3)", 14, number);
+    check_error("(q + 1)^64^2", 8, "the exponent is beyond 64; write the formula with smaller powers");
+    check_error("(q^64)^64", 7, "an exponent beyond 64; write the formula with smaller powers");
+    CHECK(parse("2^4000").is_equal(pow(numeric(2), numeric(4000))));
+    CHECK(parse("q^-64").is_equal(pow(q, -64)));
+    CHECK(parse("q^(3/2)").is_equal(pow(q, numeric(3, 2))));
+    CHECK(parse("(-1)^99999").is_equal(-1));
+}
+
+TEST_CASE("nesting of 200 is read, of 201 and of 200,000 refused") {
+    const std::string message =
+        "the Lagrangian is nested more than 200 deep; write it with fewer parentheses and powers";
+    CHECK(parse(repeated("(", 199) + "q" + repeated(")", 199)).is_equal(q));
+    CHECK(error_of(repeated("(", 200) + "q" + repeated(")", 200)).find(message) != std::string::npos);
+    CHECK(error_of(repeated("(", 90000)).find(message) != std::string::npos);
+    CHECK(error_of(repeated("q^", 40000)).find(message) != std::string::npos);
+    CHECK(error_of(repeated("sin(", 20000)).find(message) != std::string::npos);
+    CHECK(parse(repeated("-", 90000) + "q").is_equal(q));
+    CHECK(error_of(repeated("(", 200000))
+              .starts_with("formula:1:1: the Lagrangian has 200000 characters; at most 100000 are read\n"));
+}
+
+TEST_CASE("an initial value is made of parameters and numbers") {
+    lobatto::Scope scope = scope_of_a_lagrangian();
+    scope.formula = "the initial position of q";
+    scope.velocities_allowed = scope.positions_allowed = false;
+    CHECK(parse("2*m", scope).is_equal(2 * m));
+    CHECK(error_of("2*q", scope) ==
+          layout("2*q", 3,
+                 "the coordinate q cannot occur in the initial position of q: write it with numbers and parameters"));
+    CHECK(error_of("q'", scope) ==
+          layout("q'", 1,
+                 "the velocity q' cannot occur in the initial position of q: write it with numbers and parameters"));
+    CHECK(error_of("k", scope) == layout("k", 1, "unknown name 'k' in the initial position of q; declared: m, omega."));
+}
+
+TEST_CASE("a long line is shown as a window around the caret") {
+    const std::string text = repeated("q+", 300) + "?" + repeated("+q", 300);
+    CHECK(error_of(text) == "formula:1:601: unexpected character '?' in the Lagrangian\n  1 | ..." +
+                                repeated("q+", 50) + "?" + repeated("+q", 49) + "+...\n    | " + repeated(" ", 103) +
+                                "^");
+}

@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Scene files: what is read from the two scenes of the project, and what is said of each mistake, word for word.
+#include "generator/scene.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+
+using GiNaC::ex;
+using GiNaC::numeric;
+using GiNaC::Pi;
+using lobatto::InputError;
+using lobatto::Scene;
+using lobatto::Source;
+using lobatto::Start;
+
+namespace {
+
+// A scene of ten lines; each mistake changes one of them.
+const std::string oscillator =
+    "lagrangian = \"m*q'^2/2 - k*q^2/2\"\n"
+    "[coordinates]\n"
+    "q = { position = 1, velocity = 0 }\n"
+    "[parameters]\n"
+    "m = 1\n"
+    "k = 4\n"
+    "[run]\n"
+    "step = 0.1\n"
+    "until = 10\n";
+
+std::string with_line(int number, const std::string& replacement) {
+    std::string text;
+    std::size_t begin = 0;
+    for (int line = 1; begin < oscillator.size(); ++line) {
+        const std::size_t end = oscillator.find('\n', begin) + 1;
+        text += line == number ? replacement + "\n" : oscillator.substr(begin, end - begin);
+        begin = end;
+    }
+    return text;
+}
+
+Scene read(const std::string& text) {
+    return lobatto::read_scene(Source("some/oscillator.toml", text));
+}
+
+std::string error_of(const std::string& text) {
+    try {
+        read(text);
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+std::string line_of(const std::string& text, int line) {
+    std::size_t begin = 0;
+    for (int i = 1; i < line; ++i) begin = text.find('\n', begin) + 1;
+    return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+// The error of the oscillator with one line replaced: its place, its text, the line and the caret.
+void check_error(int changed, const std::string& replacement, lobatto::Position at, const std::string& message) {
+    const std::string text = with_line(changed, replacement);
+    const std::string line = std::to_string(at.line);
+    CHECK(error_of(text) == "some/oscillator.toml:" + line + ":" + std::to_string(at.column) + ": " + message + "\n" +
+                                std::string(3 - line.size(), ' ') + line + " | " + line_of(text, at.line) + "\n    | " +
+                                std::string(static_cast<std::size_t>(at.column - 1), ' ') + "^");
+}
+
+std::string scene_path(const std::string& name) {
+    return std::string(LOBATTO_SOURCE_DIR) + "/scenes/" + name;
+}
+
+}  // namespace
+
+TEST_CASE("the pendulum scene is the paper's pendulum") {
+    const Scene scene = lobatto::read_scene(scene_path("pendulum.toml"));
+    CHECK(scene.name == "pendulum");
+    CHECK(scene.title == "A plane pendulum");
+    REQUIRE(scene.coordinates.size() == 1);
+    REQUIRE(scene.parameters.size() == 2);
+    const ex q = scene.coordinates[0].position, v = scene.coordinates[0].velocity;
+    const ex m = scene.parameters[0].symbol, omega = scene.parameters[1].symbol;
+    CHECK((scene.lagrangian - (m * pow(v, 2) / 2 - m * pow(omega, 2) * (1 - cos(q)))).expand().is_zero());
+    CHECK(scene.lagrangian_text == "m*q'^2/2 - m*omega^2*(1 - cos(q))");
+    CHECK(scene.coordinates[0].unit == "rad");
+    CHECK(scene.parameters[0].value.is_equal(1));
+    CHECK(scene.parameters[1].value.is_equal(2 * Pi));
+    CHECK(scene.initial_position[0].is_equal(Pi / 2));
+    CHECK(scene.initial_rate[0].is_zero());
+    CHECK(scene.start == Start::velocity);
+    CHECK(scene.method.points == 4);
+    CHECK(scene.run.step.is_equal(numeric(1, 20)));
+    CHECK(scene.run.until.is_equal(120));
+    CHECK(scene.outputs.every == 1);
+    CHECK(scene.outputs.energy);
+}
+
+TEST_CASE("the oscillator scene starts with a momentum and steps by a fraction of its period") {
+    const Scene scene = lobatto::read_scene(scene_path("harmonic_oscillator.toml"));
+    const ex omega = scene.parameters.at(1).symbol;
+    CHECK(scene.name == "harmonic_oscillator");
+    CHECK(scene.start == Start::momentum);
+    CHECK(scene.run.step.is_equal(Pi / 10 / omega));
+    CHECK(abs(scene.evaluate(scene.run.step, "the step") - numeric(1, 20)) < pow(numeric(10), -58));
+    // Another omega than the scene's: a step of pi / 10.
+    CHECK(abs(scene.evaluate(scene.run.step - Pi / 10, "the step", {1, 1})) < pow(numeric(10), -58));
+}
+
+TEST_CASE("the example and the error of docs/scene_format.md are true") {
+    const std::string page = Source::read(std::string(LOBATTO_SOURCE_DIR) + "/docs/scene_format.md").content();
+    const auto block = [&](const std::string& kind) {
+        const std::size_t begin = page.find("```" + kind + "\n") + kind.size() + 4;
+        return page.substr(begin, page.find("```", begin) - begin);
+    };
+    const Scene scene = read(block("toml"));
+    CHECK(scene.title == "Two masses on springs");
+    CHECK(scene.coordinates.size() == 2);
+    CHECK(scene.parameters.size() == 3);
+    CHECK(scene.constants.size() == 1);
+    // ten periods of twenty steps
+    CHECK(abs(scene.evaluate(scene.run.until / scene.run.step, "the number of steps") - 200) < pow(numeric(10), -50));
+    try {
+        lobatto::read_scene(Source("pendulum.toml",
+                                   "\n\n\nlagrangian = \"m*q'^2/2 - m*omgea^2*(1 - cos(q))\"\n[coordinates]\n"
+                                   "q = { position = 1, velocity = 0 }\n[parameters]\nm = 1\nomega = 1\n"));
+        FAIL("read");
+    } catch (const InputError& error) {
+        CHECK(error.what() + std::string("\n") == block("text"));
+    }
+}
+
+TEST_CASE("names keep the order of the file, whatever their alphabet") {
+    const Scene scene = read(
+        "lagrangian = \"z'^2 + a'^2 + b'^2 - w*c*y*z\"\n"
+        "run = { step = 1, until = 0 }\n"
+        "[parameters]\nw = 1\nc = 2\ny = 3\n"
+        "[coordinates]\n"
+        "z = { position = 1, velocity = 0 }\n"
+        "a = { position = 2, velocity = 0 }\n"
+        "[coordinates.b]\nposition = 3\nvelocity = 0\n");
+    CHECK(scene.coordinates[0].name + scene.coordinates[1].name + scene.coordinates[2].name == "zab");
+    CHECK(scene.parameters[0].name + scene.parameters[1].name + scene.parameters[2].name == "wcy");
+    CHECK(scene.initial_position[2].is_equal(3));
+}
+
+TEST_CASE("decimal numbers of TOML are exact, and constants are substituted") {
+    const Scene scene = read(with_line(5, "m = { value = 1_0.1, constant = true, unit = \"kg\" }"));
+    REQUIRE(scene.constants.size() == 1);
+    CHECK(scene.constants[0].value.is_equal(numeric(101, 10)));
+    CHECK(scene.constants[0].unit == "kg");
+    REQUIRE(scene.parameters.size() == 1);
+    CHECK_FALSE(scene.lagrangian.has(scene.constants[0].symbol));
+    CHECK(scene.lagrangian.coeff(scene.coordinates[0].velocity, 2).is_equal(numeric(101, 20)));
+    CHECK(read(with_line(8, "step = 1e-1")).run.step.is_equal(numeric(1, 10)));
+    CHECK(read(with_line(5, "m = 0x1F")).parameters[0].value.is_equal(31));
+}
+
+TEST_CASE("what is left out has its default") {
+    const Scene scene = read(oscillator);
+    CHECK(scene.title == "oscillator");
+    CHECK(scene.method.points == 4);
+    CHECK(scene.outputs.every == 1);
+    CHECK(scene.outputs.energy);
+    CHECK(scene.coordinates[0].unit.empty());
+}
+
+TEST_CASE("a name of a file becomes a C identifier") {
+    const auto name_of = [](const std::string& path) { return lobatto::read_scene(Source(path, oscillator)).name; };
+    CHECK(name_of("a/b/three-body (new).toml") == "three_body_new_");
+    CHECK(name_of("3body.toml") == "scene_3body");
+    CHECK(name_of("") == "scene_");
+}
+
+TEST_CASE("a Lagrangian of several lines knows the place of every character") {
+    const std::string lagrangian = "lagrangian = \"\"\"\n  m*q'^2/2 \\\n     - \\u006b*q^2/2\n  %\"\"\"";
+    CHECK(error_of(with_line(1, lagrangian)) ==
+          "some/oscillator.toml:4:3: unexpected character '%' in the Lagrangian\n"
+          "  4 |   %\"\"\"\n"
+          "    |   ^");
+    const std::string correct = "lagrangian = '''\r\nm*q'^2/2\r\n\t- k*q^2/2'''";
+    CHECK(read(with_line(1, correct)).lagrangian_text == "m*q'^2/2 - k*q^2/2");
+}
+
+TEST_CASE("mistakes of TOML come with their place") {
+    check_error(1, "lagrangian = m*q'^2/2", {1, 14},
+                "not valid TOML: value: could not determine value type; a formula must stand in quotes");
+    check_error(6, "k = 2*pi", {6, 6},
+                "not valid TOML: decimal integer: expected digit, saw '*'; a formula must stand in quotes");
+    check_error(6, "m = 2", {6, 5}, "not valid TOML: key-value pair: cannot redefine existing integer 'm'");
+    check_error(6, "ω = 2", {6, 1}, "not valid TOML: 'ω' cannot stand outside quotes and comments");
+    check_error(6, "k = nan", {6, 5}, "inf and nan are not numbers a scene can use; write a finite number");
+    check_error(6, "k = [4]", {6, 5}, "a list: no value of a scene is one");
+    check_error(6, "k = 1979-05-27  # a date", {6, 5}, "a date or time: no value of a scene is one");
+    check_error(7, "[[run]]", {7, 1}, "a list of tables: each table of a scene occurs once; write [name]");
+    check_error(7, "[+run]", {7, 1}, "not valid TOML: the name of a table must follow [, for example [run]");
+    CHECK(error_of(with_line(6, "k = \"\xff\"")) ==
+          "some/oscillator.toml:6:6: this byte is not UTF-8; save the file with the encoding UTF-8\n"
+          "  6 | k = \"\uFFFD\"\n"
+          "    |      ^");
+    std::string key = "k";
+    for (int i = 0; i < 100000; ++i) key += ".k";
+    CHECK(error_of(with_line(6, key + " = 1"))
+              .starts_with("some/oscillator.toml:6:32: a key of more than 16 parts; keys of a scene have at most 3\n"));
+}
+
+TEST_CASE("unknown and missing keys are named") {
+    check_error(8, "stpe = 0.1", {8, 1},
+                "unknown key 'stpe' in [run]; known: step, steps_per_period, period, until. Did you mean 'step'?");
+    check_error(3, "q = { position = 1, velocty = 0 }", {3, 21},
+                "unknown key 'velocty' in coordinate q; known: unit, position, velocity, momentum. "
+                "Did you mean 'velocity'?");
+    check_error(3, "q = { velocity = 0 }", {3, 1},
+                "coordinate q has no position: add its initial position, for example position = 1");
+    check_error(3, "q = { position = 1 }", {3, 1},
+                "coordinate q has no initial velocity or momentum; add velocity = 0 or momentum = 0");
+    check_error(3, "q = { position = 1, velocity = 0, momentum = 0 }", {3, 35},
+                "coordinate q has both a velocity and a momentum; keep one");
+    check_error(3, "q = { position = 1, velocity = 0 }\nx = { position = 1, momentum = 0 }", {4, 21},
+                "coordinate x starts with a momentum and the ones before with a velocity; give the same for all");
+    check_error(3, "", {2, 2}, "a scene needs a coordinate; add a line such as q = { position = 1, velocity = 0 }");
+    check_error(8, "", {7, 2}, "[run] has no step; add step = 0.05, or steps_per_period and period");
+    check_error(8, "step = 0.1\nsteps_per_period = 10", {9, 1}, "[run] has both step and steps_per_period; keep one");
+    check_error(8, "steps_per_period = 10", {7, 2},
+                "[run] has no period: add the period that has these steps, for example period = \"2*pi/omega\"");
+    check_error(8, "step = 0.1\nperiod = 1", {9, 1}, "period goes with steps_per_period; with step it has no meaning");
+    check_error(9, "", {7, 2}, "[run] has no until: add the end time, for example until = 10");
+    check_error(1, "", {1, 1},
+                "a scene has no lagrangian: add lagrangian = \"...\", the kinetic minus the potential energy");
+}
+
+TEST_CASE("values of the wrong type are named") {
+    check_error(1, "lagrangian = 3", {1, 14}, "the Lagrangian must be a formula in quotes, not a whole number");
+    check_error(1, "title = 3", {1, 9}, "title must be a text in quotes, not a whole number");
+    check_error(3, "q = 1", {3, 5}, "q must be a table such as q = { position = 1, velocity = 0 }, not a whole number");
+    check_error(5, "m = true", {5, 5}, "m must be a number or a formula in quotes, not true or false");
+    check_error(5, "m = { value = 1, constant = 1 }", {5, 29}, "constant must be true or false, not a whole number");
+    check_error(9, "until = 1\n[output]\nevery = 1.5", {11, 9}, "every must be a whole number, not a number");
+    check_error(9, "until = 1\n[output]\nevery = 0", {11, 9},
+                "every is 0; at least 1 and at most 9e15: states whose step is a multiple of it are kept");
+    check_error(9, "until = 1\n[method]\npoints = 6", {11, 10}, "points is 6; there is Lobatto with 2 to 5 points");
+    check_error(9, "until = 1\n[method]\nfamily = \"gauss\"", {11, 10}, "unknown family; there is \"lobatto\"");
+    check_error(3, "q = { unit = \"a\\\\b\", position = 1, velocity = 0 }", {3, 14},
+                "unit must be one line without control characters, quotes and backslashes");
+}
+
+TEST_CASE("names that are taken are refused") {
+    check_error(5, "q = 1", {3, 1}, "'q' is both a parameter and a coordinate; rename one");
+    check_error(5, "h = 1", {5, 1}, "'h' is the time step; give the parameter another name");
+    check_error(3, "t = { position = 1, velocity = 0 }", {3, 1}, "'t' is the time; give the coordinate another name");
+    check_error(5, "pi = 3", {5, 1}, "'pi' is the number 3.14159...; give the parameter another name");
+    check_error(5, "sin = 3", {5, 1}, "'sin' is the name of a function; give the parameter another name");
+    check_error(5, "_m = 3", {5, 1},
+                "'_m' cannot be the name of a parameter: names are letters, digits and single underscores, and begin "
+                "with a letter");
+}
+
+TEST_CASE("names that are never used are refused") {
+    check_error(6, "k = 4\nlength = 2", {7, 1}, "parameter length occurs in no formula; use it or remove it");
+    check_error(3, "q = { position = 1, velocity = 0 }\nx = { position = 1, velocity = 0 }", {1, 14},
+                "the Lagrangian is degenerate: the velocity x' of coordinate x does not occur in it; add the kinetic "
+                "energy of x, or remove the coordinate");
+    CHECK(read(with_line(9, "until = \"late\"\n[parameters.late]\nvalue = 3")).parameters.size() == 3);
+}
+
+TEST_CASE("initial values, parameters, step and end time are finite real numbers") {
+    check_error(3, "q = { position = \"q\", velocity = 0 }", {3, 19},
+                "the coordinate q cannot occur in the initial position of q: write it with numbers and parameters");
+    check_error(3, "q = { position = 1, velocity = \"sqrt(1 - k)\" }", {3, 32},
+                "the initial velocity of q has no finite real value: -3 to the power 0.5 is not a real number");
+    check_error(3, "q = { position = \"1/(k - 4)\", velocity = 0 }", {3, 18},
+                "the initial position of q has no finite real value: it divides by zero");
+    check_error(6, "k = \"2*m\"", {6, 8},
+                "unknown name 'm' in the value of k: only numbers, pi and functions of them may stand here");
+    check_error(6, "k = \"log(0)\"", {6, 6}, "the value of k has no finite real value here: log of 0 is not finite");
+    check_error(6, "k = \"10^301\"", {6, 5}, "the value of k must be 0, or of a size between 1e-300 and 1e300");
+    check_error(8, "step = 0", {8, 8}, "the step is 0; it must be positive");
+    check_error(8, "step = \"1 - k\"", {8, 8}, "the step is -3; it must be positive");
+    check_error(8, "steps_per_period = 0\nperiod = 1", {8, 20}, "steps_per_period is 0; at least 1 and at most 9e15");
+    check_error(9, "until = -1", {9, 9}, "the end time is -1; it must not be negative: a run starts at time 0");
+    check_error(9, "until = 1e15", {9, 9},
+                "the run has 1e+16 steps; at most 9e15: make until smaller or the step larger");
+}
+
+TEST_CASE("an expression that has no value with other parameters says whose it is") {
+    const Scene scene = read(oscillator);
+    try {
+        scene.evaluate(1 / (scene.parameters[1].symbol - 5), "the period", {1, 5});
+        FAIL("evaluated");
+    } catch (const InputError& error) {
+        CHECK(std::string(error.what()) ==
+              "some/oscillator.toml: the period has no finite real value: it divides by zero");
+    }
+}
+
+TEST_CASE("a file that cannot be read is named with the reason") {
+    const auto error_of_path = [](const std::string& path) {
+        try {
+            lobatto::read_scene(path);
+        } catch (const InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string("no error");
+    };
+    CHECK(error_of_path("no/such\x1b.toml") == "no/such\uFFFD.toml: cannot read the scene: there is no such file");
+    CHECK(error_of_path(LOBATTO_SOURCE_DIR) == LOBATTO_SOURCE_DIR ": cannot read the scene: it is a directory");
+    CHECK(error_of(std::string(1000001, ' ')) ==
+          "some/oscillator.toml: the file has 1000001 bytes; a scene has at most 1000000");
+}
+
+TEST_CASE("64 coordinates and 1000 parameters are read, one more is refused") {
+    const auto scene_of = [](int coordinates, int parameters) {
+        std::string lagrangian = "0", entries, values;
+        for (int k = 0; k < coordinates; ++k) {
+            lagrangian += "+q" + std::to_string(k) + "'^2";
+            entries += "q" + std::to_string(k) + " = { position = 0, velocity = 0 }\n";
+        }
+        for (int k = 0; k < parameters; ++k) {
+            lagrangian += "+a" + std::to_string(k) + "*q0";
+            values += "a" + std::to_string(k) + " = 1\n";
+        }
+        return "lagrangian = \"" + lagrangian + "\"\n[run]\nstep = 1\nuntil = 1\n[coordinates]\n" + entries +
+               "[parameters]\n" + values;
+    };
+    CHECK(read(scene_of(64, 1000)).coordinates.size() == 64);
+    CHECK(error_of(scene_of(65, 0)).starts_with("some/oscillator.toml:5:2: 65 coordinates; at most 64\n"));
+    CHECK(error_of(scene_of(1, 1001)).starts_with("some/oscillator.toml:7:2: 1001 parameters; at most 1000\n"));
+}

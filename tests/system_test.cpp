@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Lagrangians taken apart: what is found, what is refused and in which words.
+#include "generator/system.hpp"
+
+#include <doctest/doctest.h>
+
+#include "generator/notation.hpp"
+#include "generator/structure.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+Scene scene_of(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters = "") {
+    return read_scene(Source("scene.toml", "title = \"test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" +
+                                               coordinates + (parameters.empty() ? "" : "[parameters]\n" + parameters) +
+                                               "[run]\nstep = 0.1\nuntil = 1\n"));
+}
+
+const std::string one = "q = { position = 1, velocity = 0 }\n";
+const std::string two = "a = { position = 1, velocity = 0 }\nb = { position = 0, velocity = 0 }\n";
+
+std::string refusal(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters = "") {
+    try {
+        build_system(scene_of(lagrangian, coordinates, parameters));
+    } catch (const InputError& error) {
+        const std::string text = error.what();
+        return text.substr(0, text.find('\n'));
+    }
+    return "accepted";
+}
+
+const Finding& finding(const Structure& structure, const std::string& name) {
+    for (const Finding& f : structure.findings)
+        if (f.name == name) return f;
+    throw std::runtime_error("no finding " + name);
+}
+
+}  // namespace
+
+TEST_CASE("the mass matrix and the potential are read off a Lagrangian with inertial coupling") {
+    const Scene scene = scene_of("m*(a' + b')^2/2 + 3*b'^2/2 - a^2*b - cos(b)", two, "m = 2\n");
+    const System system = build_system(scene);
+    const GiNaC::ex m = system.parameters[0], a = system.q[0], b = system.q[1];
+    CHECK(system.mass(0, 0).is_equal(m));
+    CHECK(system.mass(0, 1).is_equal(m));
+    CHECK((system.mass(1, 1) - m - 3).expand().is_zero());
+    CHECK((system.potential - GiNaC::pow(a, 2) * b - GiNaC::cos(b)).expand().is_zero());
+    CHECK((system.gradient[0] - 2 * a * b).expand().is_zero());
+    CHECK((system.gradient[1] - GiNaC::pow(a, 2) + GiNaC::sin(b)).expand().is_zero());
+    CHECK((system.hessian(0, 1) - 2 * a).expand().is_zero());
+    CHECK((system.hessian(1, 1) + GiNaC::cos(b)).expand().is_zero());
+}
+
+TEST_CASE("Lagrangians outside the class are refused with the term that is in the way") {
+    CHECK(refusal("q^2*q'^2/2", one) ==
+          "scene.toml:2:15: the Lagrangian has a mass matrix that depends on the position: d2L/dq'dq' = q^2; this "
+          "version treats "
+          "L = 1/2 q'^T M q' - V(q) with a constant mass matrix M");
+    CHECK(refusal("q'^2/2 - q'^4/8 - q^2", one) ==
+          "scene.toml:2:15: the Lagrangian is not quadratic in the velocities: d2L/dq'dq' = 1 - 3*q'^2/2; this version "
+          "treats "
+          "L = 1/2 q'^T M q' - V(q) with a constant mass matrix M");
+    CHECK(refusal("(a'^2 + b'^2)/2 + w*(a*b' - b*a')", two, "w = 1\n") ==
+          "scene.toml:2:15: the Lagrangian has the term (-b*w)*a', linear in a velocity (magnetic or gyroscopic); this "
+          "version treats "
+          "L = 1/2 q'^T M q' - V(q) with a constant mass matrix M");
+}
+
+TEST_CASE("a degenerate Lagrangian is refused with the direction that no kinetic energy opposes") {
+    CHECK(refusal("m*(a' + b')^2/2 - a^2 - b^2", two, "m = 1\n") ==
+          "scene.toml:2:15: the Lagrangian is degenerate: its second derivatives in the velocities form a singular "
+          "matrix, so velocities do not "
+          "follow from momenta. No kinetic energy opposes the direction a' = -1, b' = 1; add the missing mass, or "
+          "remove a coordinate");
+}
+
+TEST_CASE("a quadratic potential makes a linear system, any other does not") {
+    CHECK(find_structure(build_system(scene_of("q'^2/2 - 3*q^2 + q", one))).linear);
+    const Structure quartic = find_structure(build_system(scene_of("q'^2/2 - q^4", one)));
+    CHECK_FALSE(quartic.linear);
+    CHECK(finding(quartic, "linear system").reason == "d2V/dqdq = 12*q^2 depends on the position");
+    CHECK(find_structure(build_system(scene_of("q'^2/2 - (1 + q)^2 + (q - 1)*(q + 2)", one))).linear);
+}
+
+TEST_CASE("closed solutions are recognised, and only where they hold") {
+    const auto closed = [](const std::string& lagrangian, const std::string& parameters = "") {
+        return find_structure(build_system(scene_of(lagrangian, one, parameters))).closed_solution;
+    };
+    const auto pendulum = closed("m*l^2*q'^2/2 + m*g*l*cos(q)", "m = 2\nl = 3\ng = 9\n");
+    REQUIRE(pendulum.has_value());
+    CHECK(pendulum->kind == ClosedSolution::Kind::pendulum);
+    CHECK(canonical_text(pendulum->omega_squared) == "g/l");
+    const auto spring = closed("m*q'^2/2 - k*q^2/2", "m = 2\nk = 3\n");
+    REQUIRE(spring.has_value());
+    CHECK(spring->kind == ClosedSolution::Kind::harmonic);
+    CHECK(canonical_text(spring->omega_squared) == "k/m");
+    CHECK_FALSE(closed("q'^2/2 + cos(2*q)").has_value());
+    CHECK_FALSE(closed("q'^2/2 - q^2 + q").has_value());
+    CHECK_FALSE(closed("q'^2/2 + cos(q) - q^2").has_value());
+}
+
+TEST_CASE("only second derivatives that are not identically zero become entries") {
+    const auto entries = [](const std::string& lagrangian) {
+        return find_structure(build_system(scene_of(lagrangian, two))).entries;
+    };
+    using Entries = std::vector<std::pair<int, int>>;
+    CHECK(entries("(a'^2 + b'^2)/2 - a^4 - cos(b)") == Entries{{0, 0}, {1, 1}});
+    CHECK(entries("(a'^2 + b'^2)/2 - a*b") == Entries{{0, 1}, {1, 0}});
+    CHECK(entries("(a'^2 + b'^2)/2 - b^4") == Entries{{1, 1}});
+    // A mass matrix that couples spreads each column of V'' over all rows.
+    CHECK(entries("(a'^2 + a'*b' + b'^2)/2 - b^4") == Entries{{0, 1}, {1, 1}});
+}
