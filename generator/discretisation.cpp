@@ -116,16 +116,39 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
         d.full_system.push_back(equation);
         d.full_unknowns.push_back(d.Q[s - 1][k]);
     }
-    const auto jacobian = [](const std::vector<ex>& system_of, const std::vector<GiNaC::symbol>& unknowns) {
-        GiNaC::matrix result(static_cast<unsigned>(system_of.size()), static_cast<unsigned>(unknowns.size()));
-        for (unsigned i = 0; i < result.rows(); ++i)
-            for (unsigned j = 0; j < result.cols(); ++j) result(i, j) = system_of[i].diff(unknowns[j]);
-        return result;
+    const auto index = [](std::size_t i) { return static_cast<unsigned>(i); };
+    const auto second = [&](std::size_t i, std::size_t k, std::size_t l) {  // V'' at node i
+        return at(system.hessian(index(k), index(l)), d.Q[i]);
     };
-    d.full_jacobian = jacobian(d.full_system, d.full_unknowns);
+    const auto S = [&](std::size_t i, std::size_t k, std::size_t l) {  // (M^-1 V'')_kl at node i
+        ex sum = 0;
+        for (std::size_t r = 0; r < n; ++r) sum += inverse_mass(index(k), index(r)) * second(i, r, l);
+        return sum;
+    };
+    d.full_jacobian = GiNaC::matrix(index(n * s), index(n * s));
+    for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t momentum = n * m + k, position = n * (m + 1) + k;  // rows; the columns are in the same order
+        d.full_jacobian(index(momentum), index(momentum)) = 1;
+        d.full_jacobian(index(position), index(position)) = 1;
+        for (std::size_t i = 0; i < m; ++i) {
+            d.full_jacobian(index(i * n + k), index(i * n + k)) = 1;
+            d.full_jacobian(index(i * n + k), index(position)) = -c[i + 1];
+        }
+        for (std::size_t l = 0; l < n; ++l) {
+            d.full_jacobian(index(position), index(n * m + l)) = -h / 2 * inverse_mass(index(k), index(l));
+            for (std::size_t j = 1; j < s; ++j) {
+                const unsigned column = index(j + 1 < s ? (j - 1) * n + l : n * (m + 1) + l);
+                const ex entry = S(j, k, l);
+                d.full_jacobian(index(momentum), column) += h * b[j] * second(j, k, l);
+                d.full_jacobian(index(position), column) -= h * h * b[j] * (c[j] - GiNaC::numeric(1, 2)) * entry;
+                if (j + 1 < s)
+                    for (std::size_t i = 0; i < m; ++i)
+                        d.full_jacobian(index(i * n + k), column) -= h * h * G(i, j - 1) * b[j] * entry;
+            }
+        }
+    }
 
     // (D11) v = M^-1 (p0 - h b_0 grad V(q0));  (D12) the reduced system;  (D13) its Jacobian;  (D16, D17) arrival.
-    std::vector<GiNaC::symbol> interior_unknowns;
     for (std::size_t k = 0; k < n; ++k) {
         ex v = -h * b[0] * W(0, k);
         for (std::size_t l = 0; l < n; ++l)
@@ -137,9 +160,17 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
             ex equation = d.Q[i + 1][k] - d.Q[0][k] - h * c[i + 1] * d.drift_velocity[k];
             for (std::size_t j = 0; j < m; ++j) equation += h * h * A(i, j) * W(j + 1, k);
             d.reduced_system.push_back(equation);
-            interior_unknowns.push_back(d.Q[i + 1][k]);
         }
-    if (m > 0) d.reduced_jacobian = jacobian(d.reduced_system, interior_unknowns);
+    d.reduced_jacobian = GiNaC::matrix(index(n * m), index(n * m));
+    for (std::size_t j = 0; j < m; ++j)
+        for (std::size_t k = 0; k < n; ++k) {
+            d.reduced_jacobian(index(j * n + k), index(j * n + k)) += 1;
+            for (std::size_t l = 0; l < n; ++l) {
+                const ex entry = S(j + 1, k, l);
+                for (std::size_t i = 0; i < m; ++i)
+                    d.reduced_jacobian(index(i * n + k), index(j * n + l)) += h * h * A(i, j) * entry;
+            }
+        }
     for (std::size_t k = 0; k < n; ++k) {
         ex position = d.Q[0][k] + h * d.drift_velocity[k];
         ex momentum = d.p0[k];

@@ -67,6 +67,7 @@ struct Input {
     std::string code;  // q[0]
     std::string name;  // theta
     Stage stage = Stage::iterate;
+    double start = 0.5;  // near this value the formulas are real, as far as is known
 };
 
 // Decimal digits of every computation on constants.

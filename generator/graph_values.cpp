@@ -83,6 +83,8 @@ cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         case Op::atan:
             return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
         case Op::raise:
+            if (const cln::cl_I whole = cln::round1(x[1]); whole == x[1] && cln::abs(whole) <= 4096)
+                return apply(Op::power, cln::cl_I_to_int(whole), {x[0]});  // real for a negative base too
             if (!cln::plusp(x[0])) throw DomainError("real power of a number that is not positive");
             return cln::exp(real(x[1]) * cln::ln(real(x[0])));
         case Op::constant:

@@ -54,11 +54,14 @@ public:
           s_(static_cast<std::size_t>(derivation.quadrature.points)) {
         for (std::size_t i = 0; i < d_.scene.parameters.size(); ++i) {
             const std::string& name = d_.scene.parameters[i].name;
-            symbols_[d_.system.parameters[i]] = g().input({identifier(name), name, Stage::parameter});
+            const double value = start_of(d_.scene.parameters[i].value, "the parameter " + name);
+            symbols_[d_.system.parameters[i]] = g().input({identifier(name), name, Stage::parameter, value});
         }
         h_ = g().input({"h", "h", Stage::step_size});
         for (std::size_t k = 0; k < n_; ++k) {
-            q_.push_back(g().input({at("q", k), d_.scene.coordinates[k].name, Stage::step}));
+            const std::string& name = d_.scene.coordinates[k].name;
+            const double value = start_of(d_.scene.initial_position[k], "the initial position of " + name);
+            q_.push_back(g().input({at("q", k), name, Stage::step, value}));
             symbols_[d_.system.q[k]] = q_.back();
         }
         for (std::size_t k = 0; k < n_; ++k)
@@ -82,6 +85,9 @@ public:
 
 private:
     Graph& g() { return p_.graph; }
+    double start_of(const GiNaC::ex& value, const std::string& what) const {
+        return d_.scene.evaluate(value, what).to_double();
+    }
     static std::string at(const std::string& array, std::size_t index) {
         return array + "[" + std::to_string(index) + "]";
     }

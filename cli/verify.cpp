@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto verify: everything that can be checked of a scene without a paper, from the quadrature to the running kernel.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.hpp"
+#include "cli/kernel_of.hpp"
+#include "generator/check.hpp"
+#include "runtime/convergence.hpp"
+#include "runtime/diagnostics.hpp"
+#include "runtime/error.hpp"
+#include "runtime/promises.hpp"
+#include "runtime/symmetry.hpp"
+#include "runtime/trajectory.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct VerifyOptions {
+    std::string scene;
+    std::optional<int> points;
+};
+
+struct Row {
+    std::string claim, measured, bound;
+    bool holds = false;
+    std::string meaning;  // of a failure
+};
+
+std::string number(double x) {
+    return fmt::format("{:.2g}", x);
+}
+
+Row row_of(const Check& check) {
+    return {check.claim, check.exact ? (check.holds ? "0" : "not 0") : number(check.measured),
+            check.exact ? "exact" : number(check.bound), check.holds, check.meaning};
+}
+
+Row at_most(const std::string& claim, double measured, double bound, const std::string& meaning) {
+    return {claim, number(measured), number(bound), measured <= bound, meaning};
+}
+
+// A value of 60 digits in quadruple precision: the sum of its first three doubles.
+__float128 quadruple(GiNaC::numeric value) {
+    __float128 sum = 0;
+    for (int part = 0; part < 3; ++part) {
+        const double leading = value.to_double();
+        sum += leading;
+        value -= GiNaC::numeric(leading);
+    }
+    return sum;
+}
+
+// The scene's start for a kernel of either precision.
+struct Start60 {
+    std::vector<GiNaC::numeric> parameters, q, rate;
+    GiNaC::numeric step;
+    bool from_velocity = false;
+
+    explicit Start60(const Scene& scene) : from_velocity(scene.start == Start::velocity) {
+        for (const Parameter& parameter : scene.parameters)
+            parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name));
+        for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
+            const std::string& name = scene.coordinates[k].name;
+            q.push_back(scene.evaluate(scene.initial_position[k], "the initial position of " + name));
+            rate.push_back(
+                scene.evaluate(scene.initial_rate[k],
+                               (from_velocity ? "the initial velocity of " : "the initial momentum of ") + name));
+        }
+        step = scene.evaluate(scene.run.step, "the step");
+        if (!step.is_positive())
+            throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
+    }
+};
+
+template <class real>
+struct Start {
+    std::vector<real> parameters, q, p;
+    real step;
+};
+
+template <class real, class Convert>
+Start<real> start_in(const Start60& start, const Kernel& kernel, const Convert& convert) {
+    const auto all = [&](const std::vector<GiNaC::numeric>& values) {
+        std::vector<real> converted;
+        for (const GiNaC::numeric& value : values) converted.push_back(convert(value));
+        return converted;
+    };
+    Start<real> result{all(start.parameters), all(start.q), all(start.rate), convert(start.step)};
+    Stepper<real> stepper(kernel);
+    const lobatto_status status = stepper.prepare(result.parameters, result.step);
+    if (status != LOBATTO_OK)
+        throw ComputationError(status == LOBATTO_SINGULAR_MASS
+                                   ? "the mass matrix has no inverse for the scene's parameters"
+                                   : "the kernel's coefficients are not finite for the scene's parameters and step");
+    if (start.from_velocity) result.p = stepper.momentum(result.q, result.p);
+    return result;
+}
+
+constexpr std::int64_t short_run = 1000, long_run = 20000;  // steps
+
+// The states at each hundredth step of a short run, as far as it goes.
+std::vector<std::pair<std::vector<double>, std::vector<double>>> states_along(const Kernel& kernel,
+                                                                              const Start<double>& start) {
+    std::vector<std::pair<std::vector<double>, std::vector<double>>> states;
+    TrajectoryRequest request;
+    request.parameters = start.parameters;
+    request.q = start.q;
+    request.p = start.p;
+    request.step = start.step;
+    request.steps = short_run;
+    request.every = short_run / 10;
+    const std::size_t n = start.q.size();
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) {
+            const double* const row = records.rows + i * records.columns + 1;
+            states.push_back({{row, row + n}, {row + n, row + 2 * n}});
+        }
+    };
+    const TrajectoryResult result = integrate(kernel, request);
+    if (result.steps_done == 0) throw ComputationError(explain_stop(result, request));
+    states.pop_back();  // a step that fails may come after the last
+    return states;
+}
+
+template <class real>
+double worst_defect(const Kernel& kernel, const Start<real>& start,
+                    const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states) {
+    Stepper<real> stepper(kernel);
+    stepper.prepare(start.parameters, start.step);
+    real worst = 0;
+    for (const auto& [q, p] : states) {
+        const real defect = symplectic_defect<real>(stepper, {q.begin(), q.end()}, {p.begin(), p.end()});
+        if (!(defect <= worst)) worst = defect;
+    }
+    return static_cast<double>(worst);
+}
+
+// Over as many steps as rounding allows to say something.
+template <class real>
+Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& precision) {
+    Return result;
+    for (std::int64_t steps = short_run; steps > 0; steps /= 2) {
+        result = there_and_back(kernel, start.parameters, start.q, start.p, start.step, steps);
+        if (result.rounding < 1e-6) break;
+    }
+    Row row = at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
+                      "the step is not its own inverse with -h");
+    if (!(result.rounding < 1e-6)) {
+        row.holds = false;
+        row.meaning = "rounding swamps even one step; the step is too long for this motion";
+    }
+    return row;
+}
+
+void momenta(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start, const Scene& scene) {
+    std::vector<std::string> names;
+    for (const Coordinate& coordinate : scene.coordinates) names.push_back(coordinate.name);
+    const auto symmetries = find_symmetries(kernel, start.parameters, start.q, start.step, names);
+    if (symmetries.empty()) rows.push_back({"no linear symmetry, no momentum to conserve", "none found", "", true, ""});
+    std::vector<Row> found;
+    double worst = 0, bound = 0;
+    const std::string meaning = "the momentum that belongs to this symmetry is not conserved";
+    for (const Symmetry& symmetry : symmetries) {
+        const auto [steps, variation] =
+            momentum_variation(kernel, symmetry, start.parameters, start.q, start.p, start.step, short_run);
+        worst = std::max(worst, variation);
+        bound = 8 * 0x1p-53 * static_cast<double>(steps);  // each step rounds a few times, at worst always the same way
+        found.push_back(at_most(symmetry.kind + ": " + symmetry.momentum, variation, bound, meaning));
+    }
+    constexpr std::size_t most_rows = 6;
+    if (found.size() > most_rows)
+        found = {at_most(fmt::format("momenta of {} linear symmetries", found.size()), worst, bound, meaning)};
+    rows.insert(rows.end(), found.begin(), found.end());
+}
+
+void energy(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start) {
+    const EnergyDrift drift = energy_drift(kernel, start.parameters, start.q, start.p, start.step, long_run);
+    const std::string claim = fmt::format("energy drift in {} steps", drift.steps);
+    if (!drift.bounded) {
+        rows.push_back({claim, "motion unbounded", "not judged", true, ""});
+        return;
+    }
+    // A steady drift moves the mean by half the swing.
+    rows.push_back(
+        at_most(claim, drift.drift, drift.swing / 4 + drift.rounding, "the energy drifts: its error grows with time"));
+}
+
+Row order(const Convergence& convergence, const Kernel& kernel) {
+    const bool holds = bears_out(convergence, kernel->order, kernel->linear != 0);
+    const std::string bound = fmt::format("{} {}", kernel->linear ? "at least" : "about", kernel->order);
+    return {"order of convergence", convergence.exact ? "exact" : fmt::format("{:.2f}", convergence.order), bound,
+            holds, "the error of this motion does not shrink with the step as the method's order says"};
+}
+
+void print(const std::vector<Row>& rows, const Convergence& convergence) {
+    std::size_t widest = 0;
+    for (const Row& row : rows) widest = std::max(widest, row.claim.size());
+    fmt::print("  {:<{}}  {:>16}  {:>10}\n", "claim", widest, "measured", "bound");
+    for (const Row& row : rows)
+        fmt::print("  {:<{}}  {:>16}  {:>10}  {}\n", row.claim, widest, row.measured, row.bound,
+                   row.holds ? "ok" : "FAILED");
+    if (convergence.rows.empty()) return;
+    fmt::print("\nThe error over {:.4g} time units, in quadruple precision:\n  {:>12}  {:>12}  {:>6}\n",
+               8 * convergence.rows.front().step, "step", "error", "order");
+    for (const ConvergenceRow& row : convergence.rows)
+        fmt::print("  {:>12.6g}  {:>12.3e}  {:>6}\n", row.step, row.error,
+                   &row == &convergence.rows.front() ? "" : fmt::format("{:.2f}", row.order));
+}
+
+void verify(const VerifyOptions& options) {
+    Scene scene = read_scene(options.scene);
+    if (options.points) scene.method.points = *options.points;
+    const Start60 exact_start(scene);
+    const Derivation derivation = derive(scene);
+    Programs programs = build_programs(derivation);
+    EmitOptions emit_options;
+    const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
+    emit_options.precision = Precision::quadruple;
+    const Kernel exact_kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
+    optimise(programs);
+
+    fmt::print("{}: {} (Lobatto, {} points)\n", options.scene, scene.title, scene.method.points);
+    std::vector<Row> rows;
+    for (const auto& checks :
+         {check_quadrature(derivation.quadrature), check_equations(derivation), check_programs(derivation, programs)})
+        for (const Check& check : checks) rows.push_back(row_of(check));
+
+    const auto start = start_in<double>(exact_start, kernel, [](const GiNaC::numeric& x) { return x.to_double(); });
+    const auto exact = start_in<__float128>(exact_start, exact_kernel, quadruple);
+    const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
+    const auto states = states_along(kernel, start);
+    const std::string not_symplectic = "the step does not preserve phase-space areas";
+    rows.push_back(at_most("symplectic defect, double", worst_defect(kernel, start, states), 1e-14, not_symplectic));
+    rows.push_back(
+        at_most("symplectic defect, quadruple", worst_defect(exact_kernel, exact, states), 1e-30, not_symplectic));
+    rows.push_back(at_most("tangent map against differences", tangent_defect(exact_kernel, quadruple_start, start.step),
+                           1e-18, "the tangent map is not the derivative of the step"));
+    rows.push_back(reversal(kernel, start, "double"));
+    rows.push_back(reversal(exact_kernel, exact, "quadruple"));
+    const Convergence convergence = measure_order(exact_kernel, quadruple_start, start.step);
+    rows.push_back(order(convergence, exact_kernel));
+    momenta(rows, kernel, start, scene);
+    energy(rows, kernel, start);
+
+    print(rows, convergence);
+    for (const Row& row : rows)
+        if (!row.holds)
+            throw ComputationError(fmt::format("{}: the check '{}' fails: {}.", scene.path, row.claim, row.meaning));
+}
+
+}  // namespace
+
+void add_verify(CLI::App& program) {
+    CLI::App* command = program.add_subcommand(
+        "verify", "Check a scene's equations, its emitted code and the promises of its integrator");
+    const auto options = std::make_shared<VerifyOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command->add_option("--points", options->points, "Points of the Lobatto quadrature; the order is 2 points - 2")
+        ->check(CLI::Range(2, 5));
+    command->footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
+    command->callback([options] { verify(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Identities of the quadrature and of the discrete equations, by routes that the derivation does not take.
+#include "generator/check.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <tuple>
+
+#include "generator/check_point.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+using GiNaC::numeric;
+using Expressions = std::vector<ex>;
+
+unsigned at(std::size_t index) {
+    return static_cast<unsigned>(index);
+}
+
+bool vanish(const Expressions& expressions) {
+    return std::all_of(expressions.begin(), expressions.end(),
+                       [](const ex& expression) { return expand_exactly(expression).is_zero(); });
+}
+
+Check exactly(const std::string& claim, bool holds, const std::string& meaning) {
+    return {claim, holds, true, holds ? 0.0 : 1.0, 0, meaning};
+}
+
+// An upper bound of the terms that expanding would make.
+double terms_when_expanded(const ex& expression) {
+    if (GiNaC::is_a<GiNaC::add>(expression)) {
+        double sum = 0;
+        for (const ex& term : expression) sum += terms_when_expanded(term);
+        return sum;
+    }
+    if (GiNaC::is_a<GiNaC::mul>(expression)) {
+        double product = 1;
+        for (const ex& factor : expression) product *= terms_when_expanded(factor);
+        return product;
+    }
+    if (GiNaC::is_a<GiNaC::function>(expression)) return terms_when_expanded(expression.op(0));
+    if (GiNaC::is_a<GiNaC::power>(expression) && expression.op(1).info(GiNaC::info_flags::posint)) {
+        const double terms = terms_when_expanded(expression.op(0));
+        const int exponent = GiNaC::ex_to<numeric>(expression.op(1)).to_int();
+        double combinations = 1;  // (terms + exponent - 1 over exponent)
+        for (int i = 1; i <= exponent && combinations < 1e9 && terms > 1; ++i) combinations *= (terms + i - 1) / i;
+        return combinations;
+    }
+    return 1;
+}
+
+constexpr double expansion_limit = 2000;  // terms in all: a few milliseconds
+
+// Two lists of expressions that must be equal: by expansion when that is cheap and succeeds, else by numbers.
+Check equal(const Derivation& derivation, const std::string& claim, const Expressions& x, const Expressions& y,
+            const std::string& meaning) {
+    double terms = 0;
+    Expressions differences;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        differences.push_back(x[i] - y[i]);
+        terms += terms_when_expanded(differences.back());
+    }
+    if (terms < expansion_limit && vanish(differences)) return exactly(claim, true, meaning);
+    Check check{claim, false, false, 0, identity_bound, meaning};
+    at_two_points(derivation, [&](Formulas& formulas) {
+        check.measured = std::max(check.measured, relative_difference(formulas(x), formulas(y)));
+    });
+    check.holds = check.measured <= check.bound;
+    return check;
+}
+
+// F's Jacobian J against central differences along seeded directions: (F(x + e d) - F(x - e d)) / 2e = J d + O(e^2).
+Check differences(const Derivation& derivation, const std::string& claim, const Expressions& F,
+                  const std::vector<GiNaC::symbol>& unknowns, const GiNaC::matrix& J) {
+    Check check{claim, false, false, 0, difference_bound, "a derivative in the emitted Jacobian is wrong"};
+    const cln::cl_R e = cln::cl_float(cln::expt(cln::cl_RA(10), -20), cln::float_format(number_digits));
+    at_two_points(derivation, [&](Formulas& formulas) {
+        Noise noise(7);
+        Expressions entries;
+        for (unsigned i = 0; i < J.rows(); ++i)
+            for (unsigned j = 0; j < J.cols(); ++j) entries.push_back(J(i, j));
+        const std::vector<Id> roots = formulas.convert(F);
+        const std::vector<cln::cl_R> values = formulas(entries);
+        std::vector<cln::cl_R> direction, product, quotient, start;
+        for (const auto& unknown : unknowns) {
+            direction.push_back(noise.next());
+            start.push_back(formulas.get(unknown));
+        }
+        const auto move = [&](const cln::cl_R& step) {
+            for (std::size_t j = 0; j < unknowns.size(); ++j) formulas.set(unknowns[j], start[j] + step * direction[j]);
+            return formulas.evaluate(roots);
+        };
+        const std::vector<cln::cl_R> after = move(e), before = move(-e);
+        for (std::size_t i = 0; i < F.size(); ++i) {
+            cln::cl_R sum = 0;
+            for (std::size_t j = 0; j < unknowns.size(); ++j)
+                sum = sum + values[i * unknowns.size() + j] * direction[j];
+            product.push_back(sum);
+            quotient.push_back((after[i] - before[i]) / (2 * e));
+        }
+        check.measured = std::max(check.measured, relative_difference(product, quotient));
+    });
+    check.holds = check.measured <= check.bound;
+    return check;
+}
+
+Expressions flat(const std::vector<Expressions>& rows) {
+    Expressions result;
+    for (const Expressions& row : rows) result.insert(result.end(), row.begin(), row.end());
+    return result;
+}
+
+// The integral over [0, 1] of a polynomial in theta.
+ex integral(const ex& polynomial, const GiNaC::symbol& theta) {
+    const ex expanded = polynomial.expand();
+    ex sum = 0;
+    for (int degree = 0; degree <= expanded.degree(theta); ++degree)
+        sum += expanded.coeff(theta, degree) / (degree + 1);
+    return sum;
+}
+
+}  // namespace
+
+std::vector<Check> check_quadrature(const Quadrature& quadrature) {
+    const auto& [c, b, l] = std::tie(quadrature.c, quadrature.b, quadrature.basis);
+    const std::size_t s = c.size(), m = s - 2;
+    const GiNaC::symbol& theta = quadrature.theta;
+    const auto moment_error = [&](std::size_t degree) {
+        ex sum = -numeric(1, static_cast<long>(degree) + 1);
+        for (std::size_t i = 0; i < s; ++i)
+            sum += b[i] * (degree == 0 ? ex(1) : GiNaC::pow(c[i], static_cast<int>(degree)));
+        return sum;
+    };
+    Expressions moments, basis, rigidity, inverse, symplectic, parabola, weights{-1};
+    for (std::size_t degree = 0; degree <= 2 * s - 3; ++degree) moments.push_back(moment_error(degree));
+    for (std::size_t i = 0; i < s; ++i) {
+        weights[0] += b[i];
+        basis.push_back(b[i] - integral(l[i], theta));
+        ex row = 0;
+        for (std::size_t j = 0; j < s; ++j) {
+            basis.push_back(l[j].subs(theta == c[i]) - (i == j ? 1 : 0));
+            basis.push_back(l[j].diff(theta).subs(theta == c[i]) - quadrature.D(at(i), at(j)));
+            rigidity.push_back(quadrature.K(at(i), at(j)) - integral(l[i].diff(theta) * l[j].diff(theta), theta));
+            rigidity.push_back(quadrature.K(at(i), at(j)) - quadrature.K(at(j), at(i)));
+            row += quadrature.K(at(i), at(j));
+        }
+        rigidity.push_back(row);
+    }
+    for (std::size_t i = 0; i < m; ++i) {
+        ex position = b[0] * c[i + 1] - c[i + 1] * c[i + 1] / 2;
+        for (std::size_t j = 0; j < m; ++j) {
+            ex product = i == j ? -1 : 0;
+            for (std::size_t k = 0; k < m; ++k)
+                product += quadrature.G(at(i), at(k)) * quadrature.K(at(k + 1), at(j + 1));
+            inverse.push_back(product);
+            symplectic.push_back(b[i + 1] * quadrature.A(at(i), at(j)) - b[j + 1] * quadrature.A(at(j), at(i)) -
+                                 b[i + 1] * b[j + 1] * (c[i + 1] - c[j + 1]));
+            position += quadrature.A(at(i), at(j));
+        }
+        parabola.push_back(position);
+    }
+    const std::string degree = std::to_string(2 * s - 3);
+    return {
+        exactly("the quadrature is exact to degree " + degree, vanish(moments),
+                "the nodes or weights are not Lobatto's"),
+        exactly("and not beyond degree " + degree, !vanish({moment_error(2 * s - 2)}),
+                "the order claimed is lower than the rule allows"),
+        exactly("its weights sum to 1", vanish(weights), "constants are not integrated exactly"),
+        exactly("the basis is Lagrange's on the nodes", vanish(basis),
+                "a basis polynomial, its slope or its integral is wrong"),
+        exactly("K integrates products of slopes", vanish(rigidity), "K is not the rigidity matrix of the basis"),
+        exactly("G inverts the interior of K", vanish(inverse), "the stage equations are solved with a wrong inverse"),
+        exactly("a constant force bends into a parabola", vanish(parabola), "the stage matrix A is inconsistent"),
+        exactly("the stage matrix is symplectic", vanish(symplectic),
+                "b_i A_ij - b_j A_ji = b_i b_j (c_i - c_j) fails: the step would not be symplectic"),
+    };
+}
+
+std::vector<Check> check_equations(const Derivation& derivation) {
+    const Discretisation& d = derivation.discretisation;
+    const System& system = derivation.system;
+    const auto& [c, b] = std::tie(derivation.quadrature.c, derivation.quadrature.b);
+    const std::size_t n = static_cast<std::size_t>(system.n), s = c.size(), m = s - 2;
+    const ex h = d.h;
+    const GiNaC::matrix inverse_mass = system.mass.inverse();
+
+    // L_d from its definition: the quadrature of L along the interpolating polynomial.
+    ex action = 0;
+    for (std::size_t i = 0; i < s; ++i) {
+        GiNaC::exmap along;
+        for (std::size_t k = 0; k < n; ++k) {
+            ex velocity = 0;
+            for (std::size_t j = 0; j < s; ++j) velocity += derivation.quadrature.D(at(i), at(j)) * d.Q[j][k] / h;
+            along[system.q[k]] = d.Q[i][k];
+            along[system.v[k]] = velocity;
+        }
+        action += h * b[i] * system.lagrangian.subs(along, GiNaC::subs_options::no_pattern);
+    }
+    // The discrete Euler-Lagrange equations by differentiating L_d as a whole.
+    const auto slope = [&](std::size_t j, std::size_t k) { return d.L_d.diff(d.Q[j][k]); };
+    GiNaC::exmap to_step_before;
+    for (std::size_t j = 0; j < s; ++j)
+        for (std::size_t k = 0; k < n; ++k) to_step_before[d.Q[j][k]] = d.Q_before[j][k];
+    std::vector<Expressions> interior(m);
+    Expressions left, right, border;
+    for (std::size_t k = 0; k < n; ++k) {
+        for (std::size_t j = 0; j < m; ++j) interior[j].push_back(slope(j + 1, k));
+        left.push_back(-slope(0, k));
+        right.push_back(slope(s - 1, k));
+        border.push_back(slope(s - 1, k).subs(to_step_before, GiNaC::subs_options::no_pattern) + slope(0, k));
+    }
+    Expressions momenta = d.left_momentum, momenta_by_derivative = left;
+    momenta.insert(momenta.end(), d.right_momentum.begin(), d.right_momentum.end());
+    momenta_by_derivative.insert(momenta_by_derivative.end(), right.begin(), right.end());
+
+    // The solved forms as combinations of them, e_j = dL_d/dQ_j:
+    //   stages    h M^-1 sum_j G_ij e_j
+    //   momentum  (p1 - right) - (p0 - left) - sum_j e_j
+    //   position  h M^-1 (sum_j (c_j - 1/2) e_j + (right - p1)/2 + (left - p0)/2)
+    //   arrival   q1 - (q1 of the reduced form) = h M^-1 (left - p0 - sum_j (1 - c_j) e_j)
+    //   reduced   stages + c_i arrival
+    const auto times_inverse_mass = [&](const Expressions& vector, std::size_t k) {
+        ex sum = 0;
+        for (std::size_t l = 0; l < n; ++l) sum += inverse_mass(at(k), at(l)) * vector[l];
+        return h * sum;
+    };
+    Expressions momentum, position_sum(n), arrival_sum(n), combined, reduced;
+    std::vector<Expressions> stage_sum(m, Expressions(n));
+    for (std::size_t k = 0; k < n; ++k) {
+        ex sum = (d.p1[k] - right[k]) - (d.p0[k] - left[k]);
+        position_sum[k] = (right[k] - d.p1[k]) / 2 + (left[k] - d.p0[k]) / 2;
+        arrival_sum[k] = left[k] - d.p0[k];
+        for (std::size_t j = 0; j < m; ++j) {
+            const ex& e = interior[j][k];
+            sum -= e;
+            position_sum[k] += (c[j + 1] - numeric(1, 2)) * e;
+            arrival_sum[k] -= (1 - c[j + 1]) * e;
+            for (std::size_t i = 0; i < m; ++i) stage_sum[i][k] += derivation.quadrature.G(at(i), at(j)) * e;
+        }
+        momentum.push_back(sum);
+    }
+    for (std::size_t i = 0; i < m; ++i)
+        for (std::size_t k = 0; k < n; ++k) {
+            combined.push_back(times_inverse_mass(stage_sum[i], k));
+            reduced.push_back(combined.back() + c[i + 1] * times_inverse_mass(arrival_sum, k));
+        }
+    combined.insert(combined.end(), momentum.begin(), momentum.end());
+    for (std::size_t k = 0; k < n; ++k) combined.push_back(times_inverse_mass(position_sum, k));
+    Expressions reduced_form = d.reduced_system;
+    for (std::size_t k = 0; k < n; ++k) {
+        reduced.push_back(times_inverse_mass(arrival_sum, k));
+        reduced_form.push_back(d.Q[s - 1][k] - d.arrival_position[k]);
+        reduced.push_back(momentum[k]);
+        reduced_form.push_back(d.p1[k] - d.arrival_momentum[k]);
+    }
+
+    std::vector<Check> checks;
+    const auto add = [&](const std::string& claim, const Expressions& x, const Expressions& y,
+                         const std::string& meaning) {
+        if (!x.empty()) checks.push_back(equal(derivation, claim, x, y, meaning));
+    };
+    add("L_d is the quadrature of L", {d.L_d}, {action}, "the discrete Lagrangian is not that of the scene");
+    add("interior equations are dL_d/dQ = 0", flat(interior), flat(d.interior),
+        "the equations inside the step are not those of the discrete action");
+    add("border equations are dL_d/dq = 0", border, d.border, "the discrete equations of motion are wrong");
+    add("momenta are slopes of L_d", momenta_by_derivative, momenta, "the momenta at the ends of a step are wrong");
+    add("full system combines these", d.full_system, combined, "F_L does not follow from the discrete action");
+    add("reduced system combines these", reduced_form, reduced,
+        "what the kernel solves does not follow from the discrete action");
+    const auto derivatives = [](const Expressions& F, const std::vector<GiNaC::symbol>& unknowns) {
+        Expressions entries;
+        for (const ex& equation : F)
+            for (const auto& unknown : unknowns) entries.push_back(equation.diff(unknown));
+        return entries;
+    };
+    const auto entries_of = [](const GiNaC::matrix& J) {
+        Expressions entries;
+        for (unsigned i = 0; i < J.rows(); ++i)
+            for (unsigned j = 0; j < J.cols(); ++j) entries.push_back(J(i, j));
+        return entries;
+    };
+    std::vector<GiNaC::symbol> interior_unknowns;
+    for (std::size_t j = 1; j <= m; ++j)
+        interior_unknowns.insert(interior_unknowns.end(), d.Q[j].begin(), d.Q[j].end());
+    add("dF_L is the derivative of F_L", derivatives(d.full_system, d.full_unknowns), entries_of(d.full_jacobian),
+        "an entry of the full Jacobian is wrong");
+    if (m > 0)
+        add("and so is the reduced Jacobian", derivatives(d.reduced_system, interior_unknowns),
+            entries_of(d.reduced_jacobian), "an entry of the reduced Jacobian is wrong");
+    checks.push_back(
+        differences(derivation, "dF_L against central differences", d.full_system, d.full_unknowns, d.full_jacobian));
+    if (m > 0)
+        checks.push_back(differences(derivation, "reduced Jacobian against differences", d.reduced_system,
+                                     interior_unknowns, d.reduced_jacobian));
+    return checks;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// The order of convergence of a kernel on a given motion, measured in quadruple precision on a ladder of steps.
+#include "runtime/convergence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using Quadruple = __float128;
+using States = std::vector<Quadruple>;  // q, p at the eight times, one after the other
+
+constexpr int coarse_steps = 8;  // of the largest step: where errors are compared
+constexpr int rungs = 5;
+constexpr int finest_ratio = 8;           // the reference against the smallest step of the ladder
+constexpr double rounding_error = 1e-29;  // relative; quadruple rounds at 1e-34, over some 1000 steps
+constexpr int most_attempts = 14;         // ladders, each half of the one before
+
+Quadruple size(Quadruple x) {
+    return x < 0 ? -x : x;
+}
+
+// The states at the eight times with `ratio` steps in each; nothing when a step fails.
+std::optional<States> states_with(Stepper<Quadruple>& stepper, const QuadrupleStart& start, Quadruple coarse,
+                                  int ratio) {
+    const std::size_t columns = 1 + 2 * start.q.size();
+    std::vector<Quadruple> rows(coarse_steps * columns);
+    lobatto_advance call{};
+    call.steps = std::int64_t(coarse_steps) * ratio;
+    call.record_every = ratio;
+    call.records = rows.data();
+    call.capacity = coarse_steps;
+    if (stepper.prepare(start.parameters, coarse / ratio) != LOBATTO_OK ||
+        stepper.start(0, start.q, start.p) != LOBATTO_OK || stepper.advance(call) != LOBATTO_OK)
+        return std::nullopt;
+    States states;
+    for (int i = 0; i < coarse_steps; ++i)
+        states.insert(states.end(), rows.begin() + static_cast<std::ptrdiff_t>(i * columns + 1),
+                      rows.begin() + static_cast<std::ptrdiff_t>((i + 1) * columns));
+    return states;
+}
+
+// The largest error of the positions relative to the farthest that one moves, or of the momenta likewise.
+double error_of(const States& states, const States& reference, const QuadrupleStart& start) {
+    const std::size_t n = start.q.size();
+    double worst = 0;
+    for (const bool momenta : {false, true}) {
+        Quadruple error = 0, range = 0;
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            if ((i / n % 2 == 1) != momenta) continue;
+            const Quadruple from = momenta ? start.p[i % n] : start.q[i % n];
+            range = std::max(range, size(reference[i] - from));
+            error = std::max(error, size(states[i] - reference[i]));
+        }
+        if (range > 0) worst = std::max(worst, static_cast<double>(error / range));
+    }
+    return worst;
+}
+
+}  // namespace
+
+Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step) {
+    Stepper<Quadruple> stepper(kernel);
+    Convergence best;
+    Quadruple coarse = step;
+    for (int attempt = 0; attempt < most_attempts && !best.settled; ++attempt) {
+        const std::optional<States> reference = states_with(stepper, start, coarse, (1 << (rungs - 1)) * finest_ratio);
+        if (!reference) {
+            coarse /= 2;
+            continue;
+        }
+        Convergence measured;
+        for (int rung = 0; rung < rungs; ++rung) {
+            const std::optional<States> states = states_with(stepper, start, coarse, 1 << rung);
+            if (!states) break;
+            ConvergenceRow row{static_cast<double>(coarse) / (1 << rung), error_of(*states, *reference, start), 0};
+            if (row.error < rounding_error) break;
+            if (rung > 0) row.order = std::log2(measured.rows.back().error / row.error);
+            measured.rows.push_back(row);
+        }
+        const std::size_t count = measured.rows.size();
+        if (count < 3) {  // below rounding too soon
+            if (best.rows.empty()) best.exact = count == 0;
+            coarse *= 4;
+            continue;
+        }
+        measured.order = measured.rows.back().order;
+        measured.settled = std::fabs(measured.order - measured.rows[count - 2].order) < 0.1;
+        best = measured;
+        coarse /= 2;
+    }
+    if (best.rows.empty() && !best.exact)
+        throw ComputationError("the order cannot be measured: the steps fail from this start, however short");
+    return best;
+}
+
+bool bears_out(const Convergence& convergence, int order, bool linear) {
+    constexpr double tolerance = 0.3;
+    if (convergence.exact) return true;
+    return convergence.settled && convergence.order > order - tolerance &&
+           (linear || convergence.order < order + tolerance);
+}
+
+}  // namespace lobatto

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The order of convergence of a kernel on a given motion, measured in quadruple precision on a ladder of steps.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "runtime/library.hpp"
+
+namespace lobatto {
+
+// A start, in quadruple precision: parameters in scene order, q and p of n each.
+struct QuadrupleStart {
+    std::vector<__float128> parameters, q, p;
+};
+
+struct ConvergenceRow {
+    double step = 0;
+    double error = 0;  // the largest at eight times; against a step 1/8 of the smallest of the ladder; positions
+                       // relative to the farthest that one moves, momenta likewise
+    double order = 0;  // log2 of the error before by this one; 0 in the first row
+};
+
+struct Convergence {
+    std::vector<ConvergenceRow> rows;  // five steps, each half of the one before
+    double order = 0;                  // of the last row
+    bool settled = false;              // the last two orders agree: the ladder is fine enough
+    bool exact = false;                // nothing to measure: the largest step has no error but rounding
+};
+
+// Over eight of the given steps; the ladder begins at this step, or below while the orders have not settled.
+// ComputationError when no step of the ladder can be taken.
+Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step);
+
+// Whether the measurement bears out an order: within 0.3, or for a linear system at least (some super-converge).
+bool bears_out(const Convergence& convergence, int order, bool linear);
+
+}  // namespace lobatto

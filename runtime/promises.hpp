@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// What a symmetric variational integrator promises on a given motion: to run backwards, to keep energy errors bounded.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/convergence.hpp"
+#include "runtime/library.hpp"
+
+namespace lobatto {
+
+// Forwards and, with -h, backwards again. The distance from the start, and the rounding that explains it: that of all
+// steps, times what the motion makes of a small disturbance (the norm of the flow's derivative).
+struct Return {
+    std::int64_t steps = 0;  // one way; fewer than asked for when a step failed
+    double distance = 0;     // of positions relative to the farthest that one moves, or of momenta likewise
+    double rounding = 0;     // both infinite when a step fails on the way
+};
+template <class real>
+Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters, const std::vector<real>& q,
+                      const std::vector<real>& p, real step, std::int64_t steps);
+
+// |T d - (step(z + e d) - step(z - e d)) / 2e| relative to |T d|, largest entry, over all 2n directions d, e = 1e-11:
+// whether the tangent map is the derivative of the step. Truncation and rounding are both about 1e-22.
+double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step);
+
+// The means of H - H(0) over both halves of a long run, and how far it swings: a drift moves the mean.
+struct EnergyDrift {
+    std::int64_t steps = 0;  // good steps, at most those asked for
+    double swing = 0;        // max - min of H - H(0)
+    double drift = 0;        // |mean of the second half - mean of the first|
+    double rounding = 0;     // of H along the run
+    bool bounded = false;    // whether the motion stays within four times the region of its first half
+};
+EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parameters, const std::vector<double>& q,
+                         const std::vector<double>& p, double step, std::int64_t steps);
+
+}  // namespace lobatto

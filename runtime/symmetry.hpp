@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// Linear symmetries of a kernel's system, found by sampling its forces, and the momenta that Noether's theorem
+// conserves.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "runtime/library.hpp"
+
+namespace lobatto {
+
+// The direction B q + d in which moving changes neither V nor the kinetic energy: (B q + d) . grad V(q) = 0 for all q
+// and B^T M + M B = 0. Conserved: p . (B q + d).
+struct Symmetry {
+    std::vector<double> B;  // n x n, row-major
+    std::vector<double> d;  // n
+    std::string kind;       // "translation", "rotation in the (x, y) plane", "rotation"
+    std::string momentum;   // "p_x + p_y", "x*p_y - y*p_x"
+};
+
+// All of them, as far as forces sampled around q tell; `names` are those of the coordinates.
+std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
+                                      const std::vector<double>& q, double step, const std::vector<std::string>& names);
+
+// How much p . (B q + d) varies over the steps of a run, relative to the largest sum of the sizes of its terms.
+struct MomentumVariation {
+    std::int64_t steps = 0;  // good steps, at most those asked for
+    double variation = 0;
+};
+MomentumVariation momentum_variation(const Kernel& kernel, const Symmetry& symmetry,
+                                     const std::vector<double>& parameters, const std::vector<double>& q,
+                                     const std::vector<double>& p, double step, std::int64_t steps);
+
+}  // namespace lobatto

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Orders of convergence, measured in quadruple precision; and that wrong methods are found out.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "runtime/convergence.hpp"
+#include "runtime/diagnostics.hpp"
+#include "runtime/error.hpp"
+#include "runtime/promises.hpp"
+#include "runtime/reference.hpp"
+#include "tests/scenes.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+Kernel quadruple_kernel(const Scene& scene) {
+    return test::kernel_in_own_cache(derive(scene), Precision::quadruple);
+}
+
+// m = 1, omega = 1 from q = 2 at rest: a swing of 115 degrees.
+const QuadrupleStart wide_swing{{1, 1}, {2}, {0}};
+const QuadrupleStart coupled_start{{}, {0.75, 0.25}, {0.5, 1}};
+
+// |q(4) - exact| with the given number of steps.
+double error_at_four(const Kernel& kernel, std::int64_t steps) {
+    Stepper<__float128> stepper(kernel);
+    lobatto_advance call{};
+    call.steps = steps;
+    REQUIRE(stepper.prepare(wide_swing.parameters, __float128(4) / steps) == LOBATTO_OK);
+    REQUIRE(stepper.start(0, wide_swing.q, wide_swing.p) == LOBATTO_OK);
+    REQUIRE(stepper.advance(call) == LOBATTO_OK);
+    __float128 time;
+    std::vector<__float128> q, p;
+    stepper.state(time, q, p);
+    return std::fabs(static_cast<double>(q[0] - __float128(pendulum_solution(1, 2, 0, 4).q)));
+}
+
+// The hand-written pendulum with one entry of its stage matrix changed.
+Kernel spoilt_pendulum() {
+    KernelSource source;
+    source.name = "handwritten_pendulum";
+    source.digest = "0123456789abcdef";
+    source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
+                    "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
+    const std::string entry = "(11 - 5 * root5) / 120";
+    REQUIRE(source.header.find(entry) != std::string::npos);
+    source.header.replace(source.header.find(entry), entry.size(), "(11 - 4 * root5) / 120");
+    const test::TemporaryFolder folder;
+    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
+    return kernel_of(source, Precision::double_);
+}
+
+}  // namespace
+
+TEST_CASE("the s-point kernel converges at order 2, 4, 6, 8 to the pendulum's elliptic solution for s = 2 ... 5") {
+    for (int points = 2; points <= 5; ++points) {
+        const Kernel kernel = quadruple_kernel(test::pendulum_scene(points));
+        // The last error of s = 5 is 1.8e-15, far above the reference's rounding of about 1e-18.
+        const std::int64_t steps = points == 2 ? 256 : points == 5 ? 8 : 16;
+        const double coarse = error_at_four(kernel, steps), fine = error_at_four(kernel, 2 * steps),
+                     finest = error_at_four(kernel, 4 * steps);
+        INFO(points << " points: " << coarse << " " << fine << " " << finest);
+        CHECK(finest > 1e-16);
+        CHECK(std::fabs(std::log2(fine / finest) - (2 * points - 2)) < 0.3);
+        CHECK(std::fabs(std::log2(coarse / fine) - (2 * points - 2)) < 0.6);
+    }
+}
+
+TEST_CASE("the order is 2, 4, 6, 8 for s = 2 ... 5 with two coordinates and a mass matrix that is not diagonal") {
+    for (int points = 2; points <= 5; ++points) {
+        const Kernel kernel = quadruple_kernel(test::coupled_scene(points));
+        const Convergence convergence = measure_order(kernel, coupled_start, 0.1);
+        REQUIRE(convergence.rows.size() >= 3);
+        CHECK(convergence.settled);
+        CHECK(std::fabs(convergence.order - (2 * points - 2)) < 0.05);
+        CHECK(convergence.rows.front().error < 1);
+        CHECK(convergence.rows.back().error > 1e-29);
+    }
+}
+
+TEST_CASE("a Stoermer-Verlet kernel does not pass for one of order 4, nor a kernel of order 6 for one of order 4") {
+    const Convergence verlet = measure_order(quadruple_kernel(test::pendulum_scene(2)), wide_swing, 0.1);
+    CHECK(bears_out(verlet, 2, false));
+    CHECK(!bears_out(verlet, 4, false));
+    CHECK(!bears_out(verlet, 4, true));
+    const Convergence sixth = measure_order(quadruple_kernel(test::pendulum_scene(4)), wide_swing, 0.1);
+    CHECK(bears_out(sixth, 6, false));
+    CHECK(!bears_out(sixth, 4, false));
+    CHECK(bears_out(sixth, 4, true));  // a linear system may converge faster
+}
+
+TEST_CASE("a ladder that begins far too coarse is refined until the orders settle") {
+    const Convergence convergence = measure_order(quadruple_kernel(test::pendulum_scene(3)), wide_swing, 40);
+    CHECK(convergence.settled);
+    CHECK(convergence.rows.front().step < 40);
+    CHECK(std::fabs(convergence.order - 4) < 0.1);
+}
+
+TEST_CASE("free fall has no error to measure") {
+    const Kernel kernel = quadruple_kernel(
+        test::scene_of("m*q'^2/2 - m*g*q", "q = { position = 0, velocity = 0 }", 4, "m = 2\ng = 9.81"));
+    const Convergence convergence = measure_order(kernel, {{2, 9.75}, {0}, {1}}, 0.1);
+    CHECK(convergence.exact);
+    CHECK(convergence.rows.empty());
+    CHECK(bears_out(convergence, 6, true));
+}
+
+TEST_CASE("steps that fail at any length leave no order to measure") {
+    const Kernel kernel = quadruple_kernel(test::scene_of("q'^2/2 + 1/q", "q = { position = 1, velocity = 0 }", 4));
+    CHECK(test::message_of<ComputationError>([&] {
+              measure_order(kernel, {{}, {0}, {0}}, 0.1);
+          }) == "the order cannot be measured: the steps fail from this start, however short");
+}
+
+TEST_CASE("a stage matrix with one wrong entry is neither symplectic nor reversible") {
+    const Kernel kernel = spoilt_pendulum();
+    Stepper<double> stepper(kernel);
+    REQUIRE(stepper.prepare({1, 1}, 0.5) == LOBATTO_OK);
+    CHECK(symplectic_defect<double>(stepper, {2}, {0.5}) > 1e-6);  // rounding is 1e-16
+    const Return back = there_and_back<double>(kernel, {1, 1}, {2}, {0}, 0.5, 100);
+    CHECK(back.distance > 1e3 * back.rounding);
+    CHECK(back.rounding > 0);
+}
+
+TEST_CASE("the way there and back leads to the start within the rounding it allows, in both precisions") {
+    const Derivation derivation = derive(test::coupled_scene(4));
+    const Return twice = there_and_back<double>(test::kernel_in_own_cache(derivation, Precision::double_), {},
+                                                {0.75, 0.25}, {0.5, 1}, 0.1, 500);
+    CHECK(twice.steps == 500);
+    CHECK(twice.distance > 0);
+    CHECK(twice.distance < twice.rounding);
+    CHECK(twice.rounding < 1e-9);
+    const Return exact = there_and_back<__float128>(test::kernel_in_own_cache(derivation, Precision::quadruple), {},
+                                                    coupled_start.q, coupled_start.p, 0.125, 500);
+    CHECK(exact.distance < exact.rounding);
+    CHECK(exact.rounding < 1e-26);
+}
+
+TEST_CASE("the tangent map is the derivative of the step to 1e-20") {
+    for (int points = 2; points <= 5; ++points)
+        CHECK(tangent_defect(quadruple_kernel(test::coupled_scene(points)), coupled_start, 0.3) < 1e-20);
+}
+
+TEST_CASE("the energy of a long run swings without drifting; a motion that leaves is not judged") {
+    const Kernel kernel = test::kernel_in_own_cache(derive(test::pendulum_scene(3)), Precision::double_);
+    const EnergyDrift drift = energy_drift(kernel, {1, 1}, {2}, {0}, 0.3, 20000);
+    CHECK(drift.steps == 20000);
+    CHECK(drift.bounded);
+    CHECK(drift.swing > 1e-5);               // the method's error
+    CHECK(drift.drift < drift.swing / 100);  // measured: a thousandth
+    CHECK(energy_drift(kernel, {1, 1}, {0}, {3}, 0.1, 1000).bounded);  // turning over and over, at an even pace
+    const Kernel falling = test::kernel_in_own_cache(
+        derive(test::scene_of("q'^2/2 - q", "q = { position = 0, velocity = 0 }", 4)), Precision::double_);
+    CHECK(!energy_drift(falling, {}, {0}, {1}, 0.1, 20000).bounded);
+}

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto verify from the outside: its table, its verdict, its exit codes.
+#include <doctest/doctest.h>
+
+#include "tests/support.hpp"
+
+using namespace lobatto::test;
+
+namespace {
+
+Finished verify(const std::vector<std::string>& arguments) {
+    static const TemporaryFolder cache;
+    const EnvironmentVariable folder("LOBATTO_CACHE_DIR", cache.string());
+    std::vector<std::string> command{LOBATTO_PROGRAM, "verify"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    return run(command);
+}
+
+std::string scene_text(const std::string& lagrangian, const std::string& coordinates, const std::string& step) {
+    return "title = \"Test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" + coordinates +
+           "\n[method]\nfamily = \"lobatto\"\npoints = 4\n[run]\nstep = " + step + "\nuntil = 10\n";
+}
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("both scenes of the paper verify, with any number of points") {
+    for (const std::string scene : {"pendulum", "harmonic_oscillator"})
+        for (const std::string points : {"2", "3", "4", "5"}) {
+            const Finished result = verify({LOBATTO_SOURCE_DIR "/scenes/" + scene + ".toml", "--points", points});
+            INFO(result.out << result.err);
+            CHECK(result.exit_code == 0);
+            CHECK(result.err.empty());
+            CHECK(!contains(result.out, "FAILED"));
+            CHECK(contains(result.out, "order of convergence"));
+            CHECK(contains(result.out, "symplectic defect, quadruple"));
+            CHECK(contains(result.out, "no linear symmetry, no momentum to conserve"));
+        }
+}
+
+TEST_CASE("a scene with a symmetry has its momentum in the table") {
+    const TemporaryFolder folder;
+    write_text(folder / "pair.toml",
+               scene_text("x'^2/2 + y'^2 - (x - y)^4/4",
+                          "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0.5 }", "0.1"));
+    const Finished result = verify({(folder / "pair.toml").string()});
+    CHECK(result.exit_code == 0);
+    CHECK(contains(result.out, "  translation: p_x + p_y"));
+}
+
+TEST_CASE("a check that fails ends with exit code 3, the check's name and what it means") {
+    const TemporaryFolder folder;
+    // A step fifty times the period of the motion's fastest oscillation: a long way beyond stability.
+    write_text(folder / "stiff.toml",
+               scene_text("q'^2/2 - 500*q^2 - q^4/4", "q = { position = 0.1, velocity = 0 }", "10"));
+    const Finished result = verify({(folder / "stiff.toml").string()});
+    CHECK(result.exit_code == 3);
+    CHECK(contains(result.out + result.err, "stiff.toml: "));
+}
+
+TEST_CASE("a step that is not positive and a scene that is missing are mistakes of the input") {
+    const TemporaryFolder folder;
+    write_text(folder / "back.toml", scene_text("q'^2/2 - q^2/2", "q = { position = 1, velocity = 0 }", "-1"));
+    CHECK(verify({(folder / "back.toml").string()}).exit_code == 2);
+    CHECK(verify({(folder / "none.toml").string()}).exit_code == 2);
+    CHECK(verify({LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "--points", "6"}).exit_code == 2);
+}
