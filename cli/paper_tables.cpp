@@ -81,7 +81,7 @@ PaperTable table(PaperSystem system, std::string title, const int (&meshes)[3], 
 // The step loop runs inside the kernel, in blocks of records.
 template <class real>
 void run_in(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& look) {
-    Stepper<real> stepper(kernel);
+    LoadedStepper<real> stepper(kernel);
     const auto succeed = [](std::int32_t status) {
         if (status != LOBATTO_OK)
             throw ComputationError("paper: a step of the paper's own experiments failed, status " +
@@ -133,7 +133,7 @@ Kernel paper_kernel(PaperSystem system, int points, Precision precision) {
 }
 
 std::function<long double(const PaperState&)> discrete_energy_of(const Kernel& kernel, double step) {
-    Stepper<double> stepper(kernel);
+    LoadedStepper<double> stepper(kernel);
     if (stepper.prepare({1, omega}, step) != LOBATTO_OK)
         throw ComputationError("paper: the oscillator's kernel refuses this step");
     const auto H_d = discrete_energy(stepper);

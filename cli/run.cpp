@@ -94,7 +94,7 @@ std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& va
 }
 
 // Prepares and starts the stepper too: a start that is impossible is known before anything is written.
-TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, Stepper<double>& stepper) {
+TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper) {
     TrajectoryRequest request;
     for (const Parameter& parameter : scene.parameters)
         request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
@@ -150,7 +150,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 // The stepper is prepared; a unit of the first coordinate may be empty.
-void print_table(const Stepper<double>& stepper, const TrajectoryRequest& request, const TrajectoryResult& result,
+void print_table(const LoadedStepper<double>& stepper, const TrajectoryRequest& request, const TrajectoryResult& result,
                  const Watch& watch, const std::string& unit) {
     const std::string of_all = result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
     print_row("steps",
@@ -200,7 +200,7 @@ void run(const RunOptions& options) {
     const Steps steps = steps_of(scene, options.overrides);
     Compiled compiled;
     const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
-    Stepper<double> stepper(kernel);
+    LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(scene, steps.count, stepper);
     const std::string path = output_path(options, scene);
     if (!options.quiet) {

@@ -89,7 +89,7 @@ Start<real> start_in(const Start60& start, const Kernel& kernel, const Convert& 
         return converted;
     };
     Start<real> result{all(start.parameters), all(start.q), all(start.rate), convert(start.step)};
-    Stepper<real> stepper(kernel);
+    LoadedStepper<real> stepper(kernel);
     const lobatto_status status = stepper.prepare(result.parameters, result.step);
     if (status != LOBATTO_OK)
         throw ComputationError(status == LOBATTO_SINGULAR_MASS
@@ -128,7 +128,7 @@ std::vector<std::pair<std::vector<double>, std::vector<double>>> states_along(co
 template <class real>
 double worst_defect(const Kernel& kernel, const Start<real>& start,
                     const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states) {
-    Stepper<real> stepper(kernel);
+    LoadedStepper<real> stepper(kernel);
     stepper.prepare(start.parameters, start.step);
     real worst = 0;
     for (const auto& [q, p] : states) {

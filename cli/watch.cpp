@@ -18,7 +18,7 @@ long double nearest(const Scene& scene, const GiNaC::ex& value, const char* what
 
 }  // namespace
 
-Watch::Watch(const Scene& scene, const Structure& structure, const Stepper<double>& stepper,
+Watch::Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
              const std::vector<double>& velocity)
     : closed_(structure.closed_solution), discrete_(discrete_energy(stepper)) {
     if (!closed_) return;

@@ -14,7 +14,7 @@ namespace lobatto {
 class Watch {
 public:
     // The stepper is prepared; `velocity` is the initial one.
-    Watch(const Scene& scene, const Structure& structure, const Stepper<double>& stepper,
+    Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
           const std::vector<double>& velocity);
 
     void look(const Records& records);

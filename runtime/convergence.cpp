@@ -26,7 +26,7 @@ Quadruple size(Quadruple x) {
 }
 
 // The states at the eight times with `ratio` steps in each; nothing when a step fails.
-std::optional<States> states_with(Stepper<Quadruple>& stepper, const QuadrupleStart& start, Quadruple coarse,
+std::optional<States> states_with(LoadedStepper<Quadruple>& stepper, const QuadrupleStart& start, Quadruple coarse,
                                   int ratio) {
     const std::size_t columns = 1 + 2 * start.q.size();
     std::vector<Quadruple> rows(coarse_steps * columns);
@@ -65,7 +65,7 @@ double error_of(const States& states, const States& reference, const QuadrupleSt
 }  // namespace
 
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step) {
-    Stepper<Quadruple> stepper(kernel);
+    LoadedStepper<Quadruple> stepper(kernel);
     Convergence best;
     Quadruple coarse = step;
     for (int attempt = 0; attempt < most_attempts && !best.settled; ++attempt) {

@@ -10,7 +10,7 @@
 namespace lobatto {
 
 template <class real>
-real symplectic_defect(const Stepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p) {
+real symplectic_defect(const LoadedStepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p) {
     const std::size_t n = q.size(), rows = 2 * n;
     std::vector<real> q1, p1, T;
     if (stepper.tangent(q, p, q1, p1, T) != LOBATTO_OK)
@@ -29,11 +29,11 @@ real symplectic_defect(const Stepper<real>& stepper, const std::vector<real>& q,
     return squares > real(1) ? defect / squares : defect;
 }
 
-template float symplectic_defect(const Stepper<float>&, const std::vector<float>&, const std::vector<float>&);
-template double symplectic_defect(const Stepper<double>&, const std::vector<double>&, const std::vector<double>&);
-template long double symplectic_defect(const Stepper<long double>&, const std::vector<long double>&,
+template float symplectic_defect(const LoadedStepper<float>&, const std::vector<float>&, const std::vector<float>&);
+template double symplectic_defect(const LoadedStepper<double>&, const std::vector<double>&, const std::vector<double>&);
+template long double symplectic_defect(const LoadedStepper<long double>&, const std::vector<long double>&,
                                        const std::vector<long double>&);
-template __float128 symplectic_defect(const Stepper<__float128>&, const std::vector<__float128>&,
+template __float128 symplectic_defect(const LoadedStepper<__float128>&, const std::vector<__float128>&,
                                       const std::vector<__float128>&);
 
 double DiscreteEnergy::operator()(const double* q, const double* p) const {
@@ -45,7 +45,7 @@ double DiscreteEnergy::operator()(const double* q, const double* p) const {
     return z.dot(matrix * z);
 }
 
-std::optional<DiscreteEnergy> discrete_energy(const Stepper<double>& stepper) {
+std::optional<DiscreteEnergy> discrete_energy(const LoadedStepper<double>& stepper) {
     if (!stepper.kernel()->linear) return std::nullopt;
     const int n = stepper.kernel()->coordinates;
     const std::vector<double> zero(static_cast<std::size_t>(n), 0.0);

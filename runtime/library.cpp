@@ -71,7 +71,7 @@ Kernel Kernel::load(const std::string& object, const std::string& expected_diges
 }
 
 template <class real>
-Stepper<real>::Stepper(Kernel kernel) : kernel_(std::move(kernel)) {
+LoadedStepper<real>::LoadedStepper(Kernel kernel) : kernel_(std::move(kernel)) {
     const auto kind = static_cast<lobatto_real>(kernel_->real_kind);
     if (kind != real_kind<real>() || kernel_->real_bytes != static_cast<std::int32_t>(sizeof(real))) {
         throw MachineError(fmt::format("the kernel {} computes in {}, but was asked to compute in {}", kernel_->name,
@@ -82,41 +82,41 @@ Stepper<real>::Stepper(Kernel kernel) : kernel_(std::move(kernel)) {
 }
 
 template <class real>
-Stepper<real>::Stepper(const Stepper& other) : Stepper(other.kernel_) {
+LoadedStepper<real>::LoadedStepper(const LoadedStepper& other) : LoadedStepper(other.kernel_) {
     std::memcpy(stepper_, other.stepper_, static_cast<std::size_t>(kernel_->stepper_bytes));
 }
 
 template <class real>
-Stepper<real>& Stepper<real>::operator=(const Stepper& other) {
-    return *this = Stepper(other);
+LoadedStepper<real>& LoadedStepper<real>::operator=(const LoadedStepper& other) {
+    return *this = LoadedStepper(other);
 }
 
 template <class real>
-lobatto_status Stepper<real>::prepare(const std::vector<real>& parameters, real step) {
+lobatto_status LoadedStepper<real>::prepare(const std::vector<real>& parameters, real step) {
     assert(std::ssize(parameters) == kernel_->parameters);
     return static_cast<lobatto_status>(kernel_->prepare(stepper_, parameters.data(), &step));
 }
 
 template <class real>
-lobatto_status Stepper<real>::start(real time, const std::vector<real>& q, const std::vector<real>& p) {
+lobatto_status LoadedStepper<real>::start(real time, const std::vector<real>& q, const std::vector<real>& p) {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     return static_cast<lobatto_status>(kernel_->start(stepper_, &time, q.data(), p.data()));
 }
 
 template <class real>
-lobatto_status Stepper<real>::advance(lobatto_advance& call) {
+lobatto_status LoadedStepper<real>::advance(lobatto_advance& call) {
     return static_cast<lobatto_status>(kernel_->advance(stepper_, &call));
 }
 
 template <class real>
-void Stepper<real>::state(real& time, std::vector<real>& q, std::vector<real>& p) const {
+void LoadedStepper<real>::state(real& time, std::vector<real>& q, std::vector<real>& p) const {
     q.resize(kernel_->coordinates);
     p.resize(kernel_->coordinates);
     kernel_->state(stepper_, &time, q.data(), p.data());
 }
 
 template <class real>
-real Stepper<real>::energy(const std::vector<real>& q, const std::vector<real>& p) const {
+real LoadedStepper<real>::energy(const std::vector<real>& q, const std::vector<real>& p) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     real energy{};
     kernel_->energy(stepper_, q.data(), p.data(), &energy);
@@ -124,7 +124,7 @@ real Stepper<real>::energy(const std::vector<real>& q, const std::vector<real>& 
 }
 
 template <class real>
-std::vector<real> Stepper<real>::momentum(const std::vector<real>& q, const std::vector<real>& velocity) const {
+std::vector<real> LoadedStepper<real>::momentum(const std::vector<real>& q, const std::vector<real>& velocity) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);
     std::vector<real> p(kernel_->coordinates);
     kernel_->momentum(stepper_, q.data(), velocity.data(), p.data());
@@ -132,7 +132,7 @@ std::vector<real> Stepper<real>::momentum(const std::vector<real>& q, const std:
 }
 
 template <class real>
-std::vector<real> Stepper<real>::velocity(const std::vector<real>& q, const std::vector<real>& p) const {
+std::vector<real> LoadedStepper<real>::velocity(const std::vector<real>& q, const std::vector<real>& p) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     std::vector<real> velocity(kernel_->coordinates);
     kernel_->velocity(stepper_, q.data(), p.data(), velocity.data());
@@ -140,7 +140,7 @@ std::vector<real> Stepper<real>::velocity(const std::vector<real>& q, const std:
 }
 
 template <class real>
-void Stepper<real>::acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const {
+void LoadedStepper<real>::acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const {
     assert(std::ssize(q) == kernel_->coordinates);
     W.resize(kernel_->coordinates);
     S.resize(kernel_->coordinates * kernel_->coordinates);
@@ -148,8 +148,8 @@ void Stepper<real>::acceleration(const std::vector<real>& q, std::vector<real>& 
 }
 
 template <class real>
-std::vector<real> Stepper<real>::residual(const std::vector<real>& q, const std::vector<real>& p,
-                                          const std::vector<real>& Q) const {
+std::vector<real> LoadedStepper<real>::residual(const std::vector<real>& q, const std::vector<real>& p,
+                                                const std::vector<real>& Q) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     assert(std::ssize(Q) == kernel_->unknowns);
     std::vector<real> F(kernel_->unknowns);
@@ -158,7 +158,7 @@ std::vector<real> Stepper<real>::residual(const std::vector<real>& q, const std:
 }
 
 template <class real>
-std::vector<real> Stepper<real>::jacobian(const std::vector<real>& Q) const {
+std::vector<real> LoadedStepper<real>::jacobian(const std::vector<real>& Q) const {
     assert(std::ssize(Q) == kernel_->unknowns);
     std::vector<real> J(kernel_->unknowns * kernel_->unknowns);
     kernel_->jacobian(stepper_, Q.data(), J.data());
@@ -166,8 +166,8 @@ std::vector<real> Stepper<real>::jacobian(const std::vector<real>& Q) const {
 }
 
 template <class real>
-lobatto_status Stepper<real>::tangent(const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1,
-                                      std::vector<real>& p1, std::vector<real>& T) const {
+lobatto_status LoadedStepper<real>::tangent(const std::vector<real>& q, const std::vector<real>& p,
+                                            std::vector<real>& q1, std::vector<real>& p1, std::vector<real>& T) const {
     const std::int32_t n = kernel_->coordinates;
     assert(std::ssize(q) == n && std::ssize(p) == n);
     q1.resize(n);
@@ -176,9 +176,9 @@ lobatto_status Stepper<real>::tangent(const std::vector<real>& q, const std::vec
     return static_cast<lobatto_status>(kernel_->tangent(stepper_, q.data(), p.data(), q1.data(), p1.data(), T.data()));
 }
 
-template class Stepper<float>;
-template class Stepper<double>;
-template class Stepper<long double>;
-template class Stepper<__float128>;
+template class LoadedStepper<float>;
+template class LoadedStepper<double>;
+template class LoadedStepper<long double>;
+template class LoadedStepper<__float128>;
 
 }  // namespace lobatto

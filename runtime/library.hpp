@@ -46,16 +46,16 @@ private:
     const lobatto_kernel* table_ = nullptr;
 };
 
-// One trajectory's state inside a kernel. `real` must be the kernel's number type.
-// All functions that can fail return lobatto_status; shapes as in kernel_abi.h.
+// One trajectory inside a loaded kernel: the host's side of the Stepper<K> of kernel.hpp. `real` must be the kernel's
+// number type. All functions that can fail return lobatto_status; shapes as in kernel_abi.h.
 template <class real>
-class Stepper {
+class LoadedStepper {
 public:
-    explicit Stepper(Kernel kernel);  // MachineError when real is not the kernel's number type
-    Stepper(const Stepper& other);
-    Stepper& operator=(const Stepper& other);
-    Stepper(Stepper&&) noexcept = default;
-    Stepper& operator=(Stepper&&) noexcept = default;
+    explicit LoadedStepper(Kernel kernel);  // MachineError when real is not the kernel's number type
+    LoadedStepper(const LoadedStepper& other);
+    LoadedStepper& operator=(const LoadedStepper& other);
+    LoadedStepper(LoadedStepper&&) noexcept = default;
+    LoadedStepper& operator=(LoadedStepper&&) noexcept = default;
 
     lobatto_status prepare(const std::vector<real>& parameters, real step);
     lobatto_status start(real time, const std::vector<real>& q, const std::vector<real>& p);

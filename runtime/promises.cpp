@@ -34,7 +34,7 @@ std::vector<real> joined(std::vector<real> q, const std::vector<real>& p) {
 template <class real>
 Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters, const std::vector<real>& q,
                       const std::vector<real>& p, real step, std::int64_t steps) {
-    Stepper<real> stepper(kernel);
+    LoadedStepper<real> stepper(kernel);
     const std::size_t n = q.size(), rows = 2 * n;
     const std::vector<real> start = joined(q, p);
     std::vector<real> position = q, momentum = p, range(rows, real(0)), largest(rows, real(0)), q1, p1, T;
@@ -110,7 +110,7 @@ template Return there_and_back(const Kernel&, const std::vector<__float128>&, co
 
 double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step) {
     using real = __float128;
-    Stepper<real> stepper(kernel);
+    LoadedStepper<real> stepper(kernel);
     const std::size_t n = start.q.size(), rows = 2 * n;
     std::vector<real> q1, p1, T, ignored;
     const char* const failure = "the tangent map cannot be measured: the step from the start fails";
@@ -144,7 +144,7 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     std::vector<double> energies;
     std::vector<std::vector<double>> motion;
     double energy_size = 0;
-    Stepper<double> stepper(kernel);
+    LoadedStepper<double> stepper(kernel);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
         throw ComputationError("the energy cannot be followed: the kernel refuses the scene's values");
     TrajectoryRequest request;

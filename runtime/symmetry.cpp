@@ -81,7 +81,7 @@ Symmetry symmetry_of(const MatrixXd& B, const VectorXd& d, const std::vector<std
 std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
                                       const std::vector<double>& q, double step,
                                       const std::vector<std::string>& names) {
-    Stepper<double> stepper(kernel);
+    LoadedStepper<double> stepper(kernel);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
         throw ComputationError("symmetries cannot be looked for: the kernel refuses the scene's values");
     const Eigen::Index n = static_cast<Eigen::Index>(q.size()), pairs = n * (n - 1) / 2, unknowns = pairs + n;

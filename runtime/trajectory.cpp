@@ -33,7 +33,7 @@ constexpr double progress_seconds = 0.1;
 // Watches the kept states go by: their energies, and the sink.
 class Keeper {
 public:
-    Keeper(const Stepper<double>& stepper, const TrajectoryRequest& request, TrajectoryResult& result)
+    Keeper(const LoadedStepper<double>& stepper, const TrajectoryRequest& request, TrajectoryResult& result)
         : stepper_(stepper), request_(request), result_(result), n_(request.q.size()), q_(n_), p_(n_) {
         result_.energy_start = energy(request.q.data(), request.p.data());
     }
@@ -65,7 +65,7 @@ private:
         return stepper_.energy(q_, p_);
     }
 
-    const Stepper<double>& stepper_;
+    const LoadedStepper<double>& stepper_;
     const TrajectoryRequest& request_;
     TrajectoryResult& result_;
     std::size_t n_;
@@ -83,7 +83,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     result.time = request.time;
     result.q = request.q;
     result.p = request.p;
-    Stepper<double> stepper(kernel);
+    LoadedStepper<double> stepper(kernel);
     result.status = stepper.prepare(request.parameters, request.step);
     if (result.status == LOBATTO_OK) result.status = stepper.start(request.time, request.q, request.p);
     if (result.status != LOBATTO_OK) return result;

@@ -48,8 +48,8 @@ std::string refusal(const std::string& object, const std::string& expected_diges
     return message.substr(begin.size(), message.size() - begin.size() - end.size());
 }
 
-Stepper<double> pendulum_stepper(const Workshop& workshop, double h) {
-    Stepper<double> stepper(Kernel::load(workshop.build_pendulum(), digest));
+LoadedStepper<double> pendulum_stepper(const Workshop& workshop, double h) {
+    LoadedStepper<double> stepper(Kernel::load(workshop.build_pendulum(), digest));
     REQUIRE(stepper.prepare({2.0, 3.0}, h) == LOBATTO_OK);
     return stepper;
 }
@@ -91,7 +91,9 @@ TEST_CASE("a file that is not a kernel, or not the expected one, is refused with
 TEST_CASE("a kernel computes in its own number type only") {
     const Workshop workshop;
     const Kernel kernel = Kernel::load(workshop.build_pendulum(), digest);
-    const auto message = [&](auto zero) { return message_of<MachineError>([&] { Stepper<decltype(zero)>{kernel}; }); };
+    const auto message = [&](auto zero) {
+        return message_of<MachineError>([&] { LoadedStepper<decltype(zero)>{kernel}; });
+    };
     const std::string begin = "the kernel handwritten_pendulum computes in double, but was asked to compute in ";
     CHECK(message(0.0F) == begin + "float");
     CHECK(message(0.0L) == begin + "long double");
@@ -102,7 +104,7 @@ TEST_CASE("a kernel computes in its own number type only") {
 TEST_CASE("the wrapper passes every function of the kernel through") {
     const Workshop workshop;
     const double m = 2, omega2 = 9, h = 0.1, q = 0.7, p = 0.4, xi = 0.5 - std::sqrt(0.05);
-    Stepper<double> stepper = pendulum_stepper(workshop, h);
+    LoadedStepper<double> stepper = pendulum_stepper(workshop, h);
     CHECK(stepper.energy({q}, {p}) == doctest::Approx(p * p / (2 * m) + m * omega2 * (1 - std::cos(q))).epsilon(1e-15));
     CHECK(stepper.momentum({q}, {0.25}) == std::vector<double>{0.5});
     CHECK(stepper.velocity({q}, {0.5}) == std::vector<double>{0.25});
@@ -126,7 +128,7 @@ TEST_CASE("the wrapper passes every function of the kernel through") {
 
 TEST_CASE("advance records every k-th state, stops when the room is full, and state agrees with the last record") {
     const Workshop workshop;
-    Stepper<double> stepper = pendulum_stepper(workshop, 0.125);
+    LoadedStepper<double> stepper = pendulum_stepper(workshop, 0.125);
     REQUIRE(stepper.start(1.0, {0.7}, {0.4}) == LOBATTO_OK);
     std::vector<double> records(3 * 4);
     lobatto_advance call{};
@@ -151,13 +153,13 @@ TEST_CASE("advance records every k-th state, stops when the room is full, and st
 
 TEST_CASE("a copied stepper goes its own way, and the way of the original") {
     const Workshop workshop;
-    Stepper<double> original = pendulum_stepper(workshop, 0.1);
+    LoadedStepper<double> original = pendulum_stepper(workshop, 0.1);
     REQUIRE(original.start(0.0, {2.0}, {0.0}) == LOBATTO_OK);
     lobatto_advance call{};
     call.steps = 10;
     original.advance(call);
-    Stepper<double> copy = original;
-    const auto position = [](const Stepper<double>& stepper) {
+    LoadedStepper<double> copy = original;
+    const auto position = [](const LoadedStepper<double>& stepper) {
         double time = 0;
         std::vector<double> q, p;
         stepper.state(time, q, p);
@@ -176,8 +178,8 @@ TEST_CASE("a copied stepper goes its own way, and the way of the original") {
 
 TEST_CASE("a kernel stays loaded as long as a stepper uses it") {
     const Workshop workshop;
-    auto stepper = std::make_unique<Stepper<double>>(Kernel::load(workshop.build_pendulum(), digest));
-    Stepper<double> moved = std::move(*stepper);
+    auto stepper = std::make_unique<LoadedStepper<double>>(Kernel::load(workshop.build_pendulum(), digest));
+    LoadedStepper<double> moved = std::move(*stepper);
     stepper.reset();
     REQUIRE(moved.prepare({1.0, 1.0}, 0.1) == LOBATTO_OK);
     CHECK(moved.start(0.0, {0.5}, {0.0}) == LOBATTO_OK);
@@ -185,7 +187,7 @@ TEST_CASE("a kernel stays loaded as long as a stepper uses it") {
 
 TEST_CASE("the tangent map of the pendulum's step agrees with differences, and is symplectic") {
     const Workshop workshop;
-    const Stepper<double> stepper = pendulum_stepper(workshop, 0.2);
+    const LoadedStepper<double> stepper = pendulum_stepper(workshop, 0.2);
     const double q = 1.3, p = -0.8, d = 1e-5;
     std::vector<double> q1, p1, T, q_plus, p_plus, q_minus, p_minus, unused;
     REQUIRE(stepper.tangent({q}, {p}, q1, p1, T) == LOBATTO_OK);

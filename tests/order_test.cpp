@@ -25,7 +25,7 @@ const QuadrupleStart coupled_start{{}, {0.75, 0.25}, {0.5, 1}};
 
 // |q(4) - exact| with the given number of steps.
 double error_at_four(const Kernel& kernel, std::int64_t steps) {
-    Stepper<__float128> stepper(kernel);
+    LoadedStepper<__float128> stepper(kernel);
     lobatto_advance call{};
     call.steps = steps;
     REQUIRE(stepper.prepare(wide_swing.parameters, __float128(4) / steps) == LOBATTO_OK);
@@ -116,7 +116,7 @@ TEST_CASE("steps that fail at any length leave no order to measure") {
 
 TEST_CASE("a stage matrix with one wrong entry is neither symplectic nor reversible") {
     const Kernel kernel = spoilt_pendulum();
-    Stepper<double> stepper(kernel);
+    LoadedStepper<double> stepper(kernel);
     REQUIRE(stepper.prepare({1, 1}, 0.5) == LOBATTO_OK);
     CHECK(symplectic_defect<double>(stepper, {2}, {0.5}) > 1e-6);  // rounding is 1e-16
     const Return back = there_and_back<double>(kernel, {1, 1}, {2}, {0}, 0.5, 100);
@@ -148,8 +148,8 @@ TEST_CASE("the energy of a long run swings without drifting; a motion that leave
     const EnergyDrift drift = energy_drift(kernel, {1, 1}, {2}, {0}, 0.3, 20000);
     CHECK(drift.steps == 20000);
     CHECK(drift.bounded);
-    CHECK(drift.swing > 1e-5);               // the method's error
-    CHECK(drift.drift < drift.swing / 100);  // measured: a thousandth
+    CHECK(drift.swing > 1e-5);                                         // the method's error
+    CHECK(drift.drift < drift.swing / 100);                            // measured: a thousandth
     CHECK(energy_drift(kernel, {1, 1}, {0}, {3}, 0.1, 1000).bounded);  // turning over and over, at an even pace
     const Kernel falling = test::kernel_in_own_cache(
         derive(test::scene_of("q'^2/2 - q", "q = { position = 0, velocity = 0 }", 4)), Precision::double_);

@@ -242,7 +242,7 @@ TEST_CASE("a start that is impossible keeps nothing and says why") {
 }
 
 TEST_CASE("the step is symplectic to rounding") {
-    Stepper<double> stepper(pendulum());
+    LoadedStepper<double> stepper(pendulum());
     REQUIRE(stepper.prepare({1.5, 2}, 0.7) == LOBATTO_OK);
     for (const double q : {0.0, 1.0, 2.9}) CHECK(symplectic_defect(stepper, {q}, {0.8}) < 1e-15);  // measured 5e-17
     CHECK(test::message_of<ComputationError>([&] { symplectic_defect(stepper, {std::nan("")}, {0.8}); }) ==
@@ -254,7 +254,7 @@ TEST_CASE("the symplectic defect shrinks with the precision") {
     const auto defect_in = [&]<class real>(real, Precision precision) {
         EmitOptions options;
         options.precision = precision;
-        Stepper<real> stepper(kernel_in_own_cache(emit(derivation, options), precision));
+        LoadedStepper<real> stepper(kernel_in_own_cache(emit(derivation, options), precision));
         REQUIRE(stepper.prepare({}, real(0.3)) == LOBATTO_OK);
         return static_cast<double>(symplectic_defect<real>(stepper, {real(0.7), real(-0.4)}, {real(0.2), real(1.1)}));
     };
@@ -272,7 +272,7 @@ TEST_CASE("the symplectic defect shrinks with the precision") {
 
 TEST_CASE("a linear system conserves its discrete energy about its fixed point") {
     const Derivation derivation = derive(coupled("x^2 + x*y + y^2 - 3*x"));
-    Stepper<double> stepper(kernel_in_own_cache(emit(derivation), Precision::double_));
+    LoadedStepper<double> stepper(kernel_in_own_cache(emit(derivation), Precision::double_));
     REQUIRE(stepper.prepare({}, 0.5) == LOBATTO_OK);
     const std::optional<DiscreteEnergy> energy = discrete_energy(stepper);
     REQUIRE(energy);
@@ -290,10 +290,10 @@ TEST_CASE("a linear system conserves its discrete energy about its fixed point")
 }
 
 TEST_CASE("a constant force has no discrete energy, nor has a nonlinear system") {
-    Stepper<double> falling(kernel_in_own_cache(emit(derive(coupled("9.81*x"))), Precision::double_));
+    LoadedStepper<double> falling(kernel_in_own_cache(emit(derive(coupled("9.81*x"))), Precision::double_));
     REQUIRE(falling.prepare({}, 0.5) == LOBATTO_OK);
     CHECK(!discrete_energy(falling));
-    Stepper<double> nonlinear(pendulum());
+    LoadedStepper<double> nonlinear(pendulum());
     REQUIRE(nonlinear.prepare({1, 1}, 0.5) == LOBATTO_OK);
     CHECK(!discrete_energy(nonlinear));
 }
