@@ -59,12 +59,10 @@ TEST_CASE("the s-point kernel converges at order 2, 4, 6, 8 to the pendulum's el
         const Kernel kernel = quadruple_kernel(test::pendulum_scene(points));
         // The last error of s = 5 is 1.8e-15, far above the reference's rounding of about 1e-18.
         const std::int64_t steps = points == 2 ? 256 : points == 5 ? 8 : 16;
-        const double coarse = error_at_four(kernel, steps), fine = error_at_four(kernel, 2 * steps),
-                     finest = error_at_four(kernel, 4 * steps);
-        INFO(points << " points: " << coarse << " " << fine << " " << finest);
+        const double fine = error_at_four(kernel, 2 * steps), finest = error_at_four(kernel, 4 * steps);
+        INFO(points << " points: " << fine << " " << finest);
         CHECK(finest > 1e-16);
         CHECK(std::fabs(std::log2(fine / finest) - (2 * points - 2)) < 0.3);
-        CHECK(std::fabs(std::log2(coarse / fine) - (2 * points - 2)) < 0.6);
     }
 }
 
@@ -148,8 +146,8 @@ TEST_CASE("the energy of a long run swings without drifting; a motion that leave
     const EnergyDrift drift = energy_drift(kernel, {1, 1}, {2}, {0}, 0.3, 20000);
     CHECK(drift.steps == 20000);
     CHECK(drift.bounded);
-    CHECK(drift.swing > 1e-5);               // the method's error
-    CHECK(drift.drift < drift.swing / 100);  // measured: a thousandth
+    CHECK(drift.swing > 1e-5);                                         // the method's error
+    CHECK(drift.drift < drift.swing / 100);                            // measured: a thousandth
     CHECK(energy_drift(kernel, {1, 1}, {0}, {3}, 0.1, 1000).bounded);  // turning over and over, at an even pace
     const Kernel falling = test::kernel_in_own_cache(
         derive(test::scene_of("q'^2/2 - q", "q = { position = 0, velocity = 0 }", 4)), Precision::double_);
