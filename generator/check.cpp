@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <tuple>
 
 #include "generator/check_point.hpp"
 
@@ -125,7 +124,7 @@ ex integral(const ex& polynomial, const GiNaC::symbol& theta) {
 }  // namespace
 
 std::vector<Check> check_quadrature(const Quadrature& quadrature) {
-    const auto& [c, b, l] = std::tie(quadrature.c, quadrature.b, quadrature.basis);
+    const Expressions &c = quadrature.c, &b = quadrature.b, &l = quadrature.basis;
     const std::size_t s = c.size(), m = s - 2;
     const GiNaC::symbol& theta = quadrature.theta;
     const auto moment_error = [&](std::size_t degree) {
@@ -182,7 +181,7 @@ std::vector<Check> check_quadrature(const Quadrature& quadrature) {
 std::vector<Check> check_equations(const Derivation& derivation) {
     const Discretisation& d = derivation.discretisation;
     const System& system = derivation.system;
-    const auto& [c, b] = std::tie(derivation.quadrature.c, derivation.quadrature.b);
+    const Expressions &c = derivation.quadrature.c, &b = derivation.quadrature.b;
     const std::size_t n = static_cast<std::size_t>(system.n), s = c.size(), m = s - 2;
     const ex h = d.h;
     const GiNaC::matrix inverse_mass = system.mass.inverse();

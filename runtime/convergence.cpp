@@ -75,15 +75,23 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
             continue;
         }
         Convergence measured;
+        bool too_coarse = false;
         for (int rung = 0; rung < rungs; ++rung) {
             const std::optional<States> states = states_with(stepper, start, coarse, 1 << rung);
-            if (!states) break;
+            if (!states) {
+                too_coarse = true;
+                continue;
+            }
             ConvergenceRow row{static_cast<double>(coarse) / (1 << rung), error_of(*states, *reference, start), 0};
             if (row.error < rounding_error) break;
-            if (rung > 0) row.order = std::log2(measured.rows.back().error / row.error);
+            if (!measured.rows.empty()) row.order = std::log2(measured.rows.back().error / row.error);
             measured.rows.push_back(row);
         }
         const std::size_t count = measured.rows.size();
+        if (count < 3 && too_coarse) {
+            coarse /= 2;
+            continue;
+        }
         if (count < 3) {  // below rounding too soon
             if (best.rows.empty()) best.exact = count == 0;
             coarse *= 4;
