@@ -219,7 +219,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
     Evolution oscillator = evolution(PaperSystem::oscillator, 1e5, 1, {2.50e-11, 5.45e-14, 1.35e-13});
     figures.push_back(
         {"figure2", "Figure 2: harmonic oscillator, energy error over 1e5 periods",
-         "Running maxima. Above: |H − H(0)|, which is bounded; the rise of h = 0.025 after 1e4 periods is rounding. "
+         "Running maxima. Above: |H − H(0)|, which is bounded. "
          "Below: the discrete energy H_d, which the exact scheme preserves; what grows is rounding (full lines: double "
          "arithmetic; "
          "dotted: extended, 64-bit significand).",

@@ -7,7 +7,6 @@
 #include "generator/discretisation.hpp"
 
 #include <string>
-#include <tuple>
 
 namespace lobatto {
 
@@ -25,7 +24,7 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
     Discretisation d;
     const std::size_t n = static_cast<std::size_t>(system.n), s = static_cast<std::size_t>(quadrature.points),
                       m = s - 2;
-    const auto& [c, b] = std::tie(quadrature.c, quadrature.b);
+    const std::vector<ex>&c = quadrature.c, &b = quadrature.b;
     const ex h = d.h;
 
     for (std::size_t i = 0; i < s; ++i) {

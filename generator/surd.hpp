@@ -28,13 +28,13 @@ struct Surd {
     friend Surd operator+(const Surd& x, const Surd& y) { return {x.a + y.a, x.b + y.b, common(x, y)}; }
     friend Surd operator-(const Surd& x, const Surd& y) { return {x.a - y.a, x.b - y.b, common(x, y)}; }
     friend Surd operator*(const Surd& x, const Surd& y) {
-        const int d = common(x, y);
-        return {x.a * y.a + x.b * y.b * d, x.a * y.b + x.b * y.a, d};
+        const int radicand = common(x, y);
+        return {x.a * y.a + x.b * y.b * radicand, x.a * y.b + x.b * y.a, radicand};
     }
     friend Surd operator/(const Surd& x, const Surd& y) {
-        const int d = common(x, y);
-        const GiNaC::numeric norm = y.a * y.a - y.b * y.b * d;  // zero only for y = 0: d is no square
-        return x * Surd(y.a / norm, -y.b / norm, d);
+        const int radicand = common(x, y);
+        const GiNaC::numeric norm = y.a * y.a - y.b * y.b * radicand;  // zero only for y = 0: the radicand is no square
+        return x * Surd(y.a / norm, -y.b / norm, radicand);
     }
 
 private:
