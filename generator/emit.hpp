@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "generator/notation.hpp"
-#include "generator/passes.hpp"
+#include "generator/optimise.hpp"
 
 namespace lobatto {
 

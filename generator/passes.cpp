@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs. Each pass is checked at 40 digits.
+// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs.
 #include "generator/passes.hpp"
 
 #include <cln/cln.h>
@@ -15,14 +15,6 @@
 namespace lobatto {
 
 namespace {
-
-std::vector<Id> roots_of(const Programs& programs) {
-    std::vector<Id> roots;
-    for (const Program& program : programs.programs)
-        for (const Output& output : program.outputs) roots.push_back(output.value);
-    for (const auto& [id, name] : programs.names) roots.push_back(id);
-    return roots;
-}
 
 // A new graph in which every node is what `rule` makes of it, given its operands already rewritten.
 using Rule = std::function<Id(Graph& result, const Graph& before, Id id, std::vector<Id> operands)>;
@@ -54,8 +46,9 @@ Id same(Graph& graph, const Node& node, std::vector<Id> operands) {
     return graph.raw(node.op, std::move(operands), node.index);
 }
 
+}  // namespace
+
 // ---- fold constants: whatever depends on numbers only becomes a number of 60 digits; its formula stays as label
-// -----------------------
 
 Programs fold_constants(const Programs& programs) {
     Graph scratch = programs.graph;  // to print the formulas that vanish
@@ -87,7 +80,8 @@ Programs fold_constants(const Programs& programs) {
 }
 
 // ---- factor sums (Horner): a x^3 + b x^2 + c x = x (c + x (b + a x))
-// -----------------------------------------------------------------
+
+namespace {
 
 // A factor is taken out only of terms that are known no earlier than the factor itself: coefficients of an earlier
 // stage are hoisted for free.
@@ -131,6 +125,8 @@ Id horner(Graph& graph, const std::vector<Id>& terms) {
     return graph.raw(Op::add, std::move(sum));
 }
 
+}  // namespace
+
 Programs factor_sums(const Programs& programs) {
     return rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         return before[id].op == Op::add ? horner(graph, operands) : same(graph, before[id], std::move(operands));
@@ -138,7 +134,8 @@ Programs factor_sums(const Programs& programs) {
 }
 
 // ---- powers by multiplication
-// -----------------------------------------------------------------------------------------------------------
+
+namespace {
 
 Id raised(Graph& graph, Id base, int exponent) {
     if (exponent == 1) return base;
@@ -149,6 +146,8 @@ Id raised(Graph& graph, Id base, int exponent) {
     }
     return graph.raw(Op::multiply, {raised(graph, base, exponent - 1), base});
 }
+
+}  // namespace
 
 Programs multiply_powers(const Programs& programs) {
     // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...
@@ -166,7 +165,8 @@ Programs multiply_powers(const Programs& programs) {
 }
 
 // ---- stages: the operands known first are combined first, so that their part can be hoisted
-// ---------------------------------------------
+
+namespace {
 
 std::string positive_label(const Constant& negative) {
     if (negative.label.empty()) return "";
@@ -174,6 +174,8 @@ std::string positive_label(const Constant& negative) {
                ? negative.label.substr(2, negative.label.size() - 3)
                : "-(" + negative.label + ")";
 }
+
+}  // namespace
 
 Programs group_by_stage(const Programs& programs) {
     // Products that have a name of their own keep their sign.
@@ -216,7 +218,6 @@ Programs group_by_stage(const Programs& programs) {
 }
 
 // ---- share: operand pairs that several sums or products contain are computed once
-// --------------------------------------------------------
 
 Programs share_pairs(const Programs& programs) {
     // Sums and products of the graph as operand lists, rewritten in place; extracted pairs become new nodes of `graph`.
@@ -309,7 +310,6 @@ Programs share_pairs(const Programs& programs) {
 }
 
 // ---- sine and cosine of one argument as a pair
-// -------------------------------------------------------------------------------------------
 
 Programs pair_sines(const Programs& programs) {
     std::set<Id> sines, cosines;  // arguments, in the graph before
@@ -327,173 +327,12 @@ Programs pair_sines(const Programs& programs) {
     });
 }
 
-// ---- the check
-// ---------------------------------------------------------------------------------------------------------------------------
-
-// Seeded sample values: the same on every machine.
-class Samples {
-public:
-    explicit Samples(std::uint64_t seed) : state_(seed * 2654435761u + 12345u) {}
-    cln::cl_R next() {
-        state_ = state_ * 6364136223846793005u + 1442695040888963407u;
-        const auto bits = static_cast<unsigned long>(state_ >> 34);  // 30 bits
-        return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 7 + 1) / cln::cl_I(1ul << 33),
-                             cln::float_format(number_digits)) +
-               cln::cl_RA("1/16");
-    }
-
-private:
-    std::uint64_t state_;
-};
-
-constexpr int any_seeds = 20;
-
-// The values of all outputs at the seed's point; nothing when one of them is not real there.
-std::optional<std::vector<cln::cl_R>> outputs_at(const Programs& programs, std::uint64_t seed) {
-    Samples samples(seed);
-    std::vector<cln::cl_R> inputs;
-    // Anywhere in (0, 1) first; where that leaves the real numbers, ever nearer to the scene's own values.
-    for (const Input& input : programs.graph.inputs()) {
-        const cln::cl_R sample = samples.next();
-        const cln::cl_R start = cln::cl_float(input.start, cln::float_format(number_digits));
-        const cln::cl_R nearness = cln::scale_float(cln::cl_float(1, cln::float_format(number_digits)),
-                                                    -(static_cast<int>(seed) - any_seeds) / 4);
-        inputs.push_back(static_cast<int>(seed) <= any_seeds ? sample
-                                                             : start + nearness * (sample - cln::cl_RA("1/2")));
-    }
-    try {
-        std::vector<cln::cl_R> values = programs.graph.evaluate(inputs, roots_of(programs)), outputs;
-        for (const Program& program : programs.programs)
-            for (const Output& output : program.outputs)
-                outputs.push_back(values[static_cast<std::size_t>(output.value)]);
-        return outputs;
-    } catch (const DomainError&) {
-        return std::nullopt;
-    }
-}
-
-double disagreement(const std::vector<cln::cl_R>& before, const std::vector<cln::cl_R>& after) {
-    double worst = 0;
-    for (std::size_t i = 0; i < before.size(); ++i) {
-        const cln::cl_R scale = cln::max(cln::abs(before[i]), cln::abs(after[i]));
-        if (cln::zerop(scale)) continue;
-        worst = std::max(worst, cln::double_approx(cln::abs(before[i] - after[i]) / scale));
-    }
-    return worst;
-}
-
-}  // namespace
-
-Operations count(const Graph& graph, const std::vector<Id>& nodes) {
-    Operations operations;
-    std::map<Id, int> uses;
-    for (const Id id : nodes)
-        for (const Id operand : graph[id].operands) ++uses[operand];
-    for (const Id id : nodes) {
-        const Node& node = graph[id];
-        if (node.stage == Stage::constant) continue;
-        // A reciprocal known earlier is hoisted, one used twice has a name: then it is a factor like others.
-        const auto is_reciprocal = [&](Id operand) {
-            return graph[operand].op == Op::power && graph[operand].index < 0 && graph[operand].stage == node.stage &&
-                   uses[operand] == 1;
-        };
-        switch (node.op) {
-            case Op::constant:
-            case Op::input:
-            case Op::pair_sine:
-            case Op::pair_cosine:
-                break;
-            case Op::add:
-                operations.additions += static_cast<long>(node.operands.size()) - 1;
-                break;
-            case Op::multiply: {
-                // Numerator and denominator are products of their own; a reciprocal turns its multiplication into the
-                // division counted with it.
-                long factors = 0, reciprocals = 0;
-                for (const Id operand : node.operands) {
-                    if (is_reciprocal(operand))
-                        ++reciprocals;
-                    else if (!graph.is_number(operand, 1) && !graph.is_number(operand, -1))
-                        ++factors;
-                }
-                operations.multiplications += std::max(factors - 1, 0L) + std::max(reciprocals - 1, 0L);
-                operations.divisions += reciprocals > 0 ? 1 - reciprocals : 0;
-                break;
-            }
-            case Op::power:
-                operations.multiplications += std::abs(node.index) - 1;
-                operations.divisions += node.index < 0 ? 1 : 0;
-                break;
-            default:
-                ++operations.functions;
-                break;
-        }
-    }
-    return operations;
-}
-
-Operations count(const Programs& programs) {
-    Operations sum;
-    const auto accumulate = [&](const std::vector<Id>& nodes) {
-        const Operations part = count(programs.graph, nodes);
-        sum.additions += part.additions;
-        sum.multiplications += part.multiplications;
-        sum.divisions += part.divisions;
-        sum.functions += part.functions;
-    };
-    std::set<Id> hoisted;
-    for (const Program& program : programs.programs) {
-        std::vector<Id> roots, here;
+std::vector<Id> roots_of(const Programs& programs) {
+    std::vector<Id> roots;
+    for (const Program& program : programs.programs)
         for (const Output& output : program.outputs) roots.push_back(output.value);
-        for (const Id id : programs.graph.topological(roots)) {
-            if (programs.graph[id].stage <= Stage::step_size)
-                hoisted.insert(id);
-            else
-                here.push_back(id);
-        }
-        accumulate(here);
-    }
-    accumulate({hoisted.begin(), hoisted.end()});
-    return sum;
-}
-
-std::vector<PassReport> optimise(Programs& programs) {
-    struct Pass {
-        const char* name;
-        Programs (*run)(const Programs&);
-        bool only_if_cheaper;
-    };
-    constexpr std::array<Pass, 6> passes = {{{"fold constants", fold_constants, false},
-                                             {"factor sums (Horner)", factor_sums, true},
-                                             {"powers by multiplication", multiply_powers, false},
-                                             {"group by stage", group_by_stage, false},
-                                             {"share common parts", share_pairs, true},
-                                             {"pair sines and cosines", pair_sines, false}}};
-    // Sample points at which everything is real: the first two of 180 seeds.
-    std::vector<std::pair<std::uint64_t, std::vector<cln::cl_R>>> expected;
-    for (std::uint64_t seed = 1; seed <= 180 && expected.size() < 2; ++seed)
-        if (auto values = outputs_at(programs, seed)) expected.emplace_back(seed, std::move(*values));
-    if (expected.empty())
-        throw DomainError(
-            "the formulas of this scene have no real value at any of 180 sample points, the nearest 2^-40 from its "
-            "start");
-
-    std::vector<PassReport> reports{{"as derived", count(programs), 0}};
-    for (const Pass& pass : passes) {
-        Programs result = pass.run(programs);
-        PassReport report{pass.name, count(result), 0};
-        for (const auto& [seed, values] : expected) {
-            const auto now = outputs_at(result, seed);
-            report.disagreement = std::max(report.disagreement, now ? disagreement(values, *now) : 1.0);
-        }
-        if (!(report.disagreement < 1e-40)) throw std::logic_error("the pass '" + report.pass + "' changed a value");
-        if (pass.only_if_cheaper && report.after.total() >= reports.back().after.total())
-            report.after = reports.back().after;
-        else
-            programs = std::move(result);
-        reports.push_back(report);
-    }
-    return reports;
+    for (const auto& [id, name] : programs.names) roots.push_back(id);
+    return roots;
 }
 
 }  // namespace lobatto

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs. Each pass is checked at 40 digits.
+// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs.
 #pragma once
 
 #include <string>
@@ -29,23 +29,15 @@ struct Programs {
     std::vector<std::pair<Id, std::string>> names;  // value -> identifier
 };
 
-// Operations of one evaluation of every program (a value that two programs need counts in both; values of stage
-// constant are free, values hoisted to parameters and step size count once).
-struct Operations {
-    long additions = 0, multiplications = 0, divisions = 0, functions = 0;
-    long total() const { return additions + multiplications + divisions + functions; }
-};
-Operations count(const Programs& programs);
-Operations count(const Graph& graph, const std::vector<Id>& nodes);
+// The values that the programs and the names ask for.
+std::vector<Id> roots_of(const Programs& programs);
 
-struct PassReport {
-    std::string pass;  // "fold constants"
-    Operations after;
-    double disagreement = 0;  // largest relative difference to the graph before the pass, at seeded points
-};
-
-// Runs all passes in order. A pass whose values differ by more than 1e-40 relative is a bug of ours: std::logic_error.
-// The first report row counts the programs as derived.
-std::vector<PassReport> optimise(Programs& programs);
+// The passes. Each gives the same values on a graph of its own.
+Programs fold_constants(const Programs& programs);   // numbers of 60 digits; the formula stays as label
+Programs factor_sums(const Programs& programs);      // Horner
+Programs multiply_powers(const Programs& programs);  // integer powers by multiplication
+Programs group_by_stage(const Programs& programs);   // what is known first is combined first
+Programs share_pairs(const Programs& programs);      // common parts of sums and products
+Programs pair_sines(const Programs& programs);       // sine and cosine of one argument together
 
 }  // namespace lobatto

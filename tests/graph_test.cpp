@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "generator/notation.hpp"
-#include "generator/passes.hpp"
+#include "generator/optimise.hpp"
 #include "tests/support.hpp"
 
 using namespace lobatto;
