@@ -135,6 +135,12 @@ private:
     }
 
     std::string literal(const cln::cl_R& value) const {
+        const long largest = precision_ == Precision::single ? 128 : precision_ == Precision::double_ ? 1024 : 16384;
+        const long exponent =
+            cln::zerop(value) ? 0 : cln::cl_I_to_long(cln::float_exponent(cln::cl_float(value, cln::float_format(20))));
+        if (exponent > largest || exponent < 4 - largest)
+            throw DomainError("the formulas derived from it contain the number " + decimal(value, 3) +
+                              ", beyond the range of the kernel's number type; choose other units");
         if (precision_ == Precision::double_) {
             std::array<char, 40> buffer{};
             const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), cln::double_approx(value)).ptr;

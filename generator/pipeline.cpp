@@ -15,10 +15,12 @@ Derivation derive(const Scene& scene) {
 }
 
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
+    const Scene& scene = derivation.scene;
     try {
         return emit_kernel(derivation, build_programs(derivation), options);
     } catch (const DomainError& error) {
-        throw InputError(derivation.scene.path + ": " + error.what());
+        scene.source.fail(scene.lagrangian_at,
+                          std::string("no kernel can be written for the Lagrangian: ") + error.what());
     }
 }
 

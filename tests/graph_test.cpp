@@ -192,3 +192,17 @@ TEST_CASE("a value that is real only near the scene's start is checked there; on
         test::message_of<DomainError>([&] { optimise(programs); }) ==
         "the formulas of this scene have no real value at any of 180 sample points, the nearest 2^-40 from its start");
 }
+
+TEST_CASE("exponentials of huge constants are folded to their limits or refused, never to a wrong number") {
+    Graph graph;
+    const auto value = [&graph](Op op, const cln::cl_R& x) {
+        const Id id = graph.function(op, graph.constant(x));
+        return cln::double_approx(graph.evaluate({}, {id})[static_cast<std::size_t>(id)]);
+    };
+    const cln::cl_R huge = cln::expt(cln::cl_I(10), 161);
+    CHECK(value(Op::tanh, huge) == 1);
+    CHECK(value(Op::tanh, -huge) == -1);
+    CHECK(value(Op::exp, -huge) == 0);
+    CHECK_THROWS_AS(value(Op::exp, huge), DomainError);
+    CHECK_THROWS_AS(value(Op::cosh, -huge), DomainError);
+}
