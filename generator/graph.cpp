@@ -64,7 +64,7 @@ bool Graph::is_negative(Id id) const {
     return node.op == Op::multiply && is_constant(node.operands.front()) && is_negative(node.operands.front());
 }
 
-Id Graph::add(std::vector<Id> terms) {
+Id Graph::add(const std::vector<Id>& terms) {
     std::vector<Id> flat;
     for (const Id term : terms) {
         if ((*this)[term].op == Op::add) {
@@ -110,7 +110,7 @@ Id Graph::add(std::vector<Id> terms) {
     return intern({Op::add, Stage::constant, 0, std::move(operands)});
 }
 
-Id Graph::multiply(std::vector<Id> factors) {
+Id Graph::multiply(const std::vector<Id>& factors) {
     std::vector<Id> flat;
     for (const Id factor : factors) {
         if ((*this)[factor].op == Op::multiply) {
@@ -152,7 +152,7 @@ Id Graph::multiply(std::vector<Id> factors) {
     }
     if (simpler) {
         operands.push_back(constant(coefficient));
-        return multiply(std::move(operands));
+        return multiply(operands);
     }
     if (operands.empty()) return constant(coefficient);
     if (coefficient != 1) {
@@ -161,7 +161,7 @@ Id Graph::multiply(std::vector<Id> factors) {
             std::vector<Id> terms;
             const std::vector<Id> inner = (*this)[operands.front()].operands;
             for (const Id term : inner) terms.push_back(multiply({constant(coefficient), term}));
-            return add(std::move(terms));
+            return add(terms);
         }
         operands.insert(operands.begin(), constant(coefficient));
     }
@@ -182,7 +182,7 @@ Id Graph::power(Id base, int exponent) {
         std::vector<Id> factors;
         const std::vector<Id> inner = node.operands;
         for (const Id factor : inner) factors.push_back(power(factor, exponent));
-        return multiply(std::move(factors));
+        return multiply(factors);
     }
     if (node.op == Op::sqrt && exponent % 2 == 0) return power(node.operands.front(), exponent / 2);
     return intern({Op::power, Stage::constant, exponent, {base}});

@@ -88,8 +88,8 @@ public:
 
     // Operations in canonical form: nested sums and products are flattened, rational constants combined, equal terms
     // and factors collected, operands sorted.
-    Id add(std::vector<Id> terms);
-    Id multiply(std::vector<Id> factors);
+    Id add(const std::vector<Id>& terms);
+    Id multiply(const std::vector<Id>& factors);
     Id power(Id base, int exponent);
     Id function(Op op, Id argument);
     Id raise(Id base, Id exponent);

@@ -137,7 +137,7 @@ bool Graph::leads_with_minus(Id id) const {
 Id Graph::negate_terms(Id sum) {
     std::vector<Id> terms = (*this)[sum].operands;
     for (Id& term : terms) term = negate(term);
-    return add(std::move(terms));
+    return add(terms);
 }
 
 // GiNaC chooses between (a - b) (c - d) and (b - a) (d - c) by address; here each sum has a sign of its own.
@@ -169,18 +169,18 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
         } else if (GiNaC::is_a<GiNaC::add>(e)) {
             std::vector<Id> terms;
             for (const auto& term : e) terms.push_back(self(self, term));
-            id = add(std::move(terms));
+            id = add(terms);
         } else if (GiNaC::is_a<GiNaC::mul>(e)) {
             std::vector<Id> factors;
             for (const auto& factor : e) append_factor(factors, self(self, factor), 1);
-            id = multiply(std::move(factors));
+            id = multiply(factors);
         } else if (GiNaC::is_a<GiNaC::power>(e)) {
             const Id base = self(self, e.op(0));
             const GiNaC::ex exponent = e.op(1);
             if (exponent.info(GiNaC::info_flags::integer)) {
                 std::vector<Id> factors;
                 append_factor(factors, base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
-                id = multiply(std::move(factors));
+                id = multiply(factors);
             } else if ((2 * exponent).info(GiNaC::info_flags::integer)) {
                 // x^(k/2) with k odd is sqrt(x)^k: one root for all such powers.
                 id = power(function(Op::sqrt, base), GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int());

@@ -65,16 +65,15 @@ Programs fold_constants(const Programs& programs) {
         }
         const bool n_ary = node.op == Op::add || node.op == Op::multiply;
         if (numbers.empty() || (!n_ary && !others.empty())) return same(graph, node, std::move(operands));
-        if (n_ary && numbers.size() == 1)
-            return node.op == Op::add ? graph.add(std::move(operands)) : graph.multiply(std::move(operands));
+        if (n_ary && numbers.size() == 1) return node.op == Op::add ? graph.add(operands) : graph.multiply(operands);
         std::vector<cln::cl_R> values;
         for (const Id number : numbers) values.push_back(graph.constant_of(number).value);
         const cln::cl_R value = apply(node.op, node.index, values);
         std::string label;
         if (!is_rational(value)) label = formula(scratch, scratch.raw(node.op, printed, node.index), Notation::text);
         others.push_back(graph.constant(value, label));
-        return node.op == Op::add        ? graph.add(std::move(others))
-               : node.op == Op::multiply ? graph.multiply(std::move(others))
+        return node.op == Op::add        ? graph.add(others)
+               : node.op == Op::multiply ? graph.multiply(others)
                                          : others.front();
     });
 }

@@ -117,7 +117,7 @@ private:
         for (const Ids& row : matrix) {
             Ids terms;
             for (std::size_t l = 0; l < row.size(); ++l) terms.push_back(g().multiply({row[l], vector[l]}));
-            result.push_back(g().add(std::move(terms)));
+            result.push_back(g().add(terms));
         }
         return result;
     }
@@ -148,7 +148,7 @@ private:
         const Ids rates = times(inverse_mass_, p);
         for (std::size_t k = 0; k < n_; ++k) kinetic.push_back(g().multiply({g().number(1, 2), p[k], rates[k]}));
         kinetic.push_back(convert(d_.system.potential));
-        p_.programs.push_back({"energy", {{"return", g().add(std::move(kinetic))}}});
+        p_.programs.push_back({"energy", {{"return", g().add(kinetic)}}});
         program("momentum", "p", times(mass_, velocity));
         program("velocity", "velocity", rates);
 
@@ -162,7 +162,7 @@ private:
                 terms.push_back(g().multiply(
                     {inverse_mass_[static_cast<std::size_t>(row)][l],
                      convert(d_.system.hessian(static_cast<unsigned>(l), static_cast<unsigned>(column)))}));
-            node.outputs.push_back({at("S", e), g().add(std::move(terms))});
+            node.outputs.push_back({at("S", e), g().add(terms)});
         }
         p_.programs.push_back(std::move(node));
         program("acceleration", "W", W_of_q_);
@@ -203,7 +203,7 @@ private:
         const auto row = [&](std::size_t r) {
             Ids terms = {g().multiply({in("k.Phi", 3 * r), q_[0]}), g().multiply({in("k.Phi", 3 * r + 1), in("p", 0)})};
             if (!g().is_number(force, 0)) terms.push_back(in("k.Phi", 3 * r + 2));
-            return g().add(std::move(terms));
+            return g().add(terms);
         };
         p_.programs.push_back({"propagate", {{"q1[0]", row(0)}, {"p1[0]", row(1)}}});
     }
@@ -243,7 +243,7 @@ private:
                     Ids terms{in("base", i * n_ + k)};
                     for (std::size_t j = 0; j < s_; ++j)
                         terms.push_back(g().negate(g().multiply({weights[j], in("W_before", j * n_ + k)})));
-                    extrapolated.push_back(g().add(std::move(terms)));
+                    extrapolated.push_back(g().add(terms));
                 }
             }
             program("simple_start", "Q", simple);
@@ -256,7 +256,7 @@ private:
                     Ids terms{in("Q", i * n_ + k, Stage::iterate), g().negate(in("base", i * n_ + k))};
                     for (std::size_t j = 0; j < m; ++j)
                         terms.push_back(g().multiply({h2A(i, j), in("W", j * n_ + k, Stage::iterate)}));
-                    F.push_back(g().add(std::move(terms)));
+                    F.push_back(g().add(terms));
                 }
             Rows J(N, Ids(N, g().number(0)));
             for (std::size_t i = 0; i < N; ++i) J[i][i] = g().number(1);
@@ -283,7 +283,7 @@ private:
                             terms.push_back(g().multiply(
                                 {in("S", j * entries.size() + e, Stage::iterate),
                                  in("delta", j * n_ + static_cast<std::size_t>(entries[e].second), Stage::iterate)}));
-                    carry.outputs.push_back({at("W", j * n_ + k), g().add(std::move(terms))});
+                    carry.outputs.push_back({at("W", j * n_ + k), g().add(terms)});
                 }
             p_.programs.push_back(std::move(carry));
         }
@@ -298,8 +298,8 @@ private:
                 rates.push_back(g().negate(g().multiply({hb(j + 1), in("W", j * n_ + k, Stage::iterate)})));
             }
             rates.push_back(g().negate(g().multiply({hb(s_ - 1), in("W1", k)})));
-            position.push_back(g().add(std::move(terms)));
-            rate.push_back(g().add(std::move(rates)));
+            position.push_back(g().add(terms));
+            rate.push_back(g().add(rates));
         }
         program("arrive", "q1", position);
         program("finish", "u1", rate);
@@ -332,11 +332,11 @@ private:
         };
         Ids terms;
         for (std::size_t j = 0; j < N; ++j) terms.push_back(g().multiply({J[0][j], minor(0, j)}));
-        const Id inverse = named("inverse_determinant", g().power(g().add(std::move(terms)), -1));
+        const Id inverse = named("inverse_determinant", g().power(g().add(terms), -1));
         for (std::size_t i = 0; i < N; ++i) {
             Ids sum;
             for (std::size_t j = 0; j < N; ++j) sum.push_back(g().negate(g().multiply({minor(j, i), F[j]})));
-            program.outputs.push_back({at("delta", i), g().multiply({inverse, g().add(std::move(sum))})});
+            program.outputs.push_back({at("delta", i), g().multiply({inverse, g().add(sum)})});
         }
         program.outputs.push_back({"return finite", inverse});
         p_.programs.push_back(std::move(program));
