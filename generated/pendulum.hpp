@@ -20,7 +20,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "e494302988b9f1ea";
+    static constexpr const char* digest = "3bb6564a92d1a2ca";
     static constexpr int coordinates = 1;       // n
     static constexpr int points = 4;            // s, nodes of a step, both ends included
     static constexpr int order = 6;             // of accuracy in h
@@ -55,10 +55,10 @@ struct pendulum {
     struct Coefficients {
         real m;
         real h;
-        real inverse_m;      // 1/m
-        real k1;             // inverse_m/2
         real omega_squared;  // omega*omega
-        real k2;             // m*omega_squared
+        real k1;             // m*omega_squared
+        real inverse_m;      // 1/m
+        real k2;             // inverse_m/2
         real h_b1;           // h/12
         real h_c2;           // (1/2 - sqrt(5)/10)*h
         real h_c3;           // (sqrt(5)/10 + 1/2)*h
@@ -85,10 +85,10 @@ struct pendulum {
     static Status prepare(const Parameters& p, real h, Coefficients& k) {
         k.m = p.m;
         k.h = h;
-        k.inverse_m = 1.0 / p.m;
-        k.k1 = 0.5 * k.inverse_m;
         k.omega_squared = p.omega * p.omega;
-        k.k2 = p.m * k.omega_squared;
+        k.k1 = p.m * k.omega_squared;
+        k.inverse_m = 1.0 / p.m;
+        k.k2 = 0.5 * k.inverse_m;
         k.h_b1 = 0.08333333333333333 * h;
         k.h_c2 = 0.276393202250021 * h;
         k.h_c3 = 0.7236067977499789 * h;
@@ -112,7 +112,7 @@ struct pendulum {
         k.h_b2 = 0.4166666666666667 * h;
         const real pivot_1 = p.m;
         if (pivot_1 == real(0)) return Status::singular_mass;
-        if (!lobatto::is_finite(k.m, k.h, k.inverse_m, k.k1, k.omega_squared, k.k2, k.h_b1, k.h_c2, k.h_c3, k.h2_A2,
+        if (!lobatto::is_finite(k.m, k.h, k.omega_squared, k.k1, k.inverse_m, k.k2, k.h_b1, k.h_c2, k.h_c3, k.h2_A2,
             k.h2_A3, k.k3, k.h2_AE22, k.k4, k.h2_AE24, k.k5, k.h2_AE32, k.k6, k.h2_AE34, k.h2_A22, k.h2_A23, k.h2_A32,
             k.k7, k.h2_d2, k.h2_d3, k.h_b2)) return Status::not_finite;
         return Status::ok;
@@ -120,7 +120,7 @@ struct pendulum {
 
     // (D3) Hamiltonian H(q, p) = p^T M^-1 p / 2 + V(q); q, p: n.
     static real energy(const Coefficients& k, const real* q, const real* p) {
-        return k.k1 * (p[0] * p[0]) + k.k2 * (1.0 - lobatto::cos(q[0]));
+        return k.k1 * (1.0 - lobatto::cos(q[0])) + p[0] * (k.k2 * p[0]);
     }
 
     // (D2) p = dL/dq' = M q'; n each.

@@ -72,7 +72,7 @@ const std::vector<Declaration>& declarations() {
          "void",
          {{in, "v"}, {in, "W"}, {in, "W1"}, {out, "u1"}}},
         {"propagate",
-         "(D20) The whole step: (q1, p1) = Phi (q, p) + shift, the columns of Phi being q, p and the shift.",
+         "(D20) The whole step: (q1, p1) = Phi (q, p) + shift, as (q, p) + (Phi - I) (q, p) + shift.",
          "void",
          {{in, "q"}, {in, "p"}, {out, "q1"}, {out, "p1"}}},
     };
@@ -121,7 +121,7 @@ public:
         std::string text = preamble(name, report);
         text += "#pragma once\n\n";
         if (options_.precision == Precision::quadruple) text += "#define LOBATTO_USE_FLOAT128\n";
-        text += options_.standalone_support.empty() ? "#include \"kernel.hpp\"\n" : support();
+        text += options_.standalone_support.empty() ? "#include \"kernel.hpp\"\n" : options_.standalone_support;
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(name, digest) + tables() + parameters() + coefficients() + prepare(name);
         for (const Declaration& declaration : declarations()) text += function(declaration);
@@ -129,7 +129,7 @@ public:
             text +=
                 "\n    // (D20) The whole step: (q1, p1) = Phi (q, p) + shift.\n"
                 "    static void propagate(const Coefficients& k, const real* q, const real* p, real* q1, real* p1) {\n"
-                "        lobatto::apply_map<coordinates>(k.Phi, q, p, q1, p1);\n    }\n";
+                "        lobatto::apply_map<coordinates>(k.Phi_minus_I, q, p, q1, p1);\n    }\n";
         text += "};\n\n}  // namespace lobatto::kernels\n";
         return text;
     }
@@ -160,20 +160,6 @@ private:
             "// Operations   {} in all, {} as derived: {} additions, {} multiplications, {} divisions, {} functions\n",
             now.total(), report.front().after.total(), now.additions, now.multiplications, now.divisions,
             now.functions);
-        return text;
-    }
-
-    // kernel.hpp without what only a file of its own needs.
-    std::string support() const {
-        std::string text;
-        std::size_t begin = 0;
-        while (begin < options_.standalone_support.size()) {
-            const std::size_t end =
-                std::min(options_.standalone_support.find('\n', begin), options_.standalone_support.size());
-            const std::string line = options_.standalone_support.substr(begin, end - begin);
-            if (line != "#pragma once") text += line + "\n";
-            begin = end + 1;
-        }
         return text;
     }
 
@@ -280,7 +266,9 @@ private:
                               "        //     ");
         }
         if (d_.structure.linear)
-            text += fmt::format("        real Phi[{}];  // rows q1, p1; columns q, p, shift\n", 2 * n_ * (2 * n_ + 1));
+            text +=
+                fmt::format("        real Phi_minus_I[{}];  // what a step adds: rows q1, p1; columns q, p, shift\n",
+                            2 * n_ * (2 * n_ + 1));
         return text + "    };\n";
     }
 
@@ -323,7 +311,7 @@ private:
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");
-        if (d_.structure.linear && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi);\n";
+        if (d_.structure.linear && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi_minus_I);\n";
         if (d_.structure.linear && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else

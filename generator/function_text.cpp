@@ -55,7 +55,7 @@ Hoisted::Hoisted(const Programs& programs) {
                 if (is_early(operand)) wanted.insert(operand);
     std::vector<Id> all = graph.topological(roots);
     std::stable_partition(all.begin(), all.end(), [&graph](Id id) { return graph[id].op == Op::input; });
-    std::set<std::string> taken{"Phi"};
+    std::set<std::string> taken{"Phi_minus_I"};
     std::map<Id, std::string> suggested;
     for (const auto& [id, name] : programs.names) suggested.emplace(id, name);
     int counter = 0;

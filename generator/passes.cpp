@@ -103,7 +103,9 @@ Id horner(Graph& graph, const std::vector<Id>& terms) {
         }
     const auto best = std::max_element(uses.begin(), uses.end(),
                                        [](const auto& x, const auto& y) { return x.second.size() < y.second.size(); });
-    if (best == uses.end() || best->second.size() < 2) return graph.add(terms);
+    if (best == uses.end() || best->second.size() < 2)
+        return terms.size() == 1 ? terms.front()
+                                 : graph.raw(Op::add, terms);  // a sum within a sum stays one: it chose its rounding
     std::vector<Id> inside, outside;
     for (std::size_t t = 0, next = 0; t < terms.size(); ++t) {
         if (next < best->second.size() && best->second[next] == t) {

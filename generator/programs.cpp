@@ -146,7 +146,9 @@ private:
         }
         Ids kinetic;
         const Ids rates = times(inverse_mass_, p);
-        for (std::size_t k = 0; k < n_; ++k) kinetic.push_back(g().multiply({g().number(1, 2), p[k], rates[k]}));
+        for (std::size_t k = 0; k < n_; ++k)
+            kinetic.push_back(
+                g().raw(Op::multiply, {p[k], g().multiply({g().number(1, 2), rates[k]})}));  // p^2 may overflow
         kinetic.push_back(convert(d_.system.potential));
         p_.programs.push_back({"energy", {{"return", g().add(kinetic)}}});
         program("momentum", "p", times(mass_, velocity));
@@ -189,7 +191,9 @@ private:
             return local(name, g().from(e, {{exact.z, z}}));
         };
         const Id inverse_delta = g().power(polynomial("delta", exact.delta), -1);
-        const Id a = polynomial("phi_a", exact.a), b = polynomial("phi_b", exact.b), c = polynomial("phi_c", exact.c);
+        // The kernel stores E = Phi - I: for a small step it keeps the digits that Phi would round off.
+        const Id a = polynomial("a_minus_delta", (exact.a - exact.delta).expand()), b = polynomial("phi_b", exact.b),
+                 c = polynomial("phi_c", exact.c);
         const Ids position = {a, g().multiply({h_by_m, c}),
                               g().multiply({h_, h_by_m, force, g().from(exact.e_q, {{exact.z, z}})})};
         const Ids momentum = {g().multiply({g().power(h_by_m, -1), b}), a,
@@ -197,13 +201,15 @@ private:
         std::size_t index = 0;
         for (const Ids& row : {position, momentum})
             for (const Id entry : row)
-                prepare_map.outputs.push_back({at("k.Phi", index++), g().multiply({entry, inverse_delta})});
+                prepare_map.outputs.push_back({at("k.Phi_minus_I", index++), g().multiply({entry, inverse_delta})});
         p_.programs.push_back(std::move(prepare_map));
 
         const auto row = [&](std::size_t r) {
-            Ids terms = {g().multiply({in("k.Phi", 3 * r), q_[0]}), g().multiply({in("k.Phi", 3 * r + 1), in("p", 0)})};
-            if (!g().is_number(force, 0)) terms.push_back(in("k.Phi", 3 * r + 2));
-            return g().add(terms);
+            Ids terms = {g().multiply({in("k.Phi_minus_I", 3 * r), q_[0]}),
+                         g().multiply({in("k.Phi_minus_I", 3 * r + 1), in("p", 0)})};
+            if (!g().is_number(force, 0)) terms.push_back(in("k.Phi_minus_I", 3 * r + 2));
+            // Small terms first, then the state they are added to.
+            return g().raw(Op::add, {r == 0 ? q_[0] : in("p", 0), g().add(terms)});
         };
         p_.programs.push_back({"propagate", {{"q1[0]", row(0)}, {"p1[0]", row(1)}}});
     }
@@ -358,32 +364,115 @@ Programs build_programs(const Derivation& derivation) {
 }
 
 std::string identifier(const std::string& name) {
-    static const std::set<std::string> keywords = {"alignas",      "alignof",      "and",           "and_eq",
-                                                   "asm",          "auto",         "bitand",        "bitor",
-                                                   "bool",         "break",        "case",          "catch",
-                                                   "char",         "char8_t",      "char16_t",      "char32_t",
-                                                   "class",        "compl",        "concept",       "const",
-                                                   "consteval",    "constexpr",    "constinit",     "const_cast",
-                                                   "continue",     "co_await",     "co_return",     "co_yield",
-                                                   "decltype",     "default",      "delete",        "do",
-                                                   "double",       "dynamic_cast", "else",          "enum",
-                                                   "explicit",     "export",       "extern",        "false",
-                                                   "float",        "for",          "friend",        "goto",
-                                                   "if",           "inline",       "int",           "long",
-                                                   "mutable",      "namespace",    "new",           "noexcept",
-                                                   "not",          "not_eq",       "nullptr",       "operator",
-                                                   "or",           "or_eq",        "private",       "protected",
-                                                   "public",       "real",         "register",      "reinterpret_cast",
-                                                   "requires",     "return",       "short",         "signed",
-                                                   "sizeof",       "static",       "static_assert", "static_cast",
-                                                   "struct",       "switch",       "template",      "this",
-                                                   "thread_local", "throw",        "true",          "try",
-                                                   "typedef",      "typeid",       "typename",      "union",
-                                                   "unsigned",     "using",        "virtual",       "void",
-                                                   "volatile",     "wchar_t",      "while",         "xor",
-                                                   "xor_eq",       "lobatto",      "linux",         "unix",
-                                                   "Parameters",   "Coefficients"};
-    return keywords.contains(name) ? name + "_" : name;
+    static const std::set<std::string> keywords = {"alignas",
+                                                   "alignof",
+                                                   "and",
+                                                   "and_eq",
+                                                   "asm",
+                                                   "auto",
+                                                   "bitand",
+                                                   "bitor",
+                                                   "bool",
+                                                   "break",
+                                                   "case",
+                                                   "catch",
+                                                   "char",
+                                                   "char8_t",
+                                                   "char16_t",
+                                                   "char32_t",
+                                                   "class",
+                                                   "compl",
+                                                   "concept",
+                                                   "const",
+                                                   "consteval",
+                                                   "constexpr",
+                                                   "constinit",
+                                                   "const_cast",
+                                                   "continue",
+                                                   "co_await",
+                                                   "co_return",
+                                                   "co_yield",
+                                                   "decltype",
+                                                   "default",
+                                                   "delete",
+                                                   "do",
+                                                   "double",
+                                                   "dynamic_cast",
+                                                   "else",
+                                                   "enum",
+                                                   "explicit",
+                                                   "export",
+                                                   "extern",
+                                                   "false",
+                                                   "float",
+                                                   "for",
+                                                   "friend",
+                                                   "goto",
+                                                   "if",
+                                                   "inline",
+                                                   "int",
+                                                   "long",
+                                                   "mutable",
+                                                   "namespace",
+                                                   "new",
+                                                   "noexcept",
+                                                   "not",
+                                                   "not_eq",
+                                                   "nullptr",
+                                                   "operator",
+                                                   "or",
+                                                   "or_eq",
+                                                   "private",
+                                                   "protected",
+                                                   "public",
+                                                   "real",
+                                                   "register",
+                                                   "reinterpret_cast",
+                                                   "requires",
+                                                   "return",
+                                                   "short",
+                                                   "signed",
+                                                   "sizeof",
+                                                   "static",
+                                                   "static_assert",
+                                                   "static_cast",
+                                                   "struct",
+                                                   "switch",
+                                                   "template",
+                                                   "this",
+                                                   "thread_local",
+                                                   "throw",
+                                                   "true",
+                                                   "try",
+                                                   "typedef",
+                                                   "typeid",
+                                                   "typename",
+                                                   "union",
+                                                   "unsigned",
+                                                   "using",
+                                                   "virtual",
+                                                   "void",
+                                                   "volatile",
+                                                   "wchar_t",
+                                                   "while",
+                                                   "xor",
+                                                   "xor_eq",
+                                                   "lobatto",
+                                                   "linux",
+                                                   "unix",
+                                                   "Parameters",
+                                                   "Status",
+                                                   "math_errhandling",
+                                                   "errno",
+                                                   "signgam",
+                                                   "Coefficients"};
+    // Names in capitals may be macros of the standard headers (NAN, M_PI). What already ends in underscores gets one
+    // more, so that different names stay different.
+    const std::string stem = name.substr(0, name.find_last_not_of('_') + 1);
+    const bool capitals = stem.size() > 2 && std::all_of(stem.begin(), stem.end(), [](char c) {
+                              return c == '_' || (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z');
+                          });
+    return capitals || keywords.contains(stem) ? name + "_" : name;
 }
 
 }  // namespace lobatto

@@ -3,7 +3,8 @@
 //
 // An emitted kernel K is a struct of static functions, the formulas of one scene; Stepper<K> below is its life in time.
 // Formula numbers (D..) refer to docs/derivation.md.
-#pragma once
+#ifndef LOBATTO_KERNEL_HPP
+#define LOBATTO_KERNEL_HPP
 
 #include <cmath>
 #include <cstdint>
@@ -233,11 +234,12 @@ inline void expand_entries(const typename K::real* entries, typename K::real* S)
     for (int e = 0; e < K::entries; ++e) S[K::entry_row[e] * K::coordinates + K::entry_column[e]] = entries[e];
 }
 
-// The tangent of one step in (q, u), from the S of the s nodes (D24). T: 2n x (2n + 1); its last column is the image of
-// the constant acceleration W0 when S does not depend on q, that is, the shift of a linear system with forces at q = 0.
+// What one step adds, in (q, u), from the S of the s nodes: E = T - I with T the tangent map (D24). E: 2n x (2n + 1);
+// its last column is the image of the constant acceleration W0 when S does not depend on q, that is, the shift of a
+// linear system with forces at q = 0. E is small for a small step and keeps its digits there, T would not.
 template <class K>
-inline bool tangent_of_step(typename K::real h, const typename K::real* S, const typename K::real* W0,
-                            typename K::real* T) {
+inline bool increment_of_step(typename K::real h, const typename K::real* S, const typename K::real* W0,
+                              typename K::real* E) {
     using real = typename K::real;
     constexpr int n = K::coordinates, s = K::points, m = s - 2, N = n * m, columns = 2 * n + 1;
     real v[n * columns], X[(N > 0 ? N : 1) * columns], J[N > 0 ? N * N : 1];
@@ -270,27 +272,28 @@ inline bool tangent_of_step(typename K::real h, const typename K::real* S, const
     if constexpr (N > 0) {
         if (!solve<N, columns>(J, X)) return false;
     }
-    real* const q1 = T;
-    real* const u1 = T + n * columns;
+    real* const dq = E;
+    real* const du = E + n * columns;
+    real q1[n * columns];
     for (int k = 0; k < n; ++k)
         for (int c = 0; c < columns; ++c) {
-            real position = q0[k * columns + c] + h * v[k * columns + c];
-            real rate = v[k * columns + c];
+            real position = h * v[k * columns + c];
+            real rate = -(h * K::b[0] * force(0, q0, k, c));
             for (int j = 0; j < m; ++j) {
                 const real w = force(j + 1, X + j * n * columns, k, c);
                 position -= h * h * (K::b[j + 1] * (real(1) - K::c[j + 1])) * w;
                 rate -= h * K::b[j + 1] * w;
             }
-            q1[k * columns + c] = position;
-            u1[k * columns + c] = rate;
+            dq[k * columns + c] = position;
+            du[k * columns + c] = rate;
+            q1[k * columns + c] = q0[k * columns + c] + position;
         }
     for (int k = 0; k < n; ++k)
-        for (int c = 0; c < columns; ++c) v[k * columns + c] = h * K::b[s - 1] * force(s - 1, q1, k, c);
-    for (int i = 0; i < n * columns; ++i) u1[i] -= v[i];
+        for (int c = 0; c < columns; ++c) du[k * columns + c] -= h * K::b[s - 1] * force(s - 1, q1, k, c);
     return true;
 }
 
-// From (q, u) to (q, p): rows of u and columns of u are multiplied by M and M^-1. T: 2n x (2n + 1).
+// From (q, u) to (q, p): rows of u and columns of u are multiplied by M and M^-1; the identity stays. T: 2n x (2n + 1).
 template <class K>
 inline void to_momentum(const typename K::Coefficients& k, typename K::real* T) {
     using real = typename K::real;
@@ -323,14 +326,13 @@ inline __float128 fused(__float128 a, __float128 b, __float128 c) {
 }
 #endif
 
-// Moves the entries of a 2 x 2 propagation matrix (rows of three: q, p, shift) by at most two units in the last place
-// each, so that the determinant of what is stored is 1 to far below rounding (D21). A determinant of 1 + e multiplies
-// the conserved energy by 1 + e in every step: with entries rounded one by one, e = 2e-16, it drifts by 3e-10 in 1e6
-// steps; with e < 1e-18 only the rounding of the states is left.
+// Moves the entries of E = Phi - I (2 x 2, rows of three: q, p, shift) by at most two units in the last place each, so
+// that det Phi = 1 + tr E + det E is 1 to far below the rounding of the entries (D20). A determinant of 1 + e
+// multiplies the conserved energy by 1 + e in every step.
 template <class real>
-inline void round_to_unit_determinant(real* Phi) {
+inline void round_to_unit_determinant(real* E) {
     const int places[4] = {0, 1, 3, 4};
-    real candidates[4][5], best[4] = {Phi[0], Phi[1], Phi[3], Phi[4]}, least = Limits<real>::largest;
+    real candidates[4][5], best[4] = {E[0], E[1], E[3], E[4]}, least = Limits<real>::largest;
     for (int e = 0; e < 4; ++e) {
         const real entry = best[e];
         // A unit in the last place, or half of one just above a power of two.
@@ -343,10 +345,15 @@ inline void round_to_unit_determinant(real* Phi) {
             for (const real c : candidates[2])
                 for (const real d : candidates[3]) {
                     const real ad = a * d, bc = b * c;
-                    const real high = ad - bc;
-                    const real back = high - ad;
-                    const real lost = (ad - (high - back)) - (bc + back);
-                    const real defect = fabs((high - real(1)) + (lost + (fused(a, d, -ad) - fused(b, c, -bc))));
+                    // tr E + det E, the terms and their rounding, summed without loss (TwoSum).
+                    const real terms[6] = {a, d, ad, -bc, fused(a, d, -ad), -fused(b, c, -bc)};
+                    real sum = real(0), lost = real(0);
+                    for (const real term : terms) {
+                        const real next = sum + term, back = next - sum;
+                        lost += (sum - (next - back)) + (term - back);
+                        sum = next;
+                    }
+                    const real defect = fabs(sum + lost);
                     if (defect < least) {
                         least = defect;
                         best[0] = a;
@@ -355,7 +362,7 @@ inline void round_to_unit_determinant(real* Phi) {
                         best[3] = d;
                     }
                 }
-    for (int e = 0; e < 4; ++e) Phi[places[e]] = best[e];
+    for (int e = 0; e < 4; ++e) E[places[e]] = best[e];
 }
 
 // The affine map of one step of a linear system, in (q, p), from the constant S = M^-1 V'' and W(0) (D20, n > 1).
@@ -367,22 +374,22 @@ inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
     real W0[n], entries[K::entries > 0 ? K::entries : 1], S[s * n * n];
     K::node(k, origin, W0, entries);
     for (int i = 0; i < s; ++i) expand_entries<K>(entries, S + i * n * n);
-    if (!tangent_of_step<K>(h, S, W0, k.Phi)) return Status::singular_jacobian;
-    to_momentum<K>(k, k.Phi);
+    if (!increment_of_step<K>(h, S, W0, k.Phi_minus_I)) return Status::singular_jacobian;
+    to_momentum<K>(k, k.Phi_minus_I);
     real sum = real(0);
-    for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi[i] - k.Phi[i];
+    for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi_minus_I[i] - k.Phi_minus_I[i];
     return sum == real(0) ? Status::ok : Status::not_finite;
 }
 
-// (q1, p1) = Phi (q, p) + shift; Phi: 2n x (2n + 1).
+// (q1, p1) = (q, p) + E (q, p) + shift, E = Phi - I; E: 2n x (2n + 1), the shift its last column.
 template <int n, class real>
-inline void apply_map(const real* Phi, const real* q, const real* p, real* q1, real* p1) {
+inline void apply_map(const real* E, const real* q, const real* p, real* q1, real* p1) {
     for (int r = 0; r < 2 * n; ++r) {
-        const real* const row = Phi + r * (2 * n + 1);
+        const real* const row = E + r * (2 * n + 1);
         real sum = row[2 * n];
         for (int k = 0; k < n; ++k) sum += row[k] * q[k];
         for (int k = 0; k < n; ++k) sum += row[n + k] * p[k];
-        (r < n ? q1[r] : p1[r - n]) = sum;
+        (r < n ? q1[r] : p1[r - n]) = (r < n ? q[r] : p[r - n]) + sum;
     }
 }
 
@@ -565,3 +572,5 @@ private:
 };
 
 }  // namespace lobatto
+
+#endif

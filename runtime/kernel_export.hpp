@@ -118,18 +118,19 @@ struct Export {
         constexpr int s = K::points, columns = 2 * n + 1;
         real full[2 * n * columns];
         if constexpr (K::linear) {
-            for (int i = 0; i < 2 * n * columns; ++i) full[i] = local.coefficients.Phi[i];
+            for (int i = 0; i < 2 * n * columns; ++i) full[i] = local.coefficients.Phi_minus_I[i];
         } else {
             real second[s * n * n], W[n], entries[K::entries > 0 ? K::entries : 1], none[n] = {};
             for (int i = 0; i < s; ++i) {
                 K::node(local.coefficients, i == 0 ? in(q) : i == s - 1 ? local.q : local.Q + (i - 1) * n, W, entries);
                 expand_entries<K>(entries, second + i * n * n);
             }
-            if (!tangent_of_step<K>(local.step_size, second, none, full)) return code(Status::singular_jacobian);
+            if (!increment_of_step<K>(local.step_size, second, none, full)) return code(Status::singular_jacobian);
             to_momentum<K>(local.coefficients, full);
         }
         for (int r = 0; r < 2 * n; ++r)
-            for (int c = 0; c < 2 * n; ++c) out(T)[r * 2 * n + c] = full[r * columns + c];
+            for (int c = 0; c < 2 * n; ++c)
+                out(T)[r * 2 * n + c] = (r == c ? real(1) : real(0)) + full[r * columns + c];
         return code(Status::ok);
     }
 

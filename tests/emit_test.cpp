@@ -183,12 +183,44 @@ TEST_CASE("names that are C++ keywords compile") {
                    {3, 4});
 }
 
+TEST_CASE("names of macros compile, and names that differ by an underscore stay apart") {
+    check_compiles({"NAN",
+                    "M_PI*q'^2/2 - INFINITY*q^4 - INT64_MAX*cos(q) - real*q^6 - real_*sin(q)",
+                    {"q"},
+                    {"M_PI", "INFINITY", "INT64_MAX", "real", "real_"}},
+                   {4});
+    check_compiles({"Status", "q'^2/2 - HUGE_VAL*q^2/2", {"q"}, {"HUGE_VAL"}}, {4});
+}
+
+TEST_CASE("a derivative that cancels to nothing is no disagreement between passes") {
+    check_compiles(
+        {"nothing", "x'^2/2 + y'^2/2 - sqrt(x^2) - tan(y)*cos(y) + sin(y) - acos(cos(x - 2*y)) - y^4", {"x", "y"}, {}},
+        {4});
+}
+
+TEST_CASE("two standalone headers can be included in one program") {
+    const test::TemporaryFolder folder;
+    EmitOptions options;
+    options.standalone_support = kernel_hpp_text;
+    SceneText other = pendulum;
+    other.name = "other";
+    for (const SceneText& scene : {pendulum, other})
+        test::write_text(folder / (scene.name + ".hpp"), emit(derivation_of(scene, 4), options).header);
+    test::write_text(folder / "program.cpp",
+                     "#include \"pendulum.hpp\"\n#include \"other.hpp\"\n"
+                     "template struct lobatto::Stepper<lobatto::kernels::pendulum>;\n"
+                     "template struct lobatto::Stepper<lobatto::kernels::other>;\nint main() {}\n");
+    CHECK(
+        test::run({"g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", folder / "program.cpp"}).err ==
+        "");
+}
+
 TEST_CASE("names that the emitted code uses itself compile") {
     check_compiles({"collide",
                     "q1*t1'^2/2 + k1'^2/2 - V*sin(t1)*cos(t1)*z^2 - inverse_m*m*k1^3*t1^2 - p*k*S*h2_A22*exp(k1) - "
-                    "Phi*W*delta*k1",
+                    "Phi_minus_I*W*delta*k1",
                     {"t1", "k1"},
-                    {"q1", "V", "z", "inverse_m", "m", "p", "k", "S", "h2_A22", "Phi", "W", "delta"}},
+                    {"q1", "V", "z", "inverse_m", "m", "p", "k", "S", "h2_A22", "Phi_minus_I", "W", "delta"}},
                    {3, 4});
     check_compiles(
         {"functions",
