@@ -231,55 +231,45 @@ Programs share_pairs(const Programs& programs) {
     for (const Id id : order)
         if (graph[id].op == Op::add || graph[id].op == Op::multiply) lists[id] = graph[id].operands;
     using Pair = std::array<Id, 3>;  // op, smaller, larger
-    for (;;) {
+    // In rounds: all pairs are counted, then the most frequent ones taken out, each list changing once a round.
+    for (bool changed = true; changed;) {
+        changed = false;
         std::map<Pair, std::set<Id>> users;
-        for (const auto& [id, operands] : lists) {
-            if (operands.size() < 3) {
-                if (operands.size() == 2) {
-                    auto [low, high] = std::minmax(operands[0], operands[1]);
-                    users[{static_cast<Id>(graph[id].op), low, high}].insert(id);
-                }
-                continue;
-            }
+        for (const auto& [id, operands] : lists)
             for (std::size_t i = 0; i < operands.size(); ++i)
                 for (std::size_t j = i + 1; j < operands.size(); ++j) {
-                    auto [low, high] = std::minmax(operands[i], operands[j]);
+                    const auto [low, high] = std::minmax(operands[i], operands[j]);
                     users[{static_cast<Id>(graph[id].op), low, high}].insert(id);
                 }
-        }
-        const Pair* best = nullptr;
-        std::size_t most = 1;
-        for (const auto& [pair, ids] : users) {
+        std::vector<std::pair<Pair, std::set<Id>>> frequent;
+        for (auto& [pair, ids] : users)
+            if (ids.size() > 1) frequent.emplace_back(pair, std::move(ids));
+        std::stable_sort(frequent.begin(), frequent.end(),
+                         [](const auto& x, const auto& y) { return x.second.size() > y.second.size(); });
+        std::set<Id> touched;
+        for (auto& [key, ids] : frequent) {
+            std::erase_if(ids, [&touched](Id id) { return touched.contains(id); });
             // A pair that is a whole node already gains nothing unless a longer list contains it.
             const bool in_longer =
                 std::any_of(ids.begin(), ids.end(), [&lists](Id id) { return lists[id].size() > 2; });
-            if (in_longer && ids.size() > most) {
-                most = ids.size();
-                best = &pair;
+            if (ids.size() < 2 || !in_longer) continue;
+            const auto [op, low, high] = key;
+            // The pair in the order in which its first user holds it.
+            std::vector<Id> pair;
+            for (const Id operand : lists[*ids.begin()])
+                if ((operand == low || operand == high) && pair.size() < 2) pair.push_back(operand);
+            const Id shared = graph.raw(static_cast<Op>(op), pair);
+            for (const Id id : ids) {
+                std::vector<Id>& operands = lists[id];
+                operands.erase(std::find(operands.begin(), operands.end(), low));
+                operands.erase(std::find(operands.begin(), operands.end(), high));
+                operands.insert(operands.begin(), shared);
             }
+            lists[shared] = pair;  // also when one of the users was the pair itself
+            touched.insert(ids.begin(), ids.end());
+            touched.insert(shared);
+            changed = true;
         }
-        if (best == nullptr) break;
-        const Op op = static_cast<Op>((*best)[0]);
-        const Id low = (*best)[1], high = (*best)[2];
-        const std::set<Id> ids = users[*best];
-        // The pair in the order in which its first user holds it.
-        std::vector<Id> pair;
-        for (const Id operand : lists[*ids.begin()])
-            if ((operand == low || operand == high) && pair.size() < 2) pair.push_back(operand);
-        const Id shared = graph.raw(op, pair);
-        for (const Id id : ids) {
-            std::vector<Id>& operands = lists[id];
-            if (operands.size() == 2)
-                continue;  // is the pair itself, in this order or the other: merged below by rewriting
-            operands.erase(std::find(operands.begin(), operands.end(), low));
-            operands.erase(std::find(operands.begin(), operands.end(), high));
-            operands.insert(operands.begin(), shared);
-        }
-        for (const Id id : ids)
-            if (lists[id].size() == 2 && id != shared && lists[id] != std::vector<Id>{shared} &&
-                std::minmax(lists[id][0], lists[id][1]) == std::minmax(low, high))
-                lists[id] = {shared};
-        lists[shared] = pair;
     }
     // Rebuild from the lists.
     Programs result;

@@ -55,7 +55,7 @@ Structure find_structure(const System& system) {
     std::string nonlinear;
     for (unsigned i = 0; i < n && structure.linear; ++i)
         for (unsigned j = 0; j <= i && structure.linear; ++j)
-            if (has_any(system.hessian(i, j).expand(), system.q)) {
+            if (depends_on(system.hessian(i, j), system.q)) {
                 structure.linear = false;
                 nonlinear = "d2V/d" + system.q[i].get_name() + "d" + system.q[j].get_name() + " = " +
                             canonical_text(system.hessian(i, j)) + " depends on the position";

@@ -4,6 +4,8 @@
 
 #include <sstream>
 
+#include <algorithm>
+
 #include "generator/notation.hpp"
 
 namespace lobatto {
@@ -12,10 +14,18 @@ namespace {
 
 using GiNaC::ex;
 
-bool depends_on(const ex& expression, const std::vector<GiNaC::symbol>& symbols) {
-    for (const auto& symbol : symbols)
-        if (expression.has(symbol)) return true;
-    return false;
+// The value at a point of small rationals, which is a number where the expression is a rational function.
+ex at_point(const ex& expression, int point) {
+    GiNaC::exmap values;
+    int index = 0;
+    for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
+        if (GiNaC::is_a<GiNaC::symbol>(*part) && !values.contains(*part))
+            values[*part] = GiNaC::numeric(7 + 3 * point + 2 * index++, 11 + point);
+    try {
+        return expression.subs(values, GiNaC::subs_options::no_pattern);
+    } catch (const std::exception&) {  // a pole
+        return expression;
+    }
 }
 
 [[noreturn]] void refuse(const Scene& scene, const std::string& reason) {
@@ -45,6 +55,24 @@ std::string free_direction(const System& system) {
 }
 
 }  // namespace
+
+bool vanishes(const ex& expression) {
+    const ex value = at_point(expression, 0);
+    if (GiNaC::is_a<GiNaC::numeric>(value) && !value.is_zero()) return false;
+    return expression.expand().is_zero();
+}
+
+bool depends_on(const ex& expression, const std::vector<GiNaC::symbol>& symbols) {
+    const auto has_any = [&symbols](const ex& e) {
+        return std::any_of(symbols.begin(), symbols.end(), [&e](const GiNaC::symbol& s) { return e.has(s); });
+    };
+    if (!has_any(expression)) return false;
+    for (const auto& symbol : symbols) {
+        const ex slope = at_point(expression.diff(symbol), 0);
+        if (GiNaC::is_a<GiNaC::numeric>(slope) && !slope.is_zero()) return true;
+    }
+    return has_any(expression.expand());
+}
 
 System build_system(const Scene& scene) {
     System system;
@@ -91,8 +119,7 @@ System build_system(const Scene& scene) {
         system.gradient.push_back(system.potential.diff(system.q[i]));
         for (unsigned j = 0; j <= i; ++j) {
             const ex entry = system.gradient[i].diff(system.q[j]);
-            system.hessian(i, j) =
-                entry.expand().is_zero() ? ex(0) : entry;  // kept as derived: expanding may lose a short form
+            system.hessian(i, j) = vanishes(entry) ? ex(0) : entry;  // kept as derived: expanding may lose a short form
             system.hessian(j, i) = system.hessian(i, j);
         }
     }

@@ -21,6 +21,11 @@ struct System {
     GiNaC::matrix hessian;                  // n x n: d2V/dq_k dq_l
 };
 
+// Whether an expression is identically zero, or depends on one of the symbols once simplified. A polynomial that does
+// not is told at a rational point; only what vanishes there, or is no polynomial, is expanded.
+bool vanishes(const GiNaC::ex& expression);
+bool depends_on(const GiNaC::ex& expression, const std::vector<GiNaC::symbol>& symbols);
+
 // Throws InputError when L is outside the class treated (mass matrix that depends on q, terms linear or of higher
 // degree in the velocity) or degenerate (M singular), naming the offending term or direction.
 System build_system(const Scene& scene);
