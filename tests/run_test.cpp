@@ -193,7 +193,7 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
     CHECK(refusal({"--set", "m=1e400"}) == "--set:1:3: the value of m" + range + "  1 | m=1e400\n    |   ^\n");
     CHECK(contains(refusal({"--set", "omega=1e-400"}), "--set:1:7: the value of omega" + range));
     CHECK(contains(refusal({"--step", "1e400"}), "--step:1:1: the step" + range));
-    CHECK(contains(refusal({"--until", "omega*1e400"}), "--until:1:1: the end time" + range));
+    CHECK(contains(refusal({"--until", "m*1e400"}), "--until:1:1: the end time" + range));
     CHECK(refusal({"--step", "-0.1"}) == "--step: the step must be positive, but is -0.1\n");
     CHECK(refusal({"--until", "-1"}) == "--until: the end time must not be negative, but is -1\n");
     CHECK(refusal({"--until", "1e30"}) ==
