@@ -16,6 +16,7 @@
 
 #include "cli/support_text.hpp"
 #include "generator/pipeline.hpp"
+#include "runtime/compiler.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -85,7 +86,8 @@ void print_use(const KernelSource& source, const EmitCommand& options) {
                "  lobatto::Stepper<lobatto::kernels::{0}> stepper;\n"
                "  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .q, "
                ".momentum(p)\n",
-               source.name, quadruple ? "gnu++" : "c++", include, options.folder, quadruple ? " -lquadmath" : "");
+               source.name, quadruple ? "gnu++" : "c++", include, shell_word(options.folder),
+               quadruple ? " -lquadmath" : "");
 }
 
 void emit_scene(const EmitCommand& options) {

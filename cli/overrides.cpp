@@ -52,7 +52,9 @@ void set_parameter(const std::string& argument, Scene& scene) {
     Scope scope;
     scope.formula = fmt::format("the value of {}", name);
     scope.velocities_allowed = scope.positions_allowed = false;
-    parameter->value = parse_expression(source, text_from(argument, equals + 1), scope);
+    const Text text = text_from(argument, equals + 1);
+    parameter->value = parse_expression(source, text, scope);
+    value_in_range(source, text.at.front(), parameter->value, scope.formula);
 }
 
 GiNaC::ex in_parameters(const std::string& option, const std::string& argument, const std::string& what,
@@ -60,11 +62,17 @@ GiNaC::ex in_parameters(const std::string& option, const std::string& argument, 
     Scope scope;
     scope.formula = what;
     scope.velocities_allowed = scope.positions_allowed = false;
-    for (const Parameter& parameter : scene.parameters)
+    GiNaC::exmap values;
+    for (const Parameter& parameter : scene.parameters) {
         scope.names[parameter.name] = {parameter.symbol, Name::Role::parameter};
+        values[parameter.symbol] = parameter.value;
+    }
     for (const Parameter& constant : scene.constants)
         scope.names[constant.name] = {constant.value, Name::Role::parameter};
-    return parse_expression(Source(option, argument), text_from(argument, 0), scope);
+    const Source source(option, argument);
+    const GiNaC::ex expression = parse_expression(source, text_from(argument, 0), scope);
+    value_in_range(source, {1, 1}, expression, what, values);
+    return expression;
 }
 
 }  // namespace

@@ -268,7 +268,11 @@ private:
         if (!token().is('('))
             fail(name, fmt::format("{0} needs parentheses: write {0}({1})", name.text,
                                    token().kind == Token::Kind::end ? "..." : token().text.substr(0, 40)));
+        if (++function_depth_ > ExpressionLimits::function_depth)
+            fail(name, fmt::format("functions of functions in {} are more than {} deep; write it with fewer",
+                                   scope_.formula, ExpressionLimits::function_depth));
         const Operand argument = read_parenthesis();
+        --function_depth_;
         return compute(
             name, {argument}, [&] { return function.symbolic(argument.expression); },
             [&](const std::vector<numeric>& v) { return real_function(function, v[0]); });
@@ -332,6 +336,7 @@ private:
     const std::vector<Token> tokens_;
     std::size_t next_ = 0;
     int depth_ = 0;
+    int function_depth_ = 0;
 };
 
 }  // namespace
@@ -342,6 +347,19 @@ GiNaC::ex parse_expression(const Source& source, const Text& text, const Scope& 
         source.fail(text.at.front(), fmt::format("{} has {} characters; at most {} are read", scope.formula,
                                                  text.value.size(), ExpressionLimits::length));
     return Parser(source, text, scope, used).run();
+}
+
+GiNaC::numeric value_in_range(const Source& source, Position at, const GiNaC::ex& expression,
+                              const std::string& formula, const GiNaC::exmap& symbols) {
+    static const numeric largest = GiNaC::pow(numeric(10), numeric(300));
+    try {
+        const numeric value = real_value(expression, symbols);
+        if (!value.is_zero() && (abs(value) > largest || abs(value) < 1 / largest))
+            source.fail(at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", formula));
+        return value;
+    } catch (const NoValue& error) {
+        source.fail(at, fmt::format("{} has no finite real value: {}", formula, error.what()));
+    }
 }
 
 }  // namespace lobatto

@@ -139,6 +139,19 @@ private:
             names_[entry.key + "'"] = {coordinate.velocity, Name::Role::velocity};
             scene_.coordinates.push_back(coordinate);
         }
+        refuse_names_of_momenta(entries);
+    }
+
+    // The trajectory has a column x and a column p_x for a coordinate x.
+    void refuse_names_of_momenta(const std::vector<Entry>& coordinates) const {
+        for (const Entry& entry : coordinates) {
+            if (!entry.key.starts_with("p_")) continue;
+            const auto owner = names_.find(entry.key.substr(2));
+            if (owner != names_.end() && owner->second.role == Name::Role::position)
+                fail(entry.at, fmt::format("'{}' is the momentum of coordinate {} in the trajectory; give the "
+                                           "coordinate another name",
+                                           entry.key, owner->first));
+        }
     }
 
     void read_initial_entries(const Entry& coordinate, const Table& table) {
@@ -269,16 +282,10 @@ private:
 
     // A formula whose value with the parameters of the scene must be a real number that a double can hold.
     GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr) {
-        static const GiNaC::numeric largest_value = GiNaC::pow(GiNaC::numeric(10), GiNaC::numeric(300));
         const GiNaC::ex expression = parse_expression(source_, formula_of(source_, entry), scope, &used_);
-        try {
-            const GiNaC::numeric number = real_value(expression, parameter_values_);
-            if (!number.is_zero() && (abs(number) > largest_value || abs(number) < 1 / largest_value))
-                fail(entry.value.at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", scope.formula));
-            if (value != nullptr) *value = number;
-        } catch (const NoValue& error) {
-            fail(entry.value.at, fmt::format("{} has no finite real value: {}", scope.formula, error.what()));
-        }
+        const GiNaC::numeric number =
+            value_in_range(source_, entry.value.at, expression, scope.formula, parameter_values_);
+        if (value != nullptr) *value = number;
         return expression;
     }
 

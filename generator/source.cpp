@@ -98,6 +98,10 @@ Source Source::read(const std::string& path) {
     const auto status = std::filesystem::status(path, error);
     if (!std::filesystem::exists(status)) refuse("there is no such file");
     if (std::filesystem::is_directory(status)) refuse("it is a directory");
+    if (std::filesystem::is_socket(status)) refuse("it is a socket");
+    // A named pipe may wait for its writer for ever. The pipe behind /dev/stdin or <(command) has no path of its own.
+    if (std::filesystem::is_fifo(status) && !std::filesystem::canonical(path, error).empty())
+        refuse("it is a named pipe; give a file, or /dev/stdin for the output of another program");
     errno = 0;
     std::ifstream file(path, std::ios::binary);
     if (!file) refuse(std::strerror(errno));

@@ -138,16 +138,37 @@ void sweep(const fs::path& folder) {
     }
 }
 
+[[noreturn]] void fail_untrusted(const fs::path& folder, const std::string& reason, const std::string& mend) {
+    throw MachineError(
+        fmt::format("the folder {} cannot be trusted with programs to run: {}; {}, or name another folder in the "
+                    "environment variable LOBATTO_CACHE_DIR",
+                    folder.string(), reason, mend));
+}
+
+// Who may write to a folder may put another in the place of what is in it, unless its sticky bit forbids that.
+void check_parent(const fs::path& folder, const fs::path& parent) {
+    struct stat link, status;
+    if (::lstat(parent.c_str(), &link) != 0 || ::stat(parent.c_str(), &status) != 0) fail("read", parent, errno);
+    const auto is_foreign = [](uid_t user) { return user != 0 && user != ::geteuid(); };
+    if (is_foreign(link.st_uid) || is_foreign(status.st_uid))
+        fail_untrusted(folder, parent.string() + " belongs to another user", "make that yours (chown)");
+    if (S_ISDIR(status.st_mode) && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0 && (status.st_mode & S_ISVTX) == 0)
+        fail_untrusted(folder, "other users may rename what is in " + parent.string(),
+                       "take their permission to write there (chmod go-w)");
+}
+
 }  // namespace
 
 std::string cache_folder() {
-    const fs::path folder = configured_folder();
+    fs::path folder = configured_folder();
+    if (!folder.has_filename()) folder = folder.parent_path();  // a/b/ is a/b
     fs::path part;
     for (const fs::path& name : folder) {
         part /= name;
         if (::mkdir(part.c_str(), 0700) != 0 && errno != EEXIST && errno != EISDIR && !fs::is_directory(part)) {
             fail("create the folder", folder, errno);
         }
+        if (part != folder) check_parent(folder, part);
     }
     struct stat link, status;
     if (::lstat(folder.c_str(), &link) != 0 || ::stat(folder.c_str(), &status) != 0) fail("read", folder, errno);
@@ -157,13 +178,13 @@ std::string cache_folder() {
         reason = "it belongs to another user";
     else if (!only_we_can_write(status))
         reason = "other users may write to it";
-    if (reason != nullptr) {
-        throw MachineError(
-            fmt::format("the folder {} cannot be trusted with programs to run: {}; make it yours alone (chmod 700), or "
-                        "name another folder "
-                        "in the environment variable LOBATTO_CACHE_DIR",
-                        folder.string(), reason));
+    if (reason != nullptr) fail_untrusted(folder, reason, "make it yours alone (chmod 700)");
+    // Behind links the folder has other parents than those of its name.
+    for (fs::path parent = fs::canonical(folder).parent_path();; parent = parent.parent_path()) {
+        check_parent(folder, parent);
+        if (parent == parent.root_path()) break;
     }
+    if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) ::chmod(folder.c_str(), status.st_mode & S_IRWXU);
     return folder;
 }
 

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstring>
+#include <filesystem>
 
 #include "runtime/cache.hpp"
 #include "runtime/compiler.hpp"
@@ -17,22 +18,9 @@ namespace {
 
 constexpr int shown_lines = 40;
 
-// As one would type it; words with anything unusual are quoted.
 std::string shell_text(const std::vector<std::string>& arguments) {
     std::string text;
-    for (const std::string& argument : arguments) {
-        const bool is_plain = argument.find_first_not_of(
-                                  "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-                                  "_-+=./:,") == std::string::npos;
-        if (!text.empty()) text += ' ';
-        if (is_plain && !argument.empty()) {
-            text += argument;
-            continue;
-        }
-        text += '\'';
-        for (const char c : argument) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-        text += '\'';
-    }
+    for (const std::string& argument : arguments) text += (text.empty() ? "" : " ") + shell_word(argument);
     return text;
 }
 
@@ -80,7 +68,8 @@ Compiled compile(const Translation& translation) {
     const auto start = std::chrono::steady_clock::now();
     const ProcessResult result = run_process(request);
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-    if (!result.succeeded()) {
+    const bool has_object = std::filesystem::exists(request.folder + "/" + object);
+    if (!result.succeeded() || !has_object) {
         std::string kept = "Source, command and whole output are kept in " + entry.failed_path();
         try {
             write_file(request.folder + "/command", command + "\n");
@@ -89,9 +78,14 @@ Compiled compile(const Translation& translation) {
         } catch (const MachineError& error) {
             kept = std::string("Nothing of this could be kept: ") + error.what();
         }
-        throw MachineError(fmt::format("the C++ compiler {}.\nCommand: {}\nIts output:\n{}{}",
-                                       how_it_ended(result, request.seconds_limit), command, first_lines(result.output),
-                                       kept));
+        const std::string how = result.succeeded()
+                                    ? fmt::format(
+                                          "{} ended well but wrote no {}; correct the environment variable CXX, or "
+                                          "unset it to use g++ or clang++",
+                                          compiler.words[0], object)
+                                    : how_it_ended(result, request.seconds_limit);
+        throw MachineError(fmt::format("the C++ compiler {}.\nCommand: {}\nIts output:\n{}{}", how, command,
+                                       first_lines(result.output), kept));
     }
     entry.publish(object);
     return {entry.object_path(), command, false, elapsed.count()};

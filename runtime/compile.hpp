@@ -26,8 +26,9 @@ struct Compiled {
 // compiler's own output.
 Compiled compile(const Translation& translation);
 
-// The cache folder: $LOBATTO_CACHE_DIR, else $XDG_CACHE_HOME/lobatto, else ~/.cache/lobatto; created with mode 0700;
-// refused (MachineError) when it belongs to another user or others may write to it.
+// The cache folder: $LOBATTO_CACHE_DIR, else $XDG_CACHE_HOME/lobatto, else ~/.cache/lobatto; made with, or brought to,
+// mode 0700. Refused (MachineError) when it belongs to another user, others may write to it, or a folder above it
+// belongs to another user than root or lets others rename what is in it (writable, without the sticky bit).
 std::string cache_folder();
 
 }  // namespace lobatto

@@ -125,6 +125,16 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     return arguments;
 }
 
+std::string shell_word(const std::string& word) {
+    const bool is_plain = word.find_first_not_of(
+                              "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                              "_-+=./:,") == std::string::npos;
+    if (is_plain && !word.empty()) return word;
+    std::string quoted = "'";
+    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return quoted + "'";
+}
+
 std::string processor_identity() {
     // The file has one paragraph a processor; the first is enough. The other lines (frequency, numbers) change.
     std::ifstream file("/proc/cpuinfo");

@@ -20,6 +20,9 @@ Compiler find_compiler(bool quadruple);
 std::vector<std::string> compile_arguments(const Compiler& compiler, const std::string& source,
                                            const std::string& object, bool quadruple);
 
+// A word of a command as one would type it: quoted when anything in it is unusual.
+std::string shell_word(const std::string& word);
+
 // What -march=native looks at: the model and the features of the processor.
 std::string processor_identity();
 

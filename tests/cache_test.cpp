@@ -274,6 +274,43 @@ TEST_CASE("a folder that others may write to is refused") {
     }
 }
 
+TEST_CASE("a folder in one where others may rename it is refused, also behind a link; a sticky bit helps") {
+    const TemporaryFolder folder;
+    const fs::path open = folder / "open";
+    fs::create_directories(open / "sub/c");
+    fs::permissions(open / "sub/c", fs::perms::owner_all);
+    fs::create_symlink(open / "sub", folder / "link");
+    for (const std::string& path : {(open / "sub/c").string(), (folder / "link/c").string(), (open / "new").string()}) {
+        const EnvironmentVariable cache("LOBATTO_CACHE_DIR", path);
+        for (const fs::perms writer : {fs::perms::group_write, fs::perms::others_write}) {
+            fs::permissions(open, fs::perms::owner_all | writer);
+            CHECK(message_of<MachineError>([] { cache_folder(); }) ==
+                  "the folder " + path + " cannot be trusted with programs to run: other users may rename what is in " +
+                      open.string() +
+                      "; take their permission to write there (chmod go-w), or name another folder in the environment "
+                      "variable LOBATTO_CACHE_DIR");
+        }
+        fs::permissions(open, fs::perms::all | fs::perms::sticky_bit);
+        CHECK(cache_folder() == path);
+    }
+    if (::geteuid() == 0) {  // who else may give folders away?
+        REQUIRE(::chown(open.c_str(), 65534, 65534) == 0);
+        const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (open / "sub/c").string());
+        CHECK(message_of<MachineError>([] { cache_folder(); }).find(open.string() + " belongs to another user") !=
+              std::string::npos);
+    }
+}
+
+TEST_CASE("a folder that others may read becomes private, with or without a stroke at its end") {
+    const TemporaryFolder folder;
+    for (const char* end : {"", "/"}) {
+        fs::permissions(folder.string(), fs::perms(0755));
+        const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string() + end);
+        CHECK(cache_folder() == folder.string());
+        CHECK(fs::status(folder.string()).permissions() == fs::perms::owner_all);
+    }
+}
+
 TEST_CASE("a folder that belongs to another user is refused, also behind a link") {
     const TemporaryFolder folder;
     std::string foreign = "/";
@@ -327,7 +364,7 @@ TEST_CASE("a folder that cannot be made is named with the reason") {
 
 TEST_CASE("a folder without permission to write is named with the reason, but what is in it is used") {
     TemporaryFolder folder;
-    fs::permissions(folder.string(), fs::perms::all);  // for another user, too
+    fs::permissions(folder.string(), fs::perms::all | fs::perms::sticky_bit);  // for another user, too
     const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
     const pid_t pid = start_process([&] {
         if (::geteuid() == 0 && ::setuid(65534) != 0) return false;  // root may write everywhere
@@ -363,6 +400,16 @@ TEST_CASE("a compiler that fails is quoted, and source, command and output are k
     CHECK(read_file(kept / "answer.cpp") == answer.text);
     CHECK(read_file(kept / "command") == command + "\n");
     CHECK(read_file(kept / "output").ends_with("\n99\n100\n"));
+}
+
+TEST_CASE("a compiler that writes nothing and calls it success is named") {
+    const Workshop workshop;
+    workshop.set_compiler("exit 0\n");
+    CHECK(message_of<MachineError>([] { compile(answer); })
+              .starts_with("the C++ compiler " + (workshop.folder / "compiler").string() +
+                           " ended well but wrote no answer.so; correct the environment variable CXX, or unset it to "
+                           "use g++ or clang++.\nCommand: "));
+    CHECK(workshop.endings() == std::vector<std::string>{".failed"});
 }
 
 TEST_CASE("what is kept of a failure goes when the same compilation succeeds") {

@@ -165,6 +165,10 @@ TEST_CASE("emit writes the header and its support, says what each pass saved and
                              "group by stage ", "share common parts ", "pair sines and cosines "})
         CHECK(contains(emitted.out, pass));
     CHECK(contains(emitted.out, "  lobatto::Stepper<lobatto::kernels::pendulum> stepper;\n"));
+    CHECK(contains(emitted.out, " -I " + path + " program.cpp\n"));
+    const std::string spaced = folder / "it's new";
+    CHECK(contains(lobatto_program({"emit", tree + "/scenes/pendulum.toml", "-o", spaced}).out,
+                   " -I '" + (folder / "it'\\''s new").string() + "' program.cpp\n"));
     int files = 0;
     for (const auto& entry : std::filesystem::directory_iterator(path)) files += entry.is_regular_file() ? 1 : 0;
     CHECK(files == 2);  // no temporary file is left

@@ -219,10 +219,19 @@ TEST_CASE("nesting of 200 is read, of 201 and of 200,000 refused") {
     CHECK(error_of(repeated("(", 200) + "q" + repeated(")", 200)).find(message) != std::string::npos);
     CHECK(error_of(repeated("(", 90000)).find(message) != std::string::npos);
     CHECK(error_of(repeated("q^", 40000)).find(message) != std::string::npos);
-    CHECK(error_of(repeated("sin(", 20000)).find(message) != std::string::npos);
+    CHECK(error_of("-" + repeated("(", 20000)).find(message) != std::string::npos);
     CHECK(parse(repeated("-", 90000) + "q").is_equal(q));
     CHECK(error_of(repeated("(", 200000))
               .starts_with("formula:1:1: the Lagrangian has 200000 characters; at most 100000 are read\n"));
+}
+
+TEST_CASE("functions stand 16 deep in one another, not 17, and any number beside one another") {
+    const std::string message = "functions of functions in the Lagrangian are more than 16 deep; write it with fewer";
+    CHECK_NOTHROW(parse(repeated("sin(", 16) + "q" + repeated(")", 16)));
+    const std::string deep = repeated("sin(", 17) + "q" + repeated(")", 17);
+    CHECK(error_of(deep) == layout(deep, 65, message));
+    CHECK(error_of(repeated("sin(", 20000)).find(message) != std::string::npos);
+    CHECK_NOTHROW(parse("q" + repeated("+sin(cos(q))", 40)));
 }
 
 TEST_CASE("an initial value is made of parameters and numbers") {

@@ -189,6 +189,11 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
     CHECK(refusal({"--set", "m"}) == "--set:1:1: expected name=value, such as --set m=2\n  1 | m\n    | ^\n");
     CHECK(contains(refusal({"--set", "m=2*omega"}), "--set:1:5: unknown name 'omega' in the value of m"));
     CHECK(contains(refusal({"--step", "2*"}), "--step:1:3: "));
+    const std::string range = " must be 0, or of a size between 1e-300 and 1e300\n";
+    CHECK(refusal({"--set", "m=1e400"}) == "--set:1:3: the value of m" + range + "  1 | m=1e400\n    |   ^\n");
+    CHECK(contains(refusal({"--set", "omega=1e-400"}), "--set:1:7: the value of omega" + range));
+    CHECK(contains(refusal({"--step", "1e400"}), "--step:1:1: the step" + range));
+    CHECK(contains(refusal({"--until", "m*1e400"}), "--until:1:1: the end time" + range));
     CHECK(refusal({"--step", "-0.1"}) == "--step: the step must be positive, but is -0.1\n");
     CHECK(refusal({"--until", "-1"}) == "--until: the end time must not be negative, but is -1\n");
     CHECK(refusal({"--until", "1e30"}) ==

@@ -3,8 +3,11 @@
 #include "generator/scene.hpp"
 
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include <string>
+
+#include "tests/support.hpp"
 
 using GiNaC::ex;
 using GiNaC::numeric;
@@ -255,6 +258,17 @@ TEST_CASE("names that are taken are refused") {
                 "with a letter");
 }
 
+TEST_CASE("a coordinate cannot have the name of another's momentum, in either order") {
+    const std::string x = "q = { position = 1, velocity = 0 }", p = "p_q = { position = 1, velocity = 0 }";
+    const std::string message =
+        "'p_q' is the momentum of coordinate q in the trajectory; give the coordinate another name";
+    check_error(3, x + "\n" + p, {4, 1}, message);
+    check_error(3, p + "\n" + x, {3, 1}, message);
+    CHECK(read("lagrangian = \"p_m*p_q'^2\"\n[coordinates]\n" + p +
+               "\n[parameters]\np_m = 1\n[run]\nstep = 1\nuntil = 1\n")
+              .coordinates.size() == 1);
+}
+
 TEST_CASE("names that are never used are refused") {
     check_error(6, "k = 4\nlength = 2", {7, 1}, "parameter length occurs in no formula; use it or remove it");
     check_error(3, "q = { position = 1, velocity = 0 }\nx = { position = 1, velocity = 0 }", {1, 14},
@@ -304,8 +318,27 @@ TEST_CASE("a file that cannot be read is named with the reason") {
     };
     CHECK(error_of_path("no/such\x1b.toml") == "no/such\uFFFD.toml: cannot read the scene: there is no such file");
     CHECK(error_of_path(LOBATTO_SOURCE_DIR) == LOBATTO_SOURCE_DIR ": cannot read the scene: it is a directory");
+    const lobatto::test::TemporaryFolder folder;
+    const std::string pipe = folder / "pipe";
+    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+    const lobatto::test::Finished done = lobatto::test::run({"timeout", "20", LOBATTO_PROGRAM, "derive", pipe});
+    CHECK(done.exit_code == 2);
+    CHECK(done.err == pipe +
+                          ": cannot read the scene: it is a named pipe; give a file, or /dev/stdin for the output of "
+                          "another program\n");
     CHECK(error_of(std::string(1000001, ' ')) ==
           "some/oscillator.toml: the file has 1000001 bytes; a scene has at most 1000000");
+}
+
+TEST_CASE("the output of another program can be a scene") {
+    const std::string program = LOBATTO_PROGRAM, scene = scene_path("pendulum.toml");
+    for (const std::string& command :
+         {"cat " + scene + " | " + program + " derive /dev/stdin", program + " derive /dev/stdin < " + scene,
+          program + " derive <(sleep 0.1; cat " + scene + ")"}) {
+        const lobatto::test::Finished done = lobatto::test::run({"bash", "-c", command});
+        CHECK(done.exit_code == 0);
+        CHECK(done.err == "");
+    }
 }
 
 TEST_CASE("64 coordinates and 1000 parameters are read, one more is refused") {
