@@ -191,6 +191,7 @@ void energy(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& s
 Row order(const Convergence& convergence, const Kernel& kernel) {
     const bool holds = bears_out(convergence, kernel->order, kernel->linear != 0);
     const std::string bound = fmt::format("{} {}", kernel->linear ? "at least" : "about", kernel->order);
+    if (convergence.below_rounding) return {"order of convergence", "below rounding", "not judged", holds, ""};
     return {"order of convergence", convergence.exact ? "exact" : fmt::format("{:.2f}", convergence.order), bound,
             holds, "the error of this motion does not shrink with the step as the method's order says"};
 }
@@ -243,6 +244,10 @@ void verify(const VerifyOptions& options) {
     const Convergence convergence = measure_order(exact_kernel, quadruple_start, start.step);
     rows.push_back(order(convergence, exact_kernel));
     momenta(rows, kernel, start, scene);
+    rows.push_back(at_most("H in double against quadruple",
+                           energy_defect(kernel, exact_kernel, start.parameters, start.step, states), 1e-10,
+                           "terms of the energy cancel and take its digits with them; write the potential without "
+                           "differences of nearly equal terms"));
     energy(rows, kernel, start);
 
     print(rows, convergence);

@@ -25,14 +25,17 @@ struct Convergence {
     std::vector<ConvergenceRow> rows;  // five steps, each half of the one before
     double order = 0;                  // of the last row
     bool settled = false;              // the last two orders agree: the ladder is fine enough
+    bool below_rounding = false;       // not settled, and finer ladders drown in rounding: nothing can be said
     bool exact = false;                // nothing to measure: the largest step has no error but rounding
 };
 
-// Over eight of the given steps; the ladder begins at this step, or below while the orders have not settled.
+// Over eight of the given steps; the ladder begins at this step, below while the orders have not settled, above
+// while errors are no more than rounding.
 // ComputationError when no step of the ladder can be taken.
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step);
 
-// Whether the measurement bears out an order: within 0.3, or for a linear system at least (some super-converge).
+// Whether the measurement bears out an order: within 0.3, or for a linear system at least (some super-converge); or
+// cannot tell.
 bool bears_out(const Convergence& convergence, int order, bool linear);
 
 }  // namespace lobatto

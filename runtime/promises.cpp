@@ -117,6 +117,30 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
     if (stepper.prepare(start.parameters, step) != LOBATTO_OK ||
         stepper.tangent(start.q, start.p, q1, p1, T) != LOBATTO_OK)
         throw ComputationError(failure);
+    // Each component's own size, and its shift: a part of what velocity and force move it in the step, or of itself
+    // where they hardly do.
+    const std::vector<real> before = joined(start.q, start.p), after = joined(q1, p1);
+    std::vector<real> W, S;
+    stepper.acceleration(start.q, W, S);
+    const std::vector<real> velocity = stepper.velocity(start.q, start.p), force = stepper.momentum(start.q, W);
+    const real h = step;
+    std::vector<real> sizes(rows), shifts(rows);
+    for (std::size_t i = 0; i < rows; ++i) {
+        const real moved = i < n ? size(h * velocity[i]) + size(h * h * W[i]) / 2 : size(h * force[i - n]);
+        sizes[i] = std::max(size(before[i]), size(after[i]));
+        shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * size(before[i]));
+    }
+    for (const std::size_t block : {std::size_t(0), n}) {
+        const auto most = [&](const std::vector<real>& values) {  // for a component that rests, or nearly, at zero
+            const real largest = *std::max_element(values.begin() + block, values.begin() + block + n);
+            return largest > 0 ? largest : real(1);
+        };
+        const real most_size = most(sizes), most_shift = std::min(most(shifts), real(1e-6) * most_size);
+        for (std::size_t i = block; i < block + n; ++i) {
+            if (!(sizes[i] > 0)) sizes[i] = most_size;
+            shifts[i] = std::max(shifts[i], real(1e-4) * most_shift);
+        }
+    }
     double defect = 0;
     for (std::size_t j = 0; j < rows; ++j) {
         const auto image = [&](real shift) {
@@ -125,17 +149,42 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             if (stepper.tangent(q, p, q1, p1, ignored) != LOBATTO_OK) throw ComputationError(failure);
             return joined(q1, p1);
         };
-        const real start_value = j < n ? start.q[j] : start.p[j - n];
-        const real e = real(1e-11) * (size(start_value) > 1 ? size(start_value) : real(1));
-        const std::vector<real> after = image(e), before = image(-e);
-        real largest = 0, difference = 0;
-        for (std::size_t i = 0; i < rows; ++i) {
-            largest = std::max(largest, size(T[i * rows + j]));
-            difference = std::max(difference, size(T[i * rows + j] - (after[i] - before[i]) / (2 * e)));
+        // The better of two shifts: truncation spoils the first where the motion is violent, rounding the second.
+        real best = -1;
+        for (const real e : {shifts[j], shifts[j] / 1000}) {
+            const std::vector<real> f1 = image(e), b1 = image(-e), f2 = image(2 * e), b2 = image(-2 * e);
+            real largest = 0, difference = 0;
+            for (std::size_t i = 0; i < rows; ++i) {
+                const real slope = (8 * (f1[i] - b1[i]) - (f2[i] - b2[i])) / (12 * e);
+                largest = std::max(largest, size(T[i * rows + j]) / sizes[i]);
+                difference = std::max(difference, size(T[i * rows + j] - slope) / sizes[i]);
+            }
+            if (best < 0 || difference / largest < best) best = difference / largest;
         }
-        defect = std::max(defect, static_cast<double>(difference / largest));
+        defect = std::max(defect, static_cast<double>(best));
     }
     return defect;
+}
+
+double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std::vector<double>& parameters,
+                     double step, const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states) {
+    using real = __float128;
+    LoadedStepper<double> stepper(kernel);
+    LoadedStepper<real> exact(exact_kernel);
+    if (stepper.prepare(parameters, step) != LOBATTO_OK ||
+        exact.prepare({parameters.begin(), parameters.end()}, step) != LOBATTO_OK)
+        throw ComputationError("the energy cannot be compared: a kernel refuses the scene's values");
+    real difference = 0, largest = 0;
+    for (const auto& [position, momentum] : states) {
+        const std::vector<real> q(position.begin(), position.end()), p(momentum.begin(), momentum.end());
+        const real H = exact.energy(q, p);
+        const std::vector<real> velocity = exact.velocity(q, p);
+        real kinetic = 0;
+        for (std::size_t k = 0; k < q.size(); ++k) kinetic += p[k] * velocity[k] / 2;
+        difference = std::max(difference, size(real(stepper.energy(position, momentum)) - H));
+        largest = std::max(largest, size(kinetic) + size(H - kinetic));
+    }
+    return difference > 0 ? static_cast<double>(difference / largest) : 0.0;
 }
 
 EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parameters, const std::vector<double>& q,
@@ -143,6 +192,7 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     const std::size_t n = q.size();
     std::vector<double> energies;
     std::vector<std::vector<double>> motion;
+    std::vector<double> W, S;
     double energy_size = 0;
     LoadedStepper<double> stepper(kernel);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
@@ -162,7 +212,12 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
             const std::vector<double> velocity = stepper.velocity(motion.back(), momentum);
             double kinetic = 0;
             for (std::size_t k = 0; k < n; ++k) kinetic += std::fabs(momentum[k] * velocity[k]) / 2;
-            energy_size = std::max(energy_size, kinetic + std::fabs(records.energy[i] - kinetic));
+            double sizes = kinetic + std::fabs(records.energy[i] - kinetic);
+            // Rounding of q_k costs V its slope times that: sum |q_k dV/dq_k|.
+            stepper.acceleration(motion.back(), W, S);
+            const std::vector<double> slope = stepper.momentum(motion.back(), W);
+            for (std::size_t k = 0; k < n; ++k) sizes += std::fabs(row[k] * slope[k]);
+            energy_size = std::max(energy_size, sizes);
         }
     };
     const TrajectoryResult run = integrate(kernel, request);
@@ -179,8 +234,8 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     const auto [least, most] = std::minmax_element(energies.begin(), energies.end());
     result.swing = *most - *least;
     result.drift = std::fabs(mean[1] - mean[0]);
-    // Rounding of the energy itself, and of the steps, which it takes as a random walk.
-    result.rounding = rounding_of<double>() * energy_size * (8 + 4 * std::sqrt(static_cast<double>(result.steps)));
+    // Rounding of the energy itself, and of the steps: a periodic motion repeats it, so that it adds up.
+    result.rounding = rounding_of<double>() * energy_size * (8 + static_cast<double>(result.steps) / 4);
     result.bounded = reach[1] <= 4 * reach[0];
     return result;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "runtime/convergence.hpp"
@@ -21,16 +22,23 @@ template <class real>
 Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters, const std::vector<real>& q,
                       const std::vector<real>& p, real step, std::int64_t steps);
 
-// |T d - (step(z + e d) - step(z - e d)) / 2e| relative to |T d|, largest entry, over all 2n directions d, e = 1e-11:
-// whether the tangent map is the derivative of the step. Truncation and rounding are both about 1e-22.
+// |T d - D(d)| relative to |T d|, entries relative to the size of their component, over all 2n directions d, where D is
+// the difference (8 (step(z + e d) - step(z - e d)) - (step(z + 2e d) - step(z - 2e d))) / 12e, and e is 1e-6 or 1e-9
+// of what the component moves in the step, whichever agrees better: whether the tangent map is the derivative of the
+// step. Both errors are below 1e-18.
 double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step);
+
+// |H in double - H in quadruple| at states (q, p), largest, relative to the largest |kinetic| + |potential energy|
+// among them: whether the formula of H loses its digits by cancellation.
+double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std::vector<double>& parameters,
+                     double step, const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states);
 
 // The means of H - H(0) over both halves of a long run, and how far it swings: a drift moves the mean.
 struct EnergyDrift {
     std::int64_t steps = 0;  // good steps, at most those asked for
     double swing = 0;        // max - min of H - H(0)
     double drift = 0;        // |mean of the second half - mean of the first|
-    double rounding = 0;     // of H along the run
+    double rounding = 0;     // of H along the run, adding up step by step
     bool bounded = false;    // whether the motion stays within four times the region of its first half
 };
 EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parameters, const std::vector<double>& q,

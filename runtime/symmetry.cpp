@@ -22,9 +22,10 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr double tiny = 1e-7;
+
 // The rows that span a space, reduced so that each has a leading one where the others have zero.
 MatrixXd reduced(MatrixXd rows) {
-    constexpr double tiny = 1e-7;
     Eigen::Index done = 0;
     for (Eigen::Index column = 0; column < rows.cols() && done < rows.rows(); ++column) {
         Eigen::Index pivot = 0;
@@ -35,11 +36,13 @@ MatrixXd reduced(MatrixXd rows) {
             if (row != done) rows.row(row) -= rows(row, column) * rows.row(done);
         ++done;
     }
-    // Rounding of simple numbers, so that zeros are zeros and halves are halves.
-    return rows.unaryExpr([](double x) {
-        const double nearest = std::round(x * 5040) / 5040;
-        return std::fabs(x - nearest) < tiny ? nearest : x;
-    });
+    return rows.unaryExpr([](double x) { return std::fabs(x) < tiny ? 0.0 : x; });
+}
+
+// Rounding of simple numbers, so that halves are halves.
+double simple(double x) {
+    const double nearest = std::round(x * 5040) / 5040;
+    return nearest != 0 && std::fabs(x - nearest) < tiny ? nearest : x;
 }
 
 // " + 2*x*p_y" and the like, one after the other.
@@ -92,14 +95,16 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
         const std::vector<double> column = stepper.momentum(q, unit);
         M.col(k) = Eigen::Map<const VectorXd>(column.data(), n);
     }
+    M /= M.cwiseAbs().maxCoeff();  // its unit does not matter, and may lie near underflow
 
-    // One row a sample; samples where the forces are not finite are left out, and the next ones are nearer.
+    // One row a sample, half of them to find and half to confirm, and the sum of its terms' sizes for each entry;
+    // samples where the forces are not finite are left out, and the next ones are nearer.
     const Eigen::Index wanted = 3 * unknowns;
-    MatrixXd conditions(wanted, unknowns);
+    MatrixXd conditions(2 * wanted, unknowns), sizes(2 * wanted, unknowns);
     std::mt19937_64 generator(1);
     double spread = 1;
     Eigen::Index row = 0;
-    for (int attempt = 0; row < wanted && attempt < 100 * wanted; ++attempt) {
+    for (int attempt = 0; row < 2 * wanted && attempt < 200 * wanted; ++attempt) {
         std::vector<double> sample = q, W, S;
         for (double& x : sample)
             x += spread * (1 + std::fabs(x)) * (static_cast<double>(generator() >> 11) * 0x1p-52 - 1);
@@ -111,14 +116,27 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
         }
         Eigen::Index unknown = 0;
         for (Eigen::Index i = 0; i < n; ++i)
-            for (Eigen::Index j = i + 1; j < n; ++j) conditions(row, unknown++) = x(j) * force(i) - x(i) * force(j);
+            for (Eigen::Index j = i + 1; j < n; ++j, ++unknown) {
+                conditions(row, unknown) = x(j) * force(i) - x(i) * force(j);
+                sizes(row, unknown) = std::fabs(x(j) * force(i)) + std::fabs(x(i) * force(j));
+            }
         conditions.row(row).tail(n) = M * force;
-        if (const double size = conditions.row(row).norm(); size > 0) conditions.row(row) /= size;
+        sizes.row(row).tail(n) = M.cwiseAbs() * force.cwiseAbs();
         ++row;
     }
-    if (row < wanted)
+    if (row < 2 * wanted)
         throw ComputationError("symmetries cannot be looked for: the forces are not finite around the start");
-    const Eigen::JacobiSVD<MatrixXd> decomposition(conditions, Eigen::ComputeFullV);
+    // Every unknown in the unit of its own terms, then every sample: a weak force counts as much as a strong one.
+    VectorXd units = sizes.colwise().maxCoeff().transpose();
+    MatrixXd scaled = conditions.topRows(wanted);
+    for (Eigen::Index unknown = 0; unknown < unknowns; ++unknown) {
+        if (!(units(unknown) > 0)) units(unknown) = 1;
+        scaled.col(unknown) /= units(unknown);
+    }
+    for (Eigen::Index sample = 0; sample < wanted; ++sample)
+        if (const double size = sizes.row(sample).transpose().cwiseQuotient(units).maxCoeff(); size > 0)
+            scaled.row(sample) /= size;
+    const Eigen::JacobiSVD<MatrixXd> decomposition(scaled, Eigen::ComputeFullV);
     const VectorXd& values = decomposition.singularValues();
     Eigen::Index rank = 0;
     while (rank < unknowns && values(rank) > 1e-10 * std::fmax(values(0), 1.0)) ++rank;
@@ -126,8 +144,16 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
     std::vector<Symmetry> symmetries;
     if (rank == unknowns) return symmetries;
     // The entries of A lead, so that translations are reduced to directions of their own, and rotations by them.
-    const MatrixXd space = reduced(decomposition.matrixV().rightCols(unknowns - rank).transpose());
+    MatrixXd space = reduced(decomposition.matrixV().rightCols(unknowns - rank).transpose());
     for (Eigen::Index s = 0; s < space.rows(); ++s) {
+        space.row(s).array() /= units.transpose().array();
+        Eigen::Index leading = 0;
+        while (leading + 1 < unknowns && space(s, leading) == 0) ++leading;
+        space.row(s) = (space.row(s) / space(s, leading)).unaryExpr(&simple).eval();
+        const VectorXd direction = space.row(s).transpose();
+        const double missed = (conditions.bottomRows(wanted) * direction).cwiseAbs().maxCoeff();
+        const double terms = (sizes.bottomRows(wanted) * direction.cwiseAbs()).maxCoeff();
+        if (!(missed <= 1e-9 * terms)) continue;
         MatrixXd A = MatrixXd::Zero(n, n);
         Eigen::Index unknown = 0;
         for (Eigen::Index i = 0; i < n; ++i)

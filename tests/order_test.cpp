@@ -96,6 +96,27 @@ TEST_CASE("a ladder that begins far too coarse is refined until the orders settl
     CHECK(std::fabs(convergence.order - 4) < 0.1);
 }
 
+TEST_CASE("a ladder that begins at the rounding floor is coarsened until there is an error to measure") {
+    const Convergence pendulum = measure_order(quadruple_kernel(test::pendulum_scene(5)), wide_swing, 1e-4);
+    CHECK(pendulum.settled);
+    CHECK(pendulum.rows.front().step > 1e-4);
+    CHECK(std::fabs(pendulum.order - 8) < 0.3);
+    const Kernel oscillator =
+        quadruple_kernel(test::scene_of("q'^2/2 - q^2/2", "q = { position = 1, velocity = 0 }", 5));
+    CHECK(std::fabs(measure_order(oscillator, {{}, {1.5}, {0}}, 0.0125).order - 8) < 0.3);
+}
+
+TEST_CASE("an order that rounding hides at every step is not judged") {
+    // Around q = 1e20 quadruple leaves 14 digits to an angle: steps short enough for them show nothing but rounding.
+    const Convergence convergence =
+        measure_order(quadruple_kernel(test::pendulum_scene(5)), {{1, 1}, {1e20}, {2}}, 1e-6);
+    INFO(convergence.order);
+    CHECK(!convergence.settled);
+    CHECK(!convergence.exact);
+    CHECK(convergence.below_rounding);
+    CHECK(bears_out(convergence, 8, false));
+}
+
 TEST_CASE("free fall has no error to measure") {
     const Kernel kernel = quadruple_kernel(
         test::scene_of("m*q'^2/2 - m*g*q", "q = { position = 0, velocity = 0 }", 4, "m = 2\ng = 9.81"));
@@ -139,6 +160,45 @@ TEST_CASE("the way there and back leads to the start within the rounding it allo
 TEST_CASE("the tangent map is the derivative of the step to 1e-20") {
     for (int points = 2; points <= 5; ++points)
         CHECK(tangent_defect(quadruple_kernel(test::coupled_scene(points)), coupled_start, 0.3) < 1e-20);
+}
+
+TEST_CASE("the tangent map is measured in the units of the motion: a satellite in metres, an angle of a million") {
+    const Kernel satellite = quadruple_kernel(test::scene_of(
+        "m*(x'^2 + y'^2)/2 + m*mu/sqrt(x^2 + y^2)",
+        "x = { position = 7e6, velocity = 0 }\ny = { position = 0, velocity = 8000 }", 5, "m = 1000\nmu = 3.986e14"));
+    CHECK(tangent_defect(satellite, {{1000, 3.986e14}, {7e6, 0}, {0, 8e6}}, 20) < 1e-18);  // measured: 2e-20
+    CHECK(tangent_defect(quadruple_kernel(test::pendulum_scene(5)), {{1, 1}, {1e6}, {2}}, 0.01) < 1e-18);  // 5e-22
+}
+
+TEST_CASE("the energy that a periodic motion rounds away step by step is no drift of the method") {
+    const Kernel kernel = test::kernel_in_own_cache(
+        derive(test::scene_of("m*q'^2/2 + g*cos(q)", "q = { position = 0.3, velocity = 9 }", 5, "m = 1\ng = 2")),
+        Precision::double_);
+    const EnergyDrift drift = energy_drift(kernel, {1, 2}, {0.3}, {9}, 0.01, 20000);  // turning over and over
+    INFO(drift.drift << " " << drift.swing << " " << drift.rounding);
+    CHECK(drift.bounded);
+    CHECK(drift.drift <= drift.swing / 4 + drift.rounding);
+    CHECK(drift.rounding < 1e-10 * 42);  // of the energy
+}
+
+TEST_CASE("the energy of a map that is not symplectic drifts") {
+    const Kernel kernel = spoilt_pendulum();
+    const EnergyDrift drift = energy_drift(kernel, {1, 1}, {2}, {0.5}, 0.1, 2000);
+    INFO(drift.drift << " " << drift.swing << " " << drift.rounding);
+    CHECK(drift.bounded);
+    CHECK(drift.drift > drift.swing / 4 + drift.rounding);
+}
+
+TEST_CASE("an energy whose terms cancel in double is found out, a plain one is not") {
+    const std::vector<std::pair<std::vector<double>, std::vector<double>>> states{{{0.3}, {0.2}}, {{0.1}, {0.25}}};
+    const auto defect = [&](const std::string& potential) {
+        const Derivation derivation =
+            derive(test::scene_of("q'^2/2 - " + potential, "q = { position = 0.3, velocity = 0.2 }", 3));
+        return energy_defect(test::kernel_in_own_cache(derivation, Precision::double_),
+                             test::kernel_in_own_cache(derivation, Precision::quadruple), {}, 0.01, states);
+    };
+    CHECK(defect("(sqrt(1 + 1e-14*q^2) - 1)*1e14") > 1e-3);
+    CHECK(defect("(1 - cos(q))") < 1e-14);
 }
 
 TEST_CASE("the energy of a long run swings without drifting; a motion that leaves is not judged") {

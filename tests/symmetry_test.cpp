@@ -81,6 +81,19 @@ TEST_CASE("free motion has all symmetries, Henon and Heiles' potential none") {
     CHECK(symmetries(planar("x^2 + y^2 + x^2*y^2/1000")).empty());  // a small break is a break
 }
 
+TEST_CASE("a weak force beside a strong one is no symmetry, however small the units") {
+    CHECK(symmetries(planar("1000000000000*x^2/2 + y^2/2 + y^4/4")).empty());
+    const Kernel kernel = test::kernel_in_own_cache(
+        derive(test::scene_of("m*q'^2/2 - k*(1 - cos(q))", "q = { position = 0.1, velocity = 0 }", 4,
+                              "m = 1e-200\nk = 1e-200")),
+        Precision::double_);
+    CHECK(find_symmetries(kernel, {1e-200, 1e-200}, {0.1}, 0.01, {"q"}).empty());
+    // Beside them a symmetry is still found.
+    const auto found = symmetries(planar("(1000000*x - y)^4"));
+    REQUIRE(found.size() == 1);
+    CHECK(found[0].momentum == "p_x + 1e+06*p_y");
+}
+
 TEST_CASE("what is no symmetry is not conserved") {
     Symmetry wrong;
     wrong.B.assign(4, 0.0);
