@@ -152,7 +152,9 @@ void check_parent(const fs::path& folder, const fs::path& parent) {
     const auto is_foreign = [](uid_t user) { return user != 0 && user != ::geteuid(); };
     if (is_foreign(link.st_uid) || is_foreign(status.st_uid))
         fail_untrusted(folder, parent.string() + " belongs to another user", "make that yours (chown)");
-    if (S_ISDIR(status.st_mode) && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0 && (status.st_mode & S_ISVTX) == 0)
+    // A group of one's own is no stranger: with umask 002, folders such as ~/.cache are writable by it.
+    const mode_t strangers = status.st_gid == ::getegid() ? S_IWOTH : S_IWGRP | S_IWOTH;
+    if (S_ISDIR(status.st_mode) && (status.st_mode & strangers) != 0 && (status.st_mode & S_ISVTX) == 0)
         fail_untrusted(folder, "other users may rename what is in " + parent.string(),
                        "take their permission to write there (chmod go-w)");
 }

@@ -282,15 +282,15 @@ TEST_CASE("a folder in one where others may rename it is refused, also behind a 
     fs::create_symlink(open / "sub", folder / "link");
     for (const std::string& path : {(open / "sub/c").string(), (folder / "link/c").string(), (open / "new").string()}) {
         const EnvironmentVariable cache("LOBATTO_CACHE_DIR", path);
-        for (const fs::perms writer : {fs::perms::group_write, fs::perms::others_write}) {
-            fs::permissions(open, fs::perms::owner_all | writer);
-            CHECK(message_of<MachineError>([] { cache_folder(); }) ==
-                  "the folder " + path + " cannot be trusted with programs to run: other users may rename what is in " +
-                      open.string() +
-                      "; take their permission to write there (chmod go-w), or name another folder in the environment "
-                      "variable LOBATTO_CACHE_DIR");
-        }
+        fs::permissions(open, fs::perms::owner_all | fs::perms::others_write);
+        CHECK(message_of<MachineError>([] { cache_folder(); }) ==
+              "the folder " + path + " cannot be trusted with programs to run: other users may rename what is in " +
+                  open.string() +
+                  "; take their permission to write there (chmod go-w), or name another folder in the environment "
+                  "variable LOBATTO_CACHE_DIR");
         fs::permissions(open, fs::perms::all | fs::perms::sticky_bit);
+        CHECK(cache_folder() == path);
+        fs::permissions(open, fs::perms::owner_all | fs::perms::group_all);  // our own group: umask 002
         CHECK(cache_folder() == path);
     }
     if (::geteuid() == 0) {  // who else may give folders away?
