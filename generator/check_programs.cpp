@@ -7,6 +7,7 @@
 
 #include "generator/check.hpp"
 #include "generator/check_point.hpp"
+#include "generator/identifier.hpp"
 
 namespace lobatto {
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "generator/function_text.hpp"
+#include "generator/identifier.hpp"
 #include "generator/pipeline.hpp"
 #include "generator/programs.hpp"
 

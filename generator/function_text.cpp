@@ -8,6 +8,7 @@
 #include <cctype>
 #include <set>
 
+#include "generator/identifier.hpp"
 #include "generator/programs.hpp"
 
 namespace lobatto {

@@ -16,9 +16,6 @@ struct Derivation;
 // runtime/kernel.hpp.
 Programs build_programs(const Derivation& derivation);
 
-// A name of the scene as a C++ identifier that is no keyword.
-std::string identifier(const std::string& name);
-
 // Unknowns N of the stage equations up to which the Newton correction is written in closed form (Cramer's rule).
 constexpr int closed_form_limit = 3;
 
