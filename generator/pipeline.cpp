@@ -8,7 +8,7 @@ namespace lobatto {
 
 Derivation derive(const Scene& scene) {
     System system = build_system(scene);
-    Quadrature quadrature = lobatto_quadrature(scene.method.points);
+    Quadrature quadrature = quadrature_of(scene.method);
     Discretisation discretisation = discretise(system, quadrature);
     Structure structure = find_structure(system);
     return {scene, std::move(system), std::move(quadrature), std::move(discretisation), std::move(structure)};

@@ -74,8 +74,8 @@ GiNaC::matrix matrix_of(const SurdMatrix& rows, std::size_t columns) {
 
 }  // namespace
 
-Quadrature lobatto_quadrature(int points) {
-    const std::vector<Surd> c = nodes(points);
+Quadrature quadrature_of(const Method& method) {
+    const std::vector<Surd> c = nodes(method.points);
     const std::size_t s = c.size(), m = s - 2;
     std::vector<std::vector<Surd>> l(s);
     std::vector<Surd> b(s);
@@ -100,7 +100,8 @@ Quadrature lobatto_quadrature(int points) {
     }
 
     Quadrature result;
-    result.points = points;
+    result.method = method;
+    result.points = method.points;
     for (std::size_t j = 0; j < s; ++j) {
         result.radicand = std::max(result.radicand, c[j].b.is_zero() ? 1 : c[j].d);
         result.c.push_back(c[j].expression());
@@ -115,6 +116,8 @@ Quadrature lobatto_quadrature(int points) {
     result.G = matrix_of(G, m);
     result.A = matrix_of(A, m);
     result.E = matrix_of(E, s);
+    result.nodes = result.control = result.c;
+    result.weights = result.b;
     return result;
 }
 

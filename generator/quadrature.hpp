@@ -1,36 +1,53 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Lobatto quadrature on [0, 1] with s points and what the variational integrator needs of it, exactly, in Q(sqrt d).
+// Quadrature rules on [0, 1], Lobatto's and Gauss', and what the variational integrator needs of them.
 #pragma once
 
 #include <ginac/ginac.h>
 
 #include <vector>
 
+#include "generator/scene.hpp"
+
 namespace lobatto {
 
-// All numbers are exact, of the form a + b sqrt(d) with rational a, b; d = 5 for s = 4, d = 21 for s = 5, no radical
-// for s = 2, 3. Indices are 0-based here: node i of the code is node i + 1 of docs/derivation.md. (The paper's nodes 0,
-// xi, 1 - xi, 1 are nodes 0, 1, 2, 3 of s = 4.)
+// All numbers are exact where the nodes lie in one quadratic field Q(sqrt d): Lobatto with up to 5 points, Gauss with
+// up to 3; beyond, floats of 80 digits, right to at least 60. Indices are 0-based here: node i of the code is node i +
+// 1 of docs/derivation.md. (The paper's nodes 0, xi, 1 - xi, 1 are nodes 0, 1, 2, 3 of Lobatto with 4 points.)
 struct Quadrature {
-    int points = 0;                // s
-    int radicand = 1;              // d
-    std::vector<GiNaC::ex> c;      // s nodes, 0 = c_0 < ... < c_{s-1} = 1
-    std::vector<GiNaC::ex> b;      // s weights, sum 1
+    Method method;
+    bool exact = true;             // numbers in Q(sqrt d), else floats
+    int radicand = 1;              // d, 1 when no radical occurs or the numbers are floats
     GiNaC::symbol theta{"theta"};  // time within the step, t = t_0 + h theta
-    std::vector<GiNaC::ex>
-        basis;        // s Lagrange polynomials l_j(theta), expanded: l_j(c_i) = delta_ij   (paper: eq:basisFunctions)
-    GiNaC::matrix D;  // s x s: D_ij = l_j'(c_i)
-    GiNaC::matrix K;  // s x s: K = D^T diag(b) D    (paper: eq:rigidityKE)
-    GiNaC::matrix G;  // (s-2) x (s-2): inverse of the interior block of K, symmetric
-    GiNaC::matrix
-        A;  // (s-2) x (s-2): b_j (c_i (1 - c_j) - G_ij) for the interior nodes, the matrix of the stage map (D12)
-    GiNaC::matrix
-        E;  // (s-2) x s: extrapolation, E_ij = l_j(1 + c_i), i interior: start values from the last step (D15)
 
-    int order() const { return 2 * points - 2; }
+    // The rule with the ends of the step as nodes: what the reduced form of a constant mass matrix needs (D11 ... D17).
+    // Lobatto: its s points. Gauss: 0, its s points, 1, the ends with weight 0.
+    int points = 0;            // nodes of this list
+    std::vector<GiNaC::ex> c;  // nodes, 0 = c_0 < ... < c_{points-1} = 1
+    std::vector<GiNaC::ex> b;  // weights, sum 1
+    GiNaC::matrix A;  // (points-2) x (points-2), the matrix of the stage map (D12). Lobatto: b_j (c_i (1 - c_j) - G_ij)
+                      // for the interior nodes. Gauss: the square of the collocation matrix.
+    GiNaC::matrix E;  // (points-2) x points: E_ij = l_j(1 + c_i) over all nodes of the list: start values from the last
+                      // step (D15)
+
+    // The Galerkin form: a polynomial through control points, integrated at the quadrature nodes proper.
+    std::vector<GiNaC::ex> nodes, weights;  // r each: the nodes that have a weight
+    std::vector<GiNaC::ex> control;         // control points, 0 first, 1 last. Lobatto: the nodes. Gauss with s stages:
+                                            // (1 - cos(j pi/s))/2, j = 0 ... s
+    std::vector<GiNaC::ex> basis;           // Lagrange polynomials l_j(theta) on the control points, expanded
+                                            // (paper: eq:basisFunctions)
+    GiNaC::matrix B;                        // r x controls: l_j(nodes_i); Lobatto: the identity
+    GiNaC::matrix D;                        // r x controls: l_j'(nodes_i)
+    GiNaC::matrix K;                        // controls x controls: K = D^T diag(weights) D    (paper: eq:rigidityKE)
+    GiNaC::matrix G;                        // inverse of K without its first and last row and column, symmetric
+    GiNaC::matrix extrapolation;      // controls x controls: l_j(1 + control_i): the polynomial carried on into the
+                                      // next step
+    std::vector<GiNaC::ex> legendre;  // r: the shifted Legendre polynomial of degree r - 1 at the nodes, for Lobatto
+                                      // (cyclic coordinates); zeros for Gauss
+
+    int order() const { return method.order(); }
 };
 
-Quadrature lobatto_quadrature(int points);  // 2 <= points <= 5
+Quadrature quadrature_of(const Method& method);  // std::invalid_argument outside 2 ... 12 and 1 ... 10 points
 
 // Exact normal form of a polynomial expression in symbols with coefficients in Q(sqrt d): expanded, radicals collected.
 GiNaC::ex expand_exactly(const GiNaC::ex& expression);

@@ -314,6 +314,11 @@ private:
 
 }  // namespace
 
+std::string Method::name() const {
+    return family == Family::lobatto ? fmt::format("Lobatto, {} points", points)
+                                     : fmt::format("Gauss, {} {}", points, points == 1 ? "stage" : "stages");
+}
+
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
                                const std::vector<GiNaC::ex>& given) const {
     try {

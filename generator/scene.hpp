@@ -12,10 +12,11 @@
 namespace lobatto {
 
 struct Coordinate {
-    std::string name;        // an identifier
+    std::string name;        // an identifier; element 3 of an array x is x_3
     std::string unit;        // "" when none is given
     GiNaC::symbol position;  // prints as name
     GiNaC::symbol velocity;  // prints as name'
+    GiNaC::ex force = 0;  // generalised force beside the Lagrangian's own, in positions, velocities, time, parameters
 };
 
 struct Parameter {
@@ -25,11 +26,15 @@ struct Parameter {
     GiNaC::symbol symbol;
 };
 
-enum class Family { lobatto };
+enum class Family { lobatto, gauss };
 
+// Quadrature points of one step: Lobatto with 2 to 12, Gauss with 1 to 10 (its stages).
 struct Method {
     Family family = Family::lobatto;
-    int points = 4;  // 2 ... 5
+    int points = 4;
+
+    int order() const { return family == Family::lobatto ? 2 * points - 2 : 2 * points; }
+    std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage"
 };
 
 struct Run {
@@ -37,9 +42,21 @@ struct Run {
     GiNaC::ex until;  // end time, >= 0; in parameters
 };
 
+// An event: the value crosses zero. Located on the step's own polynomial.
+struct Event {
+    std::string text;   // as written, white space collapsed: "theta = 0 rising"
+    GiNaC::ex value;    // left side minus right side, in positions, velocities, time and parameters
+    int direction = 0;  // 1: rising only, -1: falling only, 0: both
+};
+
+// What a kernel computes beside the motion itself; it has no code for anything else.
 struct Outputs {
-    long every = 1;      // keep each state whose step index is a multiple of this
-    bool energy = true;  // a column H in the trajectory file
+    long every = 1;       // keep each state whose step index is a multiple of this
+    bool energy = true;   // a column H in the trajectory file, and what the run says of the energy
+    bool momenta = true;  // the columns p_...
+    bool tangent = true;  // the derivative of a step: its symplectic defect, monodromy
+    int dense = 0;        // states between two steps, evenly spaced, from the step's own polynomial
+    std::vector<Event> events;
 };
 
 // Initial rates are given either as velocities or as momenta, for all coordinates.
@@ -52,10 +69,12 @@ struct Scene {
     std::string name;        // stem of the file as a C identifier: pendulum
     std::string title;       // one line
     std::vector<Coordinate> coordinates;
+    bool has_time = false;                    // whether the scene declares the time; else no formula holds it
+    GiNaC::symbol time{"t"};                  // prints as the name the scene gives it
     std::vector<Parameter> parameters;        // run-time parameters, in the order of the file
     std::vector<Parameter> constants;         // declared constant: already substituted everywhere
     std::string lagrangian_text;              // as written, white space collapsed
-    GiNaC::ex lagrangian;                     // in position and velocity symbols and run-time parameters
+    GiNaC::ex lagrangian;                     // in position and velocity symbols, time and run-time parameters
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;

@@ -74,16 +74,16 @@ TEST_CASE("checks near the start find its real values: no log of a negative numb
 }
 
 TEST_CASE("a wrong weight, stage matrix or basis fails its checks") {
-    Quadrature wrong = lobatto_quadrature(4);
+    Quadrature wrong = quadrature_of({Family::lobatto, 4});
     wrong.b[1] += GiNaC::pow(GiNaC::ex(10), -30);
     auto failed = failures(check_quadrature(wrong));
     CHECK(std::count(failed.begin(), failed.end(), "its weights sum to 1") == 1);
     CHECK(std::count(failed.begin(), failed.end(), "the quadrature is exact to degree 5") == 1);
-    wrong = lobatto_quadrature(4);
+    wrong = quadrature_of({Family::lobatto, 4});
     std::swap(wrong.A(0, 1), wrong.A(1, 0));
     failed = failures(check_quadrature(wrong));
     CHECK(failed == Claims{"a constant force bends into a parabola", "the stage matrix is symplectic"});
-    wrong = lobatto_quadrature(3);
+    wrong = quadrature_of({Family::lobatto, 3});
     wrong.K(0, 2) = -wrong.K(0, 2);
     failed = failures(check_quadrature(wrong));
     CHECK(failed == Claims{"K integrates products of slopes"});
