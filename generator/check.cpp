@@ -179,12 +179,12 @@ std::vector<Check> check_quadrature(const Quadrature& quadrature) {
 }
 
 std::vector<Check> check_equations(const Derivation& derivation) {
-    const Discretisation& d = derivation.discretisation;
+    const Discretisation& d = derivation.discretisation();
     const System& system = derivation.system;
     const Expressions &c = derivation.quadrature.c, &b = derivation.quadrature.b;
     const std::size_t n = static_cast<std::size_t>(system.n), s = c.size(), m = s - 2;
     const ex h = d.h;
-    const GiNaC::matrix inverse_mass = system.mass.inverse();
+    const GiNaC::matrix inverse_mass = system.mass.dense().inverse();
 
     // L_d from its definition: the quadrature of L along the interpolating polynomial.
     ex action = 0;

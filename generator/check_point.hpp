@@ -7,35 +7,9 @@
 #include <vector>
 
 #include "generator/pipeline.hpp"
+#include "generator/sample.hpp"
 
 namespace lobatto {
-
-// Formulas evaluated together; their symbols have values that may be changed between evaluations.
-class Formulas {
-public:
-    void set(const GiNaC::ex& symbol, const cln::cl_R& value);
-    cln::cl_R get(const GiNaC::ex& symbol) const;
-    std::vector<Id> convert(const std::vector<GiNaC::ex>& expressions);
-    std::vector<cln::cl_R> evaluate(const std::vector<Id>& roots) const;  // DomainError when one is not real
-    std::vector<cln::cl_R> operator()(const std::vector<GiNaC::ex>& expressions) {
-        return evaluate(convert(expressions));
-    }
-
-private:
-    Graph graph_;
-    GiNaC::exmap inputs_;
-    std::vector<cln::cl_R> values_;
-};
-
-// Seeded numbers in (-1, 1), the same on every machine.
-class Noise {
-public:
-    explicit Noise(std::uint64_t seed) : state_(seed * 2654435761u + 12345u) {}
-    cln::cl_R next();
-
-private:
-    std::uint64_t state_;
-};
 
 // All symbols of the derivation (parameters, h, positions of both steps, momenta, velocities) at values near the
 // scene's. The further `attempt` is from 0, the nearer; from the tenth on the parameters are exactly the scene's.
@@ -51,7 +25,7 @@ void at_two_points(const Derivation& derivation, const Work& work) {
             work(formulas);
             ++done;
         } catch (const DomainError&) {
-            if (attempt == 40) throw;
+            if (attempt == sample_attempts) throw;
         }
     }
 }

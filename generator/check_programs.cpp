@@ -101,7 +101,7 @@ class Comparison {
 public:
     Comparison(const Derivation& derivation, Formulas& formulas, const Programs& programs)
         : derivation_(derivation),
-          d_(derivation.discretisation),
+          d_(derivation.discretisation()),
           system_(derivation.system),
           formulas_(formulas),
           machine_(programs),
@@ -110,7 +110,7 @@ public:
         for (std::size_t i = 0; i < system_.parameters.size(); ++i)
             machine_.set(identifier(derivation.scene.parameters[i].name), formulas.get(system_.parameters[i]));
         machine_.set("h", formulas.get(d_.h));
-        mass_ = formulas(entries(system_.mass));
+        mass_ = formulas(entries(system_.mass.dense()));
     }
 
     std::vector<std::pair<std::string, double>> run() {

@@ -30,7 +30,7 @@ public:
         }
         for (const Parameter& parameter : d_.scene.parameters) taken_.insert(parameter.name);
         taken_.insert("h");
-        const Discretisation& disc = d_.discretisation;
+        const Discretisation& disc = d_.discretisation();
         for (std::size_t i = 0; i < s_; ++i)
             for (std::size_t k = 0; k < n_; ++k) rename(disc.Q[i][k], fmt::format("{}_{}", name(k), i + 1));
         for (std::size_t k = 0; k < n_; ++k) {
@@ -130,11 +130,11 @@ private:
         facts.emplace_back("Method", fmt::format("Lobatto, {} points: order {}", s_, d_.quadrature.order()));
         list.clear();
         for (std::size_t i = 0; i < s_; ++i)
-            for (std::size_t k = 0; k < n_; ++k) append(name_of(d_.discretisation.Q[i][k]));
+            for (std::size_t k = 0; k < n_; ++k) append(name_of(d_.discretisation().Q[i][k]));
         const std::string in_paper = is_paper_scheme_ ? "; the paper's q_l, q_xi, q_{1-xi}, q_r" : "";
         facts.emplace_back("Positions", list + " at the nodes of one step, from its left end to its right" + in_paper);
         list.clear();
-        for (const auto& momenta : {d_.discretisation.p0, d_.discretisation.p1})
+        for (const auto& momenta : {d_.discretisation().p0, d_.discretisation().p1})
             for (const auto& symbol : momenta) append(name_of(symbol));
         facts.emplace_back("Momenta", list + " at the two ends");
     }
@@ -155,9 +155,9 @@ private:
     void system() {
         const System& system = d_.system;
         section("The system");
-        matrix("mass", "D2", "", "mass matrix", "M", system.mass);
+        matrix("mass", "D2", "", "mass matrix", "M", system.mass.dense());
         scalar("potential", "D3", "", "potential energy", "V", system.potential);
-        const GiNaC::matrix inverse = system.mass.inverse();
+        const GiNaC::matrix inverse = system.mass.dense().inverse();
         std::vector<ex> W, momenta;
         GiNaC::matrix S(static_cast<unsigned>(n_), static_cast<unsigned>(n_));
         ex energy = system.potential;
@@ -187,7 +187,7 @@ private:
     }
 
     void discrete_equations() {
-        const Discretisation& disc = d_.discretisation;
+        const Discretisation& disc = d_.discretisation();
         const bool linear = d_.structure.linear;
         section("The discrete Lagrangian and its equations");
         scalar("discrete_lagrangian", "D4", linear ? "eq:discreteLagrangian" : "eq:discreteLagrangianNL",
@@ -207,7 +207,7 @@ private:
     }
 
     void full_system() {
-        const Discretisation& disc = d_.discretisation;
+        const Discretisation& disc = d_.discretisation();
         section("The full system");
         std::string unknowns;
         for (const auto& symbol : disc.full_unknowns) unknowns += (unknowns.empty() ? "" : ", ") + name_of(symbol);
@@ -218,7 +218,7 @@ private:
     }
 
     void reduced_system() {
-        const Discretisation& disc = d_.discretisation;
+        const Discretisation& disc = d_.discretisation();
         section("The reduced form: interior unknowns only");
         const Names v = by_coordinate("v");
         std::vector<GiNaC::symbol> drift;
@@ -249,7 +249,7 @@ private:
     // (D20) and the energy that it conserves, (D21).
     void propagation_of_one() {
         const Propagation phi = propagation(d_.quadrature);
-        const Discretisation& disc = d_.discretisation;
+        const Discretisation& disc = d_.discretisation();
         const ex h = disc.h, m = d_.system.mass(0, 0), stiffness = d_.system.hessian(0, 0).expand();
         const ex force = -d_.system.gradient[0].subs(d_.system.q[0] == 0);
         rename(phi.z, "z");

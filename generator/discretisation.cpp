@@ -51,7 +51,7 @@ Discretisation discretise(const System& system, const Quadrature& quadrature) {
     const auto M = [&](std::size_t k, std::size_t l) {
         return system.mass(static_cast<unsigned>(k), static_cast<unsigned>(l));
     };
-    const GiNaC::matrix inverse_mass = system.mass.inverse();
+    const GiNaC::matrix inverse_mass = system.mass.dense().inverse();
     const auto W = [&](std::size_t i, std::size_t k) {  // (M^-1 grad V)_k at node i
         ex sum = 0;
         for (std::size_t l = 0; l < n; ++l)

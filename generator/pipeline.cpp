@@ -6,12 +6,18 @@
 
 namespace lobatto {
 
-Derivation derive(const Scene& scene) {
-    System system = build_system(scene);
-    Quadrature quadrature = quadrature_of(scene.method);
-    Discretisation discretisation = discretise(system, quadrature);
-    Structure structure = find_structure(system);
-    return {scene, std::move(system), std::move(quadrature), std::move(discretisation), std::move(structure)};
+const Discretisation& Derivation::discretisation() const {
+    if (!discretisation_) discretisation_ = std::make_shared<const Discretisation>(discretise(system, quadrature));
+    return *discretisation_;
+}
+
+Derivation derive(const Scene& scene, bool general) {
+    Derivation derivation;
+    derivation.scene = scene;
+    derivation.system = build_system(scene);
+    derivation.quadrature = quadrature_of(scene.method);
+    derivation.structure = find_structure(scene, derivation.system, derivation.quadrature, general);
+    return derivation;
 }
 
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The one place that calls the stages in order: scene -> system -> quadrature -> discretisation -> structure -> graph
+// The one place that calls the stages in order: scene -> system -> quadrature -> structure -> (discretisation) -> graph
 // -> passes -> kernel source.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "generator/discretisation.hpp"
@@ -19,11 +20,21 @@ struct Derivation {
     Scene scene;
     System system;
     Quadrature quadrature;
-    Discretisation discretisation;
     Structure structure;
+
+    // The equations of all nodes written out, for people and for checks; a kernel is assembled from one node's formulas
+    // and does not need them. Made at the first call.
+    const Discretisation& discretisation() const;
+    void put(Discretisation equations) {
+        discretisation_ = std::make_shared<const Discretisation>(std::move(equations));
+    }
+
+private:
+    mutable std::shared_ptr<const Discretisation> discretisation_;
 };
 
-Derivation derive(const Scene& scene);
+// `general`: with every shortcut of Structure switched off.
+Derivation derive(const Scene& scene, bool general = false);
 KernelSource emit(const Derivation& derivation, const EmitOptions& options = {});
 
 }  // namespace lobatto

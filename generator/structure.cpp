@@ -2,7 +2,13 @@
 // What a scene's system lets the kernel leave out, each finding with its reason.
 #include "generator/structure.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
 #include "generator/notation.hpp"
+#include "generator/routhian.hpp"
 
 namespace lobatto {
 
@@ -11,13 +17,11 @@ namespace {
 using GiNaC::ex;
 
 bool has_any(const ex& expression, const std::vector<GiNaC::symbol>& symbols) {
-    for (const auto& symbol : symbols)
-        if (expression.has(symbol)) return true;
-    return false;
+    return std::any_of(symbols.begin(), symbols.end(), [&](const auto& symbol) { return expression.has(symbol); });
 }
 
 std::optional<ClosedSolution> closed_solution(const System& system) {
-    if (system.n != 1) return std::nullopt;
+    if (system.n != 1 || !system.separable || !system.autonomous) return std::nullopt;
     const ex q = system.q[0];
     const ex acceleration = (system.gradient[0] / system.mass(0, 0)).expand();  // -q''
     for (const auto& [kind, shape] :
@@ -29,65 +33,300 @@ std::optional<ClosedSolution> closed_solution(const System& system) {
     return std::nullopt;
 }
 
+// Couplings between coordinates: who occurs in whose equations.
+class Couplings {
+public:
+    explicit Couplings(std::size_t count) : neighbours_(count) {}
+    void add(int a, int b) {
+        if (a == b) return;
+        neighbours_[static_cast<std::size_t>(a)].insert(b);
+        neighbours_[static_cast<std::size_t>(b)].insert(a);
+    }
+
+    // Connected components, each in the order of Cuthill and McKee reversed: breadth first from a far end, neighbours
+    // with few neighbours first.
+    std::vector<Group> groups() const {
+        std::vector<Group> result;
+        std::vector<bool> known(neighbours_.size(), false);
+        for (std::size_t first = 0; first < neighbours_.size(); ++first) {
+            if (known[first]) continue;
+            Group natural;
+            natural.coordinates = breadth_first(static_cast<int>(first));
+            for (const int k : natural.coordinates) known[static_cast<std::size_t>(k)] = true;
+            Group ordered;
+            ordered.coordinates = breadth_first(breadth_first(natural.coordinates.back()).back());
+            std::reverse(ordered.coordinates.begin(), ordered.coordinates.end());
+            std::sort(natural.coordinates.begin(), natural.coordinates.end());
+            natural.bandwidth = bandwidth(natural.coordinates);
+            ordered.bandwidth = bandwidth(ordered.coordinates);
+            result.push_back(ordered.bandwidth < natural.bandwidth ? ordered : natural);
+        }
+        return result;
+    }
+
+private:
+    std::vector<int> breadth_first(int start) const {
+        std::vector<int> order{start};
+        std::set<int> seen{start};
+        for (std::size_t next = 0; next < order.size(); ++next) {
+            const auto& here = neighbours_[static_cast<std::size_t>(order[next])];
+            std::vector<int> fresh;
+            for (const int k : here)
+                if (seen.insert(k).second) fresh.push_back(k);
+            std::stable_sort(fresh.begin(), fresh.end(), [&](int a, int b) { return degree(a) < degree(b); });
+            order.insert(order.end(), fresh.begin(), fresh.end());
+        }
+        return order;
+    }
+    std::size_t degree(int k) const { return neighbours_[static_cast<std::size_t>(k)].size(); }
+    int bandwidth(const std::vector<int>& order) const {
+        std::map<int, int> place;
+        for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
+        int widest = 0;
+        for (const int k : order)
+            for (const int other : neighbours_[static_cast<std::size_t>(k)])
+                widest = std::max(widest, std::abs(place.at(k) - place.at(other)));
+        return widest;
+    }
+
+    std::vector<std::set<int>> neighbours_;
+};
+
+class Finder {
+public:
+    Finder(const Scene& scene, const System& system, const Quadrature& quadrature, bool general)
+        : scene_(scene), system_(system), n_(system.n), interior_(n_ * (quadrature.points - 2)) {
+        result_.general = general;
+    }
+
+    Structure run() {
+        result_.linear = system_.linear && !result_.general;
+        result_.closed_solution = closed_solution(system_);
+        choose_form();
+        if (result_.form == Form::general)
+            general();
+        else
+            separable();
+        time_and_forces();
+        solution();
+        return std::move(result_);
+    }
+
+private:
+    void find(const std::string& name, bool holds, const std::string& reason) {
+        result_.findings.push_back({name, holds, reason});
+    }
+    std::string name(int k) const { return system_.q[static_cast<std::size_t>(k)].get_name(); }
+    // x, y, z and 9 more
+    template <class List>
+    std::string names(const List& list) const {
+        std::string text;
+        std::size_t shown = 0;
+        for (const int k : list) {
+            if (shown == 6 && list.size() > 7) return text + fmt::format(" and {} more", list.size() - shown);
+            text += (shown++ == 0 ? "" : ", ") + name(k);
+        }
+        return text;
+    }
+
+    void choose_form() {
+        if (result_.general) {
+            result_.form = Form::general;
+            find("general path", true, "asked for: nothing is looked for, every node is solved with full matrices");
+            return;
+        }
+        find("constant mass matrix", system_.separable,
+             system_.separable
+                 ? "the second derivatives of L in the velocities are free of positions: only the interior nodes are "
+                   "implicit"
+                 : system_.not_separable + ": all nodes of a step are solved together");
+        const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
+                                          [](const auto& entry) { return entry.first.first == entry.first.second; });
+        result_.diagonal_mass = system_.separable && diagonal;
+        result_.unrolled = interior_ <= unrolled_limit;
+        const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
+        if (!system_.separable || (!result_.diagonal_mass && !result_.unrolled))
+            result_.form = Form::general;
+        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted)
+            result_.form = Form::linear_map;
+    }
+
+    void separable() {
+        std::string coupling;
+        for (const auto& [place, value] : system_.mass.entries())
+            if (place.first < place.second && coupling.empty())
+                coupling = fmt::format("{}' and {}' are coupled by {}", name(place.first), name(place.second),
+                                       canonical_text(value));
+        find("diagonal mass matrix", result_.diagonal_mass,
+             result_.diagonal_mass ? "no product of two different velocities occurs" : coupling);
+        linearity();
+        // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has
+        // one.
+        if (result_.diagonal_mass) {
+            for (const auto& [place, value] : system_.hessian.entries()) result_.entries.push_back(place);
+        } else {
+            std::set<int> columns;
+            for (const auto& [place, value] : system_.hessian.entries()) columns.insert(place.second);
+            for (int i = 0; i < n_; ++i)
+                for (const int j : columns) result_.entries.emplace_back(i, j);
+        }
+        const bool full = result_.entries.size() == static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_);
+        find("sparse second derivatives", !full,
+             fmt::format("{} of {} entries of M^-1 V'' are not identically zero", result_.entries.size(), n_ * n_));
+        std::set<int> free;
+        for (int k = 0; k < n_; ++k) free.insert(k);
+        for (const auto& [place, value] : system_.hessian.entries()) {
+            free.erase(place.first);
+            free.erase(place.second);
+        }
+        for (int k = 0; k < n_; ++k)
+            if (!system_.gradient[static_cast<std::size_t>(k)].is_zero()) free.erase(k);
+        if (!result_.diagonal_mass) free.clear();
+        find("cyclic coordinates", !free.empty(),
+             free.empty() ? "every coordinate is held by L or by a force"
+                          : names(free) + ": moves uniformly, without equations to solve");
+        Couplings couplings(static_cast<std::size_t>(n_));
+        for (const auto& [row, column] : result_.entries) couplings.add(row, column);
+        result_.groups = couplings.groups();
+        describe_groups();
+        find("small enough to write out", result_.unrolled,
+             fmt::format("{} unknowns at the interior nodes; up to {} every node and coordinate is written out, beyond "
+                         "that the code loops over both",
+                         interior_, unrolled_limit));
+    }
+
+    void general() {
+        result_.unrolled = false;
+        const std::vector<int> cyclic = result_.general ? std::vector<int>{} : find_cyclic(system_);
+        result_.routhian = reduce(system_, cyclic);
+        const int active = static_cast<int>(result_.routhian.active.size());
+        if (result_.general) {
+            Group all;
+            for (int k = 0; k < active; ++k) all.coordinates.push_back(k);
+            all.bandwidth = active - 1;
+            result_.groups = {all};
+            return;
+        }
+        linearity();
+        find("cyclic coordinates", !cyclic.empty(),
+             cyclic.empty() ? "every coordinate is held by L or by a force, or its velocity occurs more than squared"
+                            : names(cyclic) +
+                                  ": the momentum is constant, the velocity follows from it, and the "
+                                  "position by quadrature");
+        Couplings couplings(static_cast<std::size_t>(active));
+        for (const auto& [place, value] : result_.routhian.second.entries())
+            if (place.first < 2 * active && place.second < 2 * active)
+                couplings.add(place.first % active, place.second % active);
+        result_.groups = couplings.groups();
+        if (!cyclic.empty() && result_.groups.size() > 1) {  // one multiplier may couple all of them
+            Group all;
+            for (const Group& group : result_.groups)
+                all.coordinates.insert(all.coordinates.end(), group.coordinates.begin(), group.coordinates.end());
+            all.bandwidth = active - 1;
+            result_.groups = {all};
+        }
+        const std::size_t size = result_.routhian.z.size();
+        find("sparse second derivatives", result_.routhian.second.entries().size() < size * size,
+             fmt::format("{} of {} second derivatives are not identically zero",
+                         result_.routhian.second.entries().size(), size * size));
+        describe_groups();
+    }
+
+    void linearity() {
+        std::string reason = "every second derivative of V is free of positions: the step is one matrix, no iteration";
+        if (result_.linear && result_.form != Form::linear_map)
+            reason = "every second derivative of L is constant: one solve a step, its matrix factored once a step size";
+        if (!result_.linear) {
+            const auto text = [](const std::string& of, const std::string& by, const ex& value) {
+                std::string formula = canonical_text(value);
+                if (formula.size() > 200) formula = "a longer formula that";
+                return "d2" + of + "/d" + by + " = " + formula + " depends on the position";
+            };
+            const auto all = [&] {
+                std::vector<GiNaC::symbol> symbols = system_.q;
+                symbols.insert(symbols.end(), system_.v.begin(), system_.v.end());
+                symbols.push_back(system_.t);
+                return symbols;
+            }();
+            if (system_.separable) {
+                for (const auto& [place, value] : system_.hessian.entries())
+                    if (has_any(value, all)) {
+                        reason = text("V", name(place.first) + "d" + name(place.second), value);
+                        break;
+                    }
+            } else {
+                reason = "a second derivative of L is not constant";
+            }
+        }
+        find("linear system", result_.linear, reason);
+    }
+
+    void describe_groups() {
+        const std::size_t count = result_.groups.size();
+        const auto& in = result_.form == Form::general ? result_.routhian.active : std::vector<int>{};
+        const auto listed = [&](const Group& group) {
+            std::vector<int> coordinates;
+            for (const int k : group.coordinates)
+                coordinates.push_back(in.empty() ? k : in[static_cast<std::size_t>(k)]);
+            return names(coordinates);
+        };
+        std::string reason;
+        if (count == 1) {
+            reason = "all coordinates are coupled";
+        } else {
+            for (std::size_t g = 0; g < count && g < 4; ++g)
+                reason += (g == 0 ? "{" : ", {") + listed(result_.groups[g]) + "}";
+            reason += count > 4 ? fmt::format(" and {} more are solved each by itself", count - 4)
+                                : " are solved each by itself";
+        }
+        find("independent groups", count > 1, reason);
+        int widest = 0;
+        std::size_t largest = 0;
+        for (const Group& group : result_.groups) {
+            widest = std::max(widest, group.bandwidth);
+            largest = std::max(largest, group.coordinates.size());
+        }
+        find("banded equations", 3 * widest + 3 < static_cast<int>(largest),
+             fmt::format("in the best order found coupled coordinates are at most {} apart, of {}", widest, largest));
+    }
+
+    void time_and_forces() {
+        find("no explicit time", system_.autonomous,
+             system_.autonomous ? "neither L nor a force holds the time: it is not passed to any formula"
+                                : "L or a force depends on the time");
+        std::vector<int> driven;
+        for (int k = 0; k < n_; ++k)
+            if (!system_.outer_force[static_cast<std::size_t>(k)].is_zero()) driven.push_back(k);
+        find("no forces", driven.empty(),
+             driven.empty() ? "all forces follow from L: the step is symplectic"
+                            : "forces beside L act on " + names(driven) + ": the step is variational, not symplectic");
+        if (!scene_.constants.empty()) {
+            std::string list;
+            for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;
+            find("constant parameters", true, list + ": put into the formulas before anything is derived");
+        }
+    }
+
+    void solution() {
+        const bool closed = result_.closed_solution.has_value();
+        find("solution in closed form", closed,
+             closed ? (result_.closed_solution->kind == ClosedSolution::Kind::harmonic
+                           ? "q'' = -w2*q"
+                           : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
+                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared)
+                    : "neither a harmonic oscillator nor a plane pendulum");
+    }
+
+    const Scene& scene_;
+    const System& system_;
+    const int n_, interior_;
+    Structure result_;
+};
+
 }  // namespace
 
-Structure find_structure(const System& system) {
-    Structure structure;
-    const unsigned n = static_cast<unsigned>(system.n);
-
-    structure.diagonal_mass = true;
-    std::string coupling;
-    for (unsigned i = 0; i < n; ++i)
-        for (unsigned j = 0; j < i; ++j)
-            if (!system.mass(i, j).is_zero() && structure.diagonal_mass) {
-                structure.diagonal_mass = false;
-                coupling = system.v[j].get_name() + " and " + system.v[i].get_name() + " are coupled by " +
-                           canonical_text(system.mass(i, j));
-            }
-    structure.findings.push_back(
-        {"constant mass matrix", true,
-         "the second derivatives of L in the velocities are free of positions: only the interior nodes are implicit"});
-    structure.findings.push_back(
-        {"diagonal mass matrix", structure.diagonal_mass,
-         structure.diagonal_mass ? "no product of two different velocities occurs" : coupling});
-
-    structure.linear = true;
-    std::string nonlinear;
-    for (unsigned i = 0; i < n && structure.linear; ++i)
-        for (unsigned j = 0; j <= i && structure.linear; ++j)
-            if (depends_on(system.hessian(i, j), system.q)) {
-                structure.linear = false;
-                nonlinear = "d2V/d" + system.q[i].get_name() + "d" + system.q[j].get_name() + " = " +
-                            canonical_text(system.hessian(i, j)) + " depends on the position";
-            }
-    structure.findings.push_back(
-        {"linear system", structure.linear,
-         structure.linear ? "every second derivative of V is free of positions: the step is one matrix, no iteration"
-                          : nonlinear});
-
-    // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has one.
-    for (unsigned i = 0; i < n; ++i)
-        for (unsigned j = 0; j < n; ++j) {
-            bool present = !system.hessian(i, j).is_zero();
-            if (!structure.diagonal_mass)
-                for (unsigned k = 0; k < n; ++k) present = present || !system.hessian(k, j).is_zero();
-            if (present) structure.entries.emplace_back(static_cast<int>(i), static_cast<int>(j));
-        }
-    const bool full = structure.entries.size() == static_cast<std::size_t>(n) * n;
-    structure.findings.push_back({"sparse second derivatives", !full,
-                                  std::to_string(structure.entries.size()) + " of " + std::to_string(n * n) +
-                                      " entries of M^-1 V'' are not identically zero"});
-
-    structure.closed_solution = closed_solution(system);
-    const bool closed = structure.closed_solution.has_value();
-    structure.findings.push_back({"solution in closed form", closed,
-                                  closed ? (structure.closed_solution->kind == ClosedSolution::Kind::harmonic
-                                                ? "q'' = -w2*q"
-                                                : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
-                                               std::string(" with w2 = ") +
-                                               canonical_text(structure.closed_solution->omega_squared)
-                                         : "neither a harmonic oscillator nor a plane pendulum"});
-    return structure;
+Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general) {
+    return Finder(scene, system, quadrature, general).run();
 }
 
 }  // namespace lobatto

@@ -6,8 +6,10 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "generator/quadrature.hpp"
 #include "generator/system.hpp"
 
 namespace lobatto {
@@ -25,14 +27,46 @@ struct ClosedSolution {
     GiNaC::ex omega_squared;  // w2, in parameters
 };
 
+// How a step is taken.
+enum class Form {
+    linear_map,  // one affine map, no equations: autonomous linear systems with few coordinates
+    separable,   // constant mass matrix: only the interior nodes are implicit (D11 ... D17)
+    general      // any L: all nodes but the first are implicit (D25 ... D30)
+};
+
+// L without the cyclic coordinates: their velocities eliminated for their momenta P (Routh). Variables z = (v, q, P),
+// v and q of the active coordinates. Without cyclic coordinates R = L.
+struct Routhian {
+    std::vector<int> active, cyclic;  // coordinates, in scene order
+    std::vector<GiNaC::symbol> P;     // one a cyclic coordinate
+    std::vector<GiNaC::symbol> z;     // 2 active + cyclic
+    std::vector<GiNaC::ex> gradient;  // dR/dz; beside dR/dq stands the force F; dR/dP = -v of the cyclic
+    SparseMatrix second;              // its derivative in z, not symmetric where forces are
+};
+
+// Coordinates whose equations are solved together, in an order that keeps coupled ones near.
+struct Group {
+    std::vector<int> coordinates;  // indices into the unknowns' coordinates
+    int bandwidth = 0;             // the largest distance in this order of two that are coupled
+};
+
 struct Structure {
-    bool linear = false;  // V at most quadratic: the step is an affine map
-    bool diagonal_mass = false;
-    std::vector<std::pair<int, int>> entries;  // where M^-1 V'' is not identically zero, row by row
+    Form form = Form::separable;
+    bool general = false;        // all that follows was switched off
+    bool linear = false;         // constant second derivatives: one correction, its Jacobian factored once a step size
+    bool diagonal_mass = false;  // of a separable system
+    bool unrolled = true;        // separable: every node and coordinate written out; else loops over both
+    std::vector<std::pair<int, int>> entries;  // separable: where M^-1 V'' is not identically zero, row by row
+    Routhian routhian;                         // general
+    std::vector<Group> groups;
     std::optional<ClosedSolution> closed_solution;
     std::vector<Finding> findings;  // all of the above and what was looked for in vain, in words
 };
 
-Structure find_structure(const System& system);
+// Largest sizes of what is written out: coordinates of a linear map, unknowns of a separable step.
+constexpr int linear_map_limit = 16, unrolled_limit = 24;
+
+// `general`: find nothing, for comparison.
+Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general = false);
 
 }  // namespace lobatto

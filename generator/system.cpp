@@ -1,128 +1,366 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The mechanical system of a scene: L = 1/2 q'^T M q' - V(q), taken apart symbolically.
+// The mechanical system of a scene: L(q, q', t) and forces, their first and second derivatives, and of what kind they
+// are.
+//
+// Derivatives are taken symbolically, term by term. Whether one vanishes, or depends on q, v or t, is told by its
+// values at seeded points to 60 digits: a formula that is zero only after simplification is recognised, and nothing is
+// expanded.
 #include "generator/system.hpp"
 
-#include <sstream>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
+#include <set>
 
 #include "generator/notation.hpp"
+#include "generator/sample.hpp"
 
 namespace lobatto {
 
 namespace {
 
 using GiNaC::ex;
-
-// The value at a point of small rationals, which is a number where the expression is a rational function.
-ex at_point(const ex& expression, int point) {
-    GiNaC::exmap values;
-    int index = 0;
-    for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
-        if (GiNaC::is_a<GiNaC::symbol>(*part) && !values.contains(*part))
-            values[*part] = GiNaC::numeric(7 + 3 * point + 2 * index++, 11 + point);
-    try {
-        return expression.subs(values, GiNaC::subs_options::no_pattern);
-    } catch (const std::exception&) {  // a pole
-        return expression;
-    }
-}
+using GiNaC::exvector;
+using Symbols = std::vector<GiNaC::symbol>;
 
 [[noreturn]] void refuse(const Scene& scene, const std::string& reason) {
     scene.source.fail(scene.lagrangian_at, "the Lagrangian " + reason);
 }
 
-constexpr const char* treated = "; this version treats L = 1/2 q'^T M q' - V(q) with a constant mass matrix M";
+// The variables that an expression holds, as indices in ascending order.
+class Occurrences {
+public:
+    explicit Occurrences(const Symbols& variables) {
+        for (std::size_t i = 0; i < variables.size(); ++i) index_[variables[i]] = i;
+    }
+    std::set<std::size_t> in(const ex& expression) const {
+        std::set<std::size_t> found;
+        visit(expression, found);
+        return found;
+    }
 
-// A direction in the velocities that no kinetic energy opposes, in words: a' = -1, b' = 1.
-std::string free_direction(const System& system) {
-    const unsigned n = static_cast<unsigned>(system.n);
-    GiNaC::matrix unknowns(n, 1), zero(n, 1);
-    GiNaC::exmap ones;
-    for (unsigned i = 0; i < n; ++i) {
-        const GiNaC::symbol x;
-        unknowns(i, 0) = x;
-        ones[x] = 1;
+private:
+    void visit(const ex& expression, std::set<std::size_t>& found) const {
+        if (GiNaC::is_a<GiNaC::symbol>(expression)) {
+            if (const auto known = index_.find(expression); known != index_.end()) found.insert(known->second);
+            return;
+        }
+        for (std::size_t i = 0; i < expression.nops(); ++i) visit(expression.op(i), found);
     }
-    const GiNaC::matrix kernel = system.mass.solve(unknowns, zero);
-    std::string direction;
-    for (unsigned i = 0; i < n; ++i) {
-        const ex component = kernel(i, 0).subs(ones).normal();
-        if (component.is_zero()) continue;
-        direction += (direction.empty() ? "" : ", ") + system.v[i].get_name() + " = " + canonical_text(component);
+    std::map<ex, std::size_t, GiNaC::ex_is_less> index_;
+};
+
+void append_terms(const ex& expression, const Occurrences& occurrences, std::vector<ex>& terms) {
+    if (GiNaC::is_a<GiNaC::add>(expression)) {
+        for (const ex& term : expression) append_terms(term, occurrences, terms);
+        return;
     }
-    return direction;
+    if (GiNaC::is_a<GiNaC::mul>(expression)) {
+        exvector free, bound;
+        for (const ex& factor : expression) (occurrences.in(factor).empty() ? free : bound).push_back(factor);
+        if (bound.size() == 1 && GiNaC::is_a<GiNaC::add>(bound.front())) {
+            std::vector<ex> inner;
+            append_terms(bound.front(), occurrences, inner);
+            const ex coefficient = GiNaC::mul(free);
+            for (const ex& term : inner) terms.push_back(coefficient * term);
+            return;
+        }
+    }
+    terms.push_back(expression);
+}
+
+ex sum_of(const exvector& terms) {
+    return terms.empty() ? ex(0) : ex(GiNaC::add(terms));
+}
+
+// Which of q, v, t the derivatives of a system depend on, from their values at sample points.
+class Dependence {
+public:
+    struct Kind {
+        bool zero = true, on_q = false, on_v = false, on_t = false;
+    };
+
+    Dependence(const Scene& scene, const System& system) : scene_(scene), system_(system) {}
+
+    std::vector<Kind> of(const std::vector<ex>& expressions) const {
+        std::vector<Kind> kinds(expressions.size());
+        for (int attempt = 0, done = 0; done < 2; ++attempt) {
+            try {
+                look(expressions, attempt, kinds);
+                ++done;
+            } catch (const DomainError& error) {
+                if (attempt == sample_attempts)
+                    refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
+                                               "from the singularity, or mend the formula",
+                                               error.what()));
+            }
+        }
+        return kinds;
+    }
+
+private:
+    void look(const std::vector<ex>& expressions, int attempt, std::vector<Kind>& kinds) const {
+        Formulas formulas;
+        NearStart near(scene_, attempt);
+        near.set_all(formulas);
+        const std::vector<Id> roots = formulas.convert(expressions);
+        const std::vector<Sized> here = formulas.evaluate_sized(roots);
+        const auto moved = [&](const Symbols& symbols, bool Kind::*flag) {
+            std::vector<cln::cl_R> before;
+            for (std::size_t k = 0; k < symbols.size(); ++k) {
+                before.push_back(formulas.get(symbols[k]));
+                formulas.set(symbols[k], near.near(before.back()));
+            }
+            const std::vector<Sized> there = formulas.evaluate_sized(roots);
+            for (std::size_t i = 0; i < kinds.size(); ++i)
+                if (!here[i].equals(there[i])) kinds[i].*flag = true;
+            for (std::size_t k = 0; k < symbols.size(); ++k) formulas.set(symbols[k], before[k]);
+        };
+        for (std::size_t i = 0; i < kinds.size(); ++i)
+            if (!here[i].vanishes()) kinds[i].zero = false;
+        moved(system_.q, &Kind::on_q);
+        moved(system_.v, &Kind::on_v);
+        moved({system_.t}, &Kind::on_t);
+    }
+
+    const Scene& scene_;
+    const System& system_;
+};
+
+// Gaussian elimination of a sparse symmetric matrix of numbers; the first direction that it maps to zero, or nothing.
+std::vector<cln::cl_R> null_direction(const std::map<std::pair<int, int>, Sized>& entries, int n) {
+    const auto at = [](int index) { return static_cast<std::size_t>(index); };
+    std::vector<std::map<int, cln::cl_R>> rows(at(n));
+    std::vector<std::set<int>> columns(at(n));  // the rows not yet used that have an entry there
+    std::vector<cln::cl_R> sizes(at(n), cln::cl_R(0));
+    for (const auto& [place, value] : entries) {
+        rows[at(place.first)][place.second] = value.value;
+        columns[at(place.second)].insert(place.first);
+        sizes[at(place.first)] = cln::max(sizes[at(place.first)], value.size);
+    }
+    const cln::cl_R tiny = cln::expt(cln::cl_RA(10), -35);
+    std::vector<int> pivot_row(at(n), -1);
+    for (int column = 0; column < n; ++column) {
+        int pivot = -1;  // the diagonal where it serves, else the shortest row: the matrix stays sparse
+        for (const int row : columns[at(column)]) {
+            if (cln::abs(rows[at(row)].at(column)) <= tiny * sizes[at(row)]) continue;
+            if (pivot < 0 || row == column || (pivot != column && rows[at(row)].size() < rows[at(pivot)].size()))
+                pivot = row;
+        }
+        if (pivot < 0) {  // this component 1, the later ones 0, the earlier ones by substitution
+            std::vector<cln::cl_R> direction(at(n), cln::cl_R(0));
+            direction[at(column)] = 1;
+            for (int earlier = column - 1; earlier >= 0; --earlier) {
+                const auto& row = rows[at(pivot_row[at(earlier)])];
+                cln::cl_R sum = 0;
+                for (const auto& [j, value] : row)
+                    if (j > earlier && j <= column) sum = sum + value * direction[at(j)];
+                direction[at(earlier)] = -sum / row.at(earlier);
+            }
+            return direction;
+        }
+        pivot_row[at(column)] = pivot;
+        for (const auto& [j, value] : rows[at(pivot)]) columns[at(j)].erase(pivot);
+        for (const int row : std::set<int>(columns[at(column)])) {
+            const cln::cl_R factor = rows[at(row)].at(column) / rows[at(pivot)].at(column);
+            for (const auto& [j, value] : rows[at(pivot)]) {
+                if (j < column) continue;
+                const auto [target, is_new] = rows[at(row)].emplace(j, cln::cl_R(0));
+                if (is_new) columns[at(j)].insert(row);
+                target->second = target->second - factor * value;
+            }
+            rows[at(row)].erase(column);
+            columns[at(column)].erase(row);
+        }
+    }
+    return {};
+}
+
+// A direction in words: a' = -1, b' = 1.
+std::string words(const System& system, const std::vector<cln::cl_R>& direction) {
+    std::string text;
+    int shown = 0;
+    for (std::size_t k = 0; k < direction.size(); ++k) {
+        if (cln::abs(direction[k]) < cln::expt(cln::cl_RA(10), -30)) continue;
+        if (++shown > 8) return text + ", ...";
+        text += (text.empty() ? "" : ", ") + system.v[k].get_name() + " = " + decimal(direction[k], 6);
+    }
+    return text;
+}
+
+// Refuses a mass matrix that is singular near the start, and a start at a singularity.
+void check_mass(const Scene& scene, const System& system) {
+    std::vector<ex> entries;
+    std::vector<std::pair<int, int>> places;
+    for (const auto& [place, value] : system.momentum_v.entries()) {
+        places.push_back(place);
+        entries.push_back(value);
+    }
+    const auto direction_at = [&](Formulas& formulas) {
+        const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(entries));
+        std::map<std::pair<int, int>, Sized> matrix;
+        for (std::size_t i = 0; i < places.size(); ++i) matrix[places[i]] = values[i];
+        return null_direction(matrix, system.n);
+    };
+    for (int attempt = 0;; ++attempt) {
+        try {
+            Formulas formulas;
+            NearStart(scene, attempt).set_all(formulas);
+            const std::vector<cln::cl_R> direction = direction_at(formulas);
+            if (!direction.empty())
+                refuse(scene,
+                       "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
+                       "do not follow from momenta. No kinetic energy opposes the direction " +
+                           words(system, direction) + "; add the missing mass, or remove a coordinate");
+            break;
+        } catch (const DomainError&) {
+            if (attempt == sample_attempts) throw;
+        }
+    }
+}
+
+std::string slope_text(const std::string& of, const GiNaC::symbol& by, const ex& value) {
+    std::string text = canonical_text(value);
+    if (text.size() > 200) text = "a formula of " + std::to_string(text.size()) + " characters";
+    return "d" + of + "/d" + by.get_name() + " = " + text;
 }
 
 }  // namespace
 
-bool vanishes(const ex& expression) {
-    const ex value = at_point(expression, 0);
-    if (GiNaC::is_a<GiNaC::numeric>(value) && !value.is_zero()) return false;
-    return expression.expand().is_zero();
+std::vector<ex> terms_of(const ex& expression, const Symbols& variables) {
+    std::vector<ex> terms;
+    append_terms(expression, Occurrences(variables), terms);
+    return terms;
 }
 
-bool depends_on(const ex& expression, const std::vector<GiNaC::symbol>& symbols) {
-    const auto has_any = [&symbols](const ex& e) {
-        return std::any_of(symbols.begin(), symbols.end(), [&e](const GiNaC::symbol& s) { return e.has(s); });
-    };
-    if (!has_any(expression)) return false;
-    for (const auto& symbol : symbols) {
-        const ex slope = at_point(expression.diff(symbol), 0);
-        if (GiNaC::is_a<GiNaC::numeric>(slope) && !slope.is_zero()) return true;
+std::vector<ex> gradient_of(const std::vector<ex>& terms, const Symbols& variables) {
+    const Occurrences occurrences(variables);
+    std::vector<exvector> parts(variables.size());
+    for (const ex& term : terms)
+        for (const std::size_t i : occurrences.in(term)) parts[i].push_back(term.diff(variables[i]));
+    std::vector<ex> gradient;
+    for (const exvector& part : parts) gradient.push_back(sum_of(part));
+    return gradient;
+}
+
+SparseMatrix derivative_of(const std::vector<ex>& vector, const Symbols& variables) {
+    const Occurrences occurrences(variables);
+    SparseMatrix result(static_cast<int>(vector.size()), static_cast<int>(variables.size()));
+    for (std::size_t k = 0; k < vector.size(); ++k) {
+        std::vector<ex> terms;
+        append_terms(vector[k], occurrences, terms);
+        std::map<std::size_t, exvector> parts;
+        for (const ex& term : terms)
+            for (const std::size_t i : occurrences.in(term)) parts[i].push_back(term.diff(variables[i]));
+        for (const auto& [i, part] : parts) {
+            const ex value = sum_of(part);
+            if (!value.is_zero()) result.put(static_cast<int>(k), static_cast<int>(i), value);
+        }
     }
-    return has_any(expression.expand());
+    return result;
 }
 
 System build_system(const Scene& scene) {
     System system;
     system.n = static_cast<int>(scene.coordinates.size());
+    system.t = scene.time;
     for (const Coordinate& coordinate : scene.coordinates) {
         system.q.push_back(coordinate.position);
         system.v.push_back(coordinate.velocity);
+        system.outer_force.push_back(coordinate.force);
     }
     for (const Parameter& parameter : scene.parameters) system.parameters.push_back(parameter.symbol);
     system.lagrangian = scene.lagrangian;
+    Symbols all = system.q;
+    all.insert(all.end(), system.v.begin(), system.v.end());
+    all.push_back(system.t);
+    system.terms = terms_of(system.lagrangian, all);
+    system.momentum = gradient_of(system.terms, system.v);
+    system.force = gradient_of(system.terms, system.q);
+    for (std::size_t k = 0; k < system.force.size(); ++k) system.force[k] += system.outer_force[k];
 
-    const unsigned n = static_cast<unsigned>(system.n);
+    // Derivatives and first-order quantities together, each with what it depends on.
+    const std::array<SparseMatrix, 4> derived = {
+        derivative_of(system.momentum, system.v), derivative_of(system.momentum, system.q),
+        derivative_of(system.force, system.v), derivative_of(system.force, system.q)};
+    const std::array<SparseMatrix*, 4> kept = {&system.momentum_v, &system.momentum_q, &system.force_v,
+                                               &system.force_q};
+    std::vector<ex> looked_at = system.momentum;
+    looked_at.insert(looked_at.end(), system.force.begin(), system.force.end());
+    const std::size_t first_order = looked_at.size();
+    for (const SparseMatrix& matrix : derived)
+        for (const auto& [place, value] : matrix.entries()) looked_at.push_back(value);
+    const std::vector<Dependence::Kind> kinds = Dependence(scene, system).of(looked_at);
+
+    // A value that does not depend on what its formula mentions is written without it.
+    GiNaC::exmap origin;
+    for (const auto& symbol : all) origin[symbol] = 0;
+    const auto constant_form = [&](const ex& value) -> ex {
+        if (Occurrences(all).in(value).empty()) return value;
+        try {
+            return value.subs(origin, GiNaC::subs_options::no_pattern);
+        } catch (const std::exception&) {  // a pole at the origin: one away from it
+            GiNaC::exmap elsewhere;
+            for (const auto& symbol : all) elsewhere[symbol] = GiNaC::numeric(1, 2);
+            return value.subs(elsewhere, GiNaC::subs_options::no_pattern);
+        }
+    };
+    const auto coordinate_of = [&](std::size_t k) { return system.q[k].get_name(); };
+    system.linear = true;
+    system.separable = true;
+    const auto reason = [&](const std::string& why) {
+        if (system.separable) system.not_separable = why;
+        system.separable = false;
+    };
+    std::size_t next = first_order;
+    for (std::size_t block = 0; block < derived.size(); ++block) {
+        *kept[block] = SparseMatrix(system.n, system.n);
+        for (const auto& [place, value] : derived[block].entries()) {
+            const Dependence::Kind& kind = kinds[next++];
+            if (kind.zero) continue;
+            const bool constant = !kind.on_q && !kind.on_v && !kind.on_t;
+            const ex kept_value = constant ? constant_form(value) : value;
+            kept[block]->put(place.first, place.second, kept_value);
+            system.linear = system.linear && constant;
+            const std::string of = (block < 2 ? "p_" : "f_") + coordinate_of(static_cast<std::size_t>(place.first));
+            const GiNaC::symbol& by =
+                (block == 0 || block == 2 ? system.v : system.q)[static_cast<std::size_t>(place.second)];
+            const auto text = [&] { return slope_text(of, by, kept_value); };
+            if (block == 0 && !constant && system.separable)
+                reason(text() + (kind.on_v   ? " depends on the velocity"
+                                 : kind.on_q ? " depends on the position"
+                                             : " depends on the time"));
+            if (block == 1 && system.separable) reason(text() + ": the momentum depends on the position");
+            if (block == 2 && system.separable) reason(text() + ": the force depends on the velocity");
+        }
+    }
+    for (std::size_t i = 0; i < first_order; ++i) {
+        ex& value = i < system.momentum.size() ? system.momentum[i] : system.force[i - system.momentum.size()];
+        if (kinds[i].zero) value = 0;
+        if (kinds[i].on_t) system.autonomous = false;
+    }
+    check_mass(scene, system);
+
     GiNaC::exmap at_rest;
     for (const auto& velocity : system.v) at_rest[velocity] = 0;
-    system.mass = GiNaC::matrix(n, n);
-    for (unsigned i = 0; i < n; ++i) {
-        const ex momentum = scene.lagrangian.diff(system.v[i]);
-        const ex at_zero = momentum.subs(at_rest).expand();
-        const std::string velocity = system.v[i].get_name();
-        if (!at_zero.is_zero())
-            refuse(scene, "has the term (" + canonical_text(at_zero) + ")*" + velocity +
-                              ", linear in a velocity (magnetic or gyroscopic)" + treated);
-        for (unsigned j = 0; j <= i; ++j) {
-            const ex entry = momentum.diff(system.v[j]).expand();
-            const std::string second =
-                "d2L/d" + velocity + "d" + system.v[j].get_name() + " = " + canonical_text(entry);
-            if (depends_on(entry, system.v)) refuse(scene, "is not quadratic in the velocities: " + second + treated);
-            if (depends_on(entry, system.q))
-                refuse(scene, "has a mass matrix that depends on the position: " + second + treated);
-            system.mass(i, j) = entry;
-            system.mass(j, i) = entry;
-        }
+    // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
+    if (system.separable) {
+        std::vector<ex> at_zero;
+        for (const ex& momentum : system.momentum)
+            at_zero.push_back(momentum.subs(at_rest, GiNaC::subs_options::no_pattern));
+        const std::vector<Dependence::Kind> rest = Dependence(scene, system).of(at_zero);
+        for (std::size_t k = 0; k < rest.size(); ++k)
+            if (!rest[k].zero && system.separable)
+                reason("p_" + coordinate_of(k) + " = " + canonical_text(at_zero[k]) + " at rest");
     }
-    if (system.mass.determinant().normal().is_zero())
-        refuse(scene,
-               "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities do not "
-               "follow from momenta. No kinetic energy "
-               "opposes the direction " +
-                   free_direction(system) + "; add the missing mass, or remove a coordinate");
-
-    system.potential = -scene.lagrangian.subs(at_rest);
-    system.hessian = GiNaC::matrix(n, n);
-    for (unsigned i = 0; i < n; ++i) {
-        system.gradient.push_back(system.potential.diff(system.q[i]));
-        for (unsigned j = 0; j <= i; ++j) {
-            const ex entry = system.gradient[i].diff(system.q[j]);
-            system.hessian(i, j) = vanishes(entry) ? ex(0) : entry;  // kept as derived: expanding may lose a short form
-            system.hessian(j, i) = system.hessian(i, j);
-        }
-    }
+    if (!system.separable) return system;
+    system.mass = system.momentum_v;
+    system.potential = -system.lagrangian.subs(at_rest, GiNaC::subs_options::no_pattern);
+    system.hessian = SparseMatrix(system.n, system.n);
+    for (const ex& force : system.force) system.gradient.push_back(-force);
+    for (const auto& [place, value] : system.force_q.entries()) system.hessian.put(place.first, place.second, -value);
     return system;
 }
 

@@ -1,33 +1,54 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The mechanical system of a scene: L = 1/2 q'^T M q' - V(q), taken apart symbolically.
+// The mechanical system of a scene: L(q, q', t) and forces, their first and second derivatives, and of what kind they
+// are.
 #pragma once
 
 #include <ginac/ginac.h>
 
+#include <string>
 #include <vector>
 
 #include "generator/scene.hpp"
+#include "generator/sparse.hpp"
 
 namespace lobatto {
 
 struct System {
     int n = 0;                              // coordinates
     std::vector<GiNaC::symbol> q, v;        // n each: positions, velocities
+    GiNaC::symbol t;                        // time
     std::vector<GiNaC::symbol> parameters;  // run-time parameters, scene order
-    GiNaC::ex lagrangian;                   // L(q, v)
-    GiNaC::matrix mass;                     // n x n, symmetric: M = d2L/dv dv, free of q and v
-    GiNaC::ex potential;                    // V(q) = -L(q, 0), constant terms kept
-    std::vector<GiNaC::ex> gradient;        // n: dV/dq_k
-    GiNaC::matrix hessian;                  // n x n: d2V/dq_k dq_l
+    GiNaC::ex lagrangian;                   // L(q, v, t)
+    std::vector<GiNaC::ex> terms;           // L is their sum; a sum of n bodies is n terms
+
+    std::vector<GiNaC::ex> outer_force;  // n: F_k(q, v, t) of the scene
+    std::vector<GiNaC::ex> momentum;     // n: p = dL/dv
+    std::vector<GiNaC::ex> force;        // n: f = dL/dq + F
+    // n x n each, what vanishes identically left out: dp/dv, dp/dq, df/dv, df/dq.
+    SparseMatrix momentum_v, momentum_q, force_v, force_q;
+
+    bool autonomous = true;  // neither L nor F depends on the time
+    bool linear = false;     // p and f are affine in q and v, with constant coefficients
+    // L = 1/2 v^T M v - V(q, t) with a constant M, and forces F(q, t): only interior nodes are implicit (D11 ... D17).
+    bool separable = false;
+    std::string not_separable;  // why not, a clause: "dp_x/dx' = 1 + x^2 depends on the position"
+
+    // Of separable systems only.
+    SparseMatrix mass;                // n x n, symmetric: M
+    GiNaC::ex potential;              // V = -L(q, 0, t), constant terms kept
+    std::vector<GiNaC::ex> gradient;  // n: dV/dq_k - F_k
+    SparseMatrix hessian;             // n x n: its derivative in q
 };
 
-// Whether an expression is identically zero, or depends on one of the symbols once simplified. A polynomial that does
-// not is told at a rational point; only what vanishes there, or is no polynomial, is expanded.
-bool vanishes(const GiNaC::ex& expression);
-bool depends_on(const GiNaC::ex& expression, const std::vector<GiNaC::symbol>& symbols);
-
-// Throws InputError when L is outside the class treated (mass matrix that depends on q, terms linear or of higher
-// degree in the velocity) or degenerate (M singular), naming the offending term or direction.
+// Throws InputError when L is degenerate (its second derivatives in the velocities are singular everywhere, or at the
+// start) or the start is a singularity of L, naming the direction or the reason.
 System build_system(const Scene& scene);
+
+// The gradient of a sum of terms in some variables, and the derivative of vectors, found term by term: each term is
+// differentiated only by the variables it holds.
+std::vector<GiNaC::ex> gradient_of(const std::vector<GiNaC::ex>& terms, const std::vector<GiNaC::symbol>& variables);
+SparseMatrix derivative_of(const std::vector<GiNaC::ex>& vector, const std::vector<GiNaC::symbol>& variables);
+// An expression as the terms of its sum; factors free of the given symbols are distributed over inner sums.
+std::vector<GiNaC::ex> terms_of(const GiNaC::ex& expression, const std::vector<GiNaC::symbol>& variables);
 
 }  // namespace lobatto

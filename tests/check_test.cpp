@@ -93,7 +93,9 @@ TEST_CASE("a wrong equation fails the checks that rederive it") {
     const Derivation right = derive(test::coupled_scene(4));
     const auto failed_after = [&](const auto& spoil) {
         Derivation wrong = right;
-        spoil(wrong.discretisation);
+        Discretisation equations = right.discretisation();
+        spoil(equations);
+        wrong.put(equations);
         return failures(check_equations(wrong));
     };
     CHECK(failed_after([](Discretisation& d) { d.interior[1][0] *= 2; }) ==

@@ -21,7 +21,7 @@ struct Paper {
     explicit Paper(const std::string& potential)
         : derivation(
               derive(test::scene_of("m*q'^2/2 - " + potential, "q = { position = 1, velocity = 0 }", 4, "m = 2"))),
-          d(derivation.discretisation),
+          d(derivation.discretisation()),
           h(d.h),
           m(derivation.system.parameters[0]),
           ql(d.Q[0][0]),
@@ -67,7 +67,7 @@ TEST_CASE("the discrete dynamics are the paper's eq:discreteDynamics") {
 
 TEST_CASE("with two points the step is Stoermer and Verlet's: no unknowns, q1 = q0 + h v") {
     const Derivation derivation = derive(test::pendulum_scene(2));
-    const Discretisation& d = derivation.discretisation;
+    const Discretisation& d = derivation.discretisation();
     CHECK(d.interior.empty());
     CHECK(d.reduced_system.empty());
     CHECK(equal(d.arrival_position[0], d.Q[0][0] + d.h * d.drift_velocity[0]));
@@ -75,7 +75,7 @@ TEST_CASE("with two points the step is Stoermer and Verlet's: no unknowns, q1 = 
 
 TEST_CASE("the Jacobian of several coupled coordinates is the derivative of the system") {
     const Derivation derivation = derive(test::coupled_scene(3));
-    const Discretisation& d = derivation.discretisation;
+    const Discretisation& d = derivation.discretisation();
     REQUIRE(d.full_unknowns.size() == 6);
     for (unsigned i = 0; i < 6; ++i)
         for (unsigned j = 0; j < 6; ++j) CHECK(equal(d.full_jacobian(i, j), d.full_system[i].diff(d.full_unknowns[j])));

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A matrix of formulas of which most are zero.
+#pragma once
+
+#include <ginac/ginac.h>
+
+#include <map>
+#include <utility>
+
+namespace lobatto {
+
+class SparseMatrix {
+public:
+    SparseMatrix() = default;
+    SparseMatrix(int rows, int columns) : rows_(rows), columns_(columns) {}
+
+    int rows() const { return rows_; }
+    int columns() const { return columns_; }
+    // Zero where nothing was put.
+    GiNaC::ex operator()(std::size_t row, std::size_t column) const {
+        const auto entry = entries_.find({static_cast<int>(row), static_cast<int>(column)});
+        return entry == entries_.end() ? GiNaC::ex(0) : entry->second;
+    }
+    void put(int row, int column, const GiNaC::ex& value) { entries_[{row, column}] = value; }
+    // Row by row; none is identically zero.
+    const std::map<std::pair<int, int>, GiNaC::ex>& entries() const { return entries_; }
+    GiNaC::matrix dense() const {
+        GiNaC::matrix result(static_cast<unsigned>(rows_), static_cast<unsigned>(columns_));
+        for (const auto& [place, value] : entries_)
+            result(static_cast<unsigned>(place.first), static_cast<unsigned>(place.second)) = value;
+        return result;
+    }
+
+private:
+    int rows_ = 0, columns_ = 0;
+    std::map<std::pair<int, int>, GiNaC::ex> entries_;
+};
+
+}  // namespace lobatto
