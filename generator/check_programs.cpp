@@ -13,7 +13,6 @@ namespace lobatto {
 
 namespace {
 
-using Numbers = std::vector<cln::cl_R>;
 using GiNaC::ex;
 
 // Runs programs over a store of named values: inputs are read from it by their C++ text, outputs written to it.
@@ -67,34 +66,6 @@ private:
     const Programs& programs_;
     std::map<std::string, cln::cl_R> store_;
 };
-
-// x with A x = y, A row by row: Gaussian elimination, the largest pivot of each column.
-Numbers solve(Numbers A, Numbers y) {
-    const std::size_t n = y.size();
-    for (std::size_t k = 0; k < n; ++k) {
-        std::size_t pivot = k;
-        for (std::size_t i = k + 1; i < n; ++i)
-            if (cln::abs(A[i * n + k]) > cln::abs(A[pivot * n + k])) pivot = i;
-        for (std::size_t j = 0; j < n; ++j) std::swap(A[k * n + j], A[pivot * n + j]);
-        std::swap(y[k], y[pivot]);
-        if (cln::zerop(A[k * n + k])) throw DomainError("a singular matrix");
-        for (std::size_t i = 0; i < n; ++i) {
-            if (i == k) continue;
-            const cln::cl_R factor = A[i * n + k] / A[k * n + k];
-            for (std::size_t j = k; j < n; ++j) A[i * n + j] = A[i * n + j] - factor * A[k * n + j];
-            y[i] = y[i] - factor * y[k];
-        }
-    }
-    for (std::size_t k = 0; k < n; ++k) y[k] = y[k] / A[k * n + k];
-    return y;
-}
-
-Numbers times(const Numbers& A, const Numbers& x) {  // A row by row
-    Numbers product(A.size() / x.size(), cln::cl_R(0));
-    for (std::size_t i = 0; i < product.size(); ++i)
-        for (std::size_t j = 0; j < x.size(); ++j) product[i] = product[i] + A[i * x.size() + j] * x[j];
-    return product;
-}
 
 // What is compared at one point: expected and computed numbers by claim.
 class Comparison {
