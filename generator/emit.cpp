@@ -168,8 +168,9 @@ private:
         const int N = d_.structure.linear ? 0 : n_ * (s_ - 2);
         std::string text = fmt::format("    using real = {};\n\n", type_name(options_.precision));
         text += fmt::format(
-            "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n",
-            name, digest);
+            "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n"
+            "    static constexpr const char* method = \"Lobatto, {} points\";\n",
+            name, digest, s_);
         const auto line = [&text](const std::string& declaration, const std::string& comment) {
             text += fmt::format("    {:<42}  // {}\n", "static constexpr " + declaration + ";", comment);
         };
@@ -178,7 +179,14 @@ private:
         line(fmt::format("int points = {}", s_), "s, nodes of a step, both ends included");
         line(fmt::format("int order = {}", d_.quadrature.order()), "of accuracy in h");
         line(fmt::format("int unknowns = {}", N), "N = n (s - 2) of the stage equations; 0: none to solve");
-        line(fmt::format("bool linear = {}", d_.structure.linear), "the step is an affine map");
+        line(fmt::format("Form form = Form::{}", d_.structure.linear ? "linear_map" : "separable"),
+             d_.structure.linear ? "the step is an affine map" : "only interior nodes are implicit");
+        line("bool autonomous = true", "no formula depends on time");
+        line(fmt::format("bool linear = {}", d_.structure.linear), "the second derivatives are constant");
+        line("bool has_energy = true", "energy() is compiled");
+        line("bool has_tangent = true", "tangent maps are compiled");
+        if (!d_.structure.linear) line("bool unrolled = true", "the stage functions are written out below");
+        line("int events = 0", "event functions");
         line(fmt::format("int parameter_count = {}", d_.scene.parameters.size()), "in the order of the scene");
         line(fmt::format("int entries = {}", entries.size()), "of M^-1 V'' that are not identically zero");
         std::string rows, columns;
@@ -370,8 +378,11 @@ private:
 // A struct cannot have the name of one of its members.
 std::string struct_name(const std::string& scene) {
     static const std::set<std::string> members = {
-        "name",    "digest",    "coordinates",  "points", "order", "unknowns", "linear",    "parameter_count",
-        "entries", "entry_row", "entry_column", "c",      "b",     "A",        "parameter", "prepare"};
+        "method",   "form",      "autonomous",   "has_energy", "has_tangent",
+        "unrolled", "events",    "name",         "digest",     "coordinates",
+        "points",   "order",     "unknowns",     "linear",     "parameter_count",
+        "entries",  "entry_row", "entry_column", "c",          "b",
+        "A",        "parameter", "prepare"};
     const auto& functions = declarations();
     const bool is_function =
         std::any_of(functions.begin(), functions.end(), [&](const Declaration& d) { return d.program == scene; });
