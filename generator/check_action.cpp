@@ -151,7 +151,7 @@ private:
     }
     const cln::cl_R& B(std::size_t i, std::size_t j) const { return B_[i * control_.size() + j]; }
     const cln::cl_R& D(std::size_t i, std::size_t j) const { return D_[i * control_.size() + j]; }
-    // (D26)
+    // (D28)
     void set_node(std::size_t i, const Path& X, const Symbols& q, const Symbols& v) {
         formulas_.set(system_.t, t0_ + nodes_[i] * h_);
         for (std::size_t k = 0; k < q.size(); ++k) {
@@ -173,7 +173,7 @@ private:
         }
         return sum;
     }
-    // (D27) of all coordinates, controls x n: sum_i h b_i (D_ij/h p + B_ij f); with `outer` F alone in place of f, and
+    // (D30) of all coordinates, controls x n: sum_i h b_i (D_ij/h p + B_ij f); with `outer` F alone in place of f, and
     // no p: the virtual work.
     Path slopes(const Path& X, bool outer = false) {
         Path sums(X.size(), Numbers(n_, cln::cl_R(0)));
@@ -224,7 +224,7 @@ private:
 
     // The reduced system's residual against the whole system's: with P_i = P0 + kappa pi(c_i) and kappa as the
     // condition wants it, the cyclic coordinates move on polynomials, their slopes are those of constant momenta, and
-    // the active slopes are the same (D29, D30). And its Jacobian (D28) along a direction.
+    // the active slopes are the same (D29). And its Jacobian (D30) along a direction.
     void routhian() {
         const Routhian& routhian = derivation_.structure.routhian;
         const std::size_t active = routhian.active.size(), cyclic = routhian.cyclic.size(), controls = control_.size(),
@@ -335,7 +335,7 @@ private:
                 jacobian_times(X, kappa, parts_of(d), at_node), quotient);
     }
 
-    // (D28) sum_i h b_i T_i^T H_i T_i d with T_i d = (D d/h, B d, kappa pi).
+    // (D30) sum_i h b_i T_i^T H_i T_i d with T_i d = (D d/h, B d, kappa pi).
     template <class AtNode>
     Numbers jacobian_times(const Path& X, const Numbers& kappa, const std::pair<Path, Numbers>& direction,
                            const AtNode& at_node) {

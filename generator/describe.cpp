@@ -201,20 +201,20 @@ private:
         vector("nodes", "D22", "eq:lobattoQuad", "nodes", numbered("c", r), q.nodes);
         vector("weights", "D22", "eq:lobattoQuad", "weights", numbered("b", r), q.weights);
         if (!lobatto_)
-            vector("control_points", "D26", "", "control points: their positions determine the path in a step",
+            vector("control_points", "D28", "", "control points: their positions determine the path in a step",
                    numbered("x", controls_), q.control);
         vector("basis", "D22", "eq:basisFunctions",
                std::string("basis: the polynomials that are 1 at their ") + (lobatto_ ? "node" : "control point") +
                    ", 0 at the others",
                numbered("l", controls_), q.basis);
         if (!lobatto_)
-            matrix("interpolation", "D26", "", "interpolation matrix: basis polynomial j at node i", "B", q.B);
+            matrix("interpolation", "D28", "", "interpolation matrix: basis polynomial j at node i", "B", q.B);
         matrix("differentiation", "D22", "", "differentiation matrix: derivative of basis polynomial j at node i", "D",
                q.D);
         if (general_) return;
         matrix("rigidity", "D4", "eq:rigidityKE", "rigidity: the integrals of products of derivatives", "K", q.K);
         if (s_ > 2)
-            matrix("stage_map", lobatto_ ? "D19" : "D31", "",
+            matrix("stage_map", lobatto_ ? "D19" : "D32", "",
                    lobatto_ ? "stage map over the interior nodes" : "stage map over the nodes", "A", q.A);
     }
 
@@ -273,7 +273,7 @@ private:
         second_derivatives("force_by_position", "df/dq", "f_q", system.force_q);
         ex energy = -system.lagrangian;
         for (std::size_t k = 0; k < n_; ++k) energy += system.momentum[k] * system.v[k];
-        scalar("energy", "D25", "", "energy, p.q' - L", "H", energy);
+        scalar("energy", "D26", "", "energy, p.q' - L", "H", energy);
     }
     void second_derivatives(const std::string& id, const std::string& what, const std::string& left,
                             const SparseMatrix& value) {
@@ -306,7 +306,7 @@ private:
                named("R_q", routhian.active), part(active, active, 1));
     }
 
-    // (D27, D28, D30) in blocks: one entry for all coordinates together.
+    // (D30) in blocks: one entry for all coordinates together.
     void general_step() {
         const Quadrature& q = d_.quadrature;
         const std::size_t r = q.nodes.size(), unknowns = controls_ - 1;
@@ -358,15 +358,15 @@ private:
             residual.push_back(condition);
             names.push_back("R_kappa");
         }
-        vector("step_equations", "D27", "",
+        vector("step_equations", "D30", "",
                "R = 0: g_v and g_q are momentum and force at the nodes" +
                    std::string(multiplier ? ", g_P the negative velocity of the cyclic coordinates" : ""),
                names, residual);
-        matrix("step_jacobian", "D28", "",
+        matrix("step_jacobian", "D30", "",
                "its Jacobian: H are the second derivatives at the nodes; columns: positions 2 to " +
                    std::to_string(controls_) + (multiplier ? ", kappa" : ""),
                "J", J);
-        vector("arrival_momentum", "D27", "", "arrival, explicit: the momentum after the step", {"p_1"},
+        vector("arrival_momentum", "D30", "", "arrival, explicit: the momentum after the step", {"p_1"},
                {slope(controls_ - 1)});
     }
     GiNaC::symbol momentum_symbol(std::size_t k) {
@@ -399,7 +399,7 @@ private:
                Names(n_, "0"), disc.border);
     }
 
-    // (D26, D27) in positions and velocities at the nodes, which have names of their own: written out in the control
+    // (D28, D30) in positions and velocities at the nodes, which have names of their own: written out in the control
     // points alone they would be too long to read.
     void general_equations() {
         const Discretisation& disc = d_.discretisation();
@@ -431,14 +431,14 @@ private:
                 positions.push_back(value);
             }
         }
-        if (!lobatto_) vector("node_positions", "D26", "", "positions at the nodes", position_names, positions);
-        vector("node_velocities", "D26", "", "velocities at the nodes", velocity_names, velocities);
+        if (!lobatto_) vector("node_positions", "D28", "", "positions at the nodes", position_names, positions);
+        vector("node_velocities", "D28", "", "velocities at the nodes", velocity_names, velocities);
         const auto moved = [&](const ex& expression, std::size_t i) {
             return expression.subs(at_node[i], GiNaC::subs_options::no_pattern);
         };
         ex action = 0;
         for (std::size_t i = 0; i < r; ++i) action += h * q.weights[i] * moved(d_.system.lagrangian, i);
-        scalar("discrete_lagrangian", "D27", "", "discrete Lagrangian: the quadrature of L along the interpolated path",
+        scalar("discrete_lagrangian", "D30", "", "discrete Lagrangian: the quadrature of L along the interpolated path",
                "L_d", action);
         const auto slopes = [&](std::size_t j, int sign) {
             std::vector<ex> values;
@@ -457,7 +457,7 @@ private:
             interior.insert(interior.end(), more.begin(), more.end());
         }
         if (!interior.empty())
-            vector("interior_equations", "D27", "", "interior discrete Euler-Lagrange equations",
+            vector("interior_equations", "D30", "", "interior discrete Euler-Lagrange equations",
                    Names(interior.size(), "0"), interior);
         vector("left_momentum", "D6", "", "momentum at the left end", names_of(disc.p0), slopes(0, -1));
         vector("right_momentum", "D7", "", "momentum at the right end", names_of(disc.p1), slopes(controls_ - 1, 1));

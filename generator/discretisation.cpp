@@ -71,7 +71,7 @@ private:
     }
 
     // One node's quantities: expressions in q, v and t, moved to quadrature node i of the path through the positions
-    // Q; the step begins at time `begin` (D26).
+    // Q; the step begins at time `begin` (D28).
     GiNaC::exmap node(std::size_t i, const std::vector<Symbols>& Q, const ex& begin) const {
         GiNaC::exmap move{{system_.t, begin + quadrature_.nodes[i] * d_.h}};
         for (std::size_t k = 0; k < n_; ++k) {
@@ -89,7 +89,7 @@ private:
         return expression.subs(move, GiNaC::subs_options::no_pattern);
     }
 
-    // L_d = h sum_i b_i L(q_i, v_i, t_i), and its slopes sum_i h b_i (D_ij/h p(i) + B_ij f(i)) (D27).
+    // L_d = h sum_i b_i L(q_i, v_i, t_i), and its slopes sum_i h b_i (D_ij/h p(i) + B_ij f(i)) (D30).
     void general_action() {
         const ex h = d_.h;
         d_.L_d = 0;

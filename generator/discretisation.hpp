@@ -21,7 +21,7 @@ struct Discretisation {
     std::vector<GiNaC::symbol> p0, p1;          // n each: momenta at the ends
 
     GiNaC::ex L_d;  // discrete Lagrangian L_d(Q_0 ... Q_{m-1})      (paper: eq:discreteLagrangianNL)
-    // Its slopes, with the virtual work of outer forces (D27).
+    // Its slopes, with the virtual work of outer forces (D30).
     std::vector<std::vector<GiNaC::ex>>
         interior;                           // (m-2) x n: dL_d/dQ_j = 0                      (paper: eq:ELinternalNL)
     std::vector<GiNaC::ex> left_momentum;   // n: p0 = -dL_d/dQ_0
