@@ -195,6 +195,7 @@ private:
     void read_initial_values() {
         for (std::size_t k = 0; k < initial_.size(); ++k) {
             const std::string& name = scene_.coordinates[k].name;
+            scene_.coordinates[k].rate_at = initial_[k].rate->value.at;
             const std::string rate = scene_.start == Start::velocity ? "velocity" : "momentum";
             scene_.initial_position.push_back(
                 read_formula(*initial_[k].position, of_parameters("the initial position of " + name)));

@@ -17,6 +17,7 @@ struct Coordinate {
     GiNaC::symbol position;  // prints as name
     GiNaC::symbol velocity;  // prints as name'
     GiNaC::ex force = 0;  // generalised force beside the Lagrangian's own, in positions, velocities, time, parameters
+    Position rate_at = {};  // where its initial velocity or momentum stands
 };
 
 struct Parameter {
