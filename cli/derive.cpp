@@ -5,6 +5,7 @@
 
 #include "cli/commands.hpp"
 
+#include "cli/method_option.hpp"
 #include "generator/describe.hpp"
 #include "generator/pipeline.hpp"
 
@@ -14,14 +15,14 @@ namespace {
 
 struct DeriveCommand {
     std::string scene;
-    std::optional<int> points;  // instead of the scene's
+    MethodOption method;
     bool latex = false;
     bool json = false;
 };
 
 void derive_scene(const DeriveCommand& options) {
     Scene scene = read_scene(options.scene);
-    if (options.points) scene.method.points = *options.points;
+    options.method.apply(scene);
     const Description description = describe(derive(scene));
     std::cout << (options.latex ? latex_of(description) : options.json ? json_of(description) : text_of(description));
 }
@@ -33,8 +34,7 @@ void add_derive(CLI::App& program) {
     CLI::App* command =
         program.add_subcommand("derive", "Show how the integrator of a scene follows from its Lagrangian");
     command->add_option("scene", options->scene, "the scene file")->required();
-    command->add_option("--points", options->points, "Lobatto points, 2 to 5, instead of the scene's")
-        ->check(CLI::Range(2, 5));
+    options->method.add_to(*command);
     CLI::Option* latex = command->add_flag("--latex", options->latex, "a complete LaTeX document");
     command->add_flag("--json", options->json, "for machines (described in docs/derivation.md)")->excludes(latex);
     command->footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");

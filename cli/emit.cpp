@@ -14,6 +14,7 @@
 
 #include "cli/commands.hpp"
 
+#include "cli/method_option.hpp"
 #include "cli/support_text.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/compiler.hpp"
@@ -28,7 +29,7 @@ namespace fs = std::filesystem;
 struct EmitCommand {
     std::string scene;
     std::string folder;
-    std::optional<int> points;  // instead of the scene's
+    MethodOption method;
     Precision precision = Precision::double_;
     bool standalone = false;
     bool no_support = false;
@@ -92,7 +93,7 @@ void print_use(const KernelSource& source, const EmitCommand& options) {
 
 void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
-    if (options.points) scene.method.points = *options.points;
+    options.method.apply(scene);
     const KernelSource source =
         emit(derive(scene), {options.precision, options.standalone ? kernel_hpp_text : std::string()});
 
@@ -126,8 +127,7 @@ void add_emit(CLI::App& program) {
     command->add_option("-o,--output", options->folder, "folder for NAME.hpp and the kernel.hpp that it includes")
         ->required()
         ->type_name("FOLDER");
-    command->add_option("--points", options->points, "Lobatto points, 2 to 5, instead of the scene's")
-        ->check(CLI::Range(2, 5));
+    options->method.add_to(*command);
     const std::map<std::string, Precision> precisions = {{"float", Precision::single},
                                                          {"double", Precision::double_},
                                                          {"long-double", Precision::extended},

@@ -26,7 +26,7 @@ Text text_from(const std::string& argument, std::size_t begin) {
 
 [[noreturn]] void fail_unknown(const Source& source, const Scene& scene, const std::string& name) {
     for (const Parameter& constant : scene.constants) {
-        if (constant.name == name)
+        if (constant.written == name)
             source.fail(
                 {1, 1},
                 fmt::format(
@@ -36,7 +36,7 @@ Text text_from(const std::string& argument, std::size_t begin) {
     if (scene.parameters.empty())
         source.fail({1, 1}, fmt::format("unknown parameter '{}'; {} has no run-time parameters", name, scene.path));
     std::vector<std::string> names;
-    for (const Parameter& parameter : scene.parameters) names.push_back(parameter.name);
+    for (const Parameter& parameter : scene.parameters) names.push_back(parameter.written);
     source.fail({1, 1},
                 fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
 }
@@ -47,11 +47,9 @@ void set_parameter(const std::string& argument, Scene& scene) {
     if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
     const std::string name = argument.substr(0, equals);
     const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
-                                        [&](const Parameter& p) { return p.name == name; });
+                                        [&](const Parameter& p) { return p.written == name; });
     if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
-    Scope scope;
-    scope.formula = fmt::format("the value of {}", name);
-    scope.velocities_allowed = scope.positions_allowed = false;
+    const Scope scope{nullptr, fmt::format("the value of {}", name), false, {}};
     const Text text = text_from(argument, equals + 1);
     parameter->value = parse_expression(source, text, scope);
     value_in_range(source, text.at.front(), parameter->value, scope.formula);
@@ -59,16 +57,10 @@ void set_parameter(const std::string& argument, Scene& scene) {
 
 GiNaC::ex in_parameters(const std::string& option, const std::string& argument, const std::string& what,
                         const Scene& scene) {
-    Scope scope;
-    scope.formula = what;
-    scope.velocities_allowed = scope.positions_allowed = false;
+    Names names = parameter_names(scene);
+    const Scope scope{&names, what, false, {}};
     GiNaC::exmap values;
-    for (const Parameter& parameter : scene.parameters) {
-        scope.names[parameter.name] = {parameter.symbol, Name::Role::parameter};
-        values[parameter.symbol] = parameter.value;
-    }
-    for (const Parameter& constant : scene.constants)
-        scope.names[constant.name] = {constant.value, Name::Role::parameter};
+    for (const Parameter& parameter : scene.parameters) values[parameter.symbol] = parameter.value;
     const Source source(option, argument);
     const GiNaC::ex expression = parse_expression(source, text_from(argument, 0), scope);
     value_in_range(source, {1, 1}, expression, what, values);

@@ -10,6 +10,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/kernel_of.hpp"
+#include "cli/method_option.hpp"
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
 #include "cli/watch.hpp"
@@ -27,7 +28,7 @@ constexpr int interrupted_exit = 130;  // as shells count an interruption
 struct RunOptions {
     std::string scene;
     std::string output;  // empty: out/NAME.csv
-    std::optional<int> points;
+    MethodOption method;
     Overrides overrides;
     bool quiet = false;
 };
@@ -121,7 +122,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
     TrajectoryHeader header;
     header.scene = scene.title.empty() ? scene.name : scene.title;
-    header.method = fmt::format("Lobatto, {} points, h = {}", scene.method.points, exact_text(request.step));
+    header.method = fmt::format("{}, h = {}", scene.method.name(), exact_text(request.step));
     header.kernel = source.digest;
     for (std::size_t i = 0; i < scene.parameters.size(); ++i)
         header.parameters.emplace_back(scene.parameters[i].name, request.parameters[i]);
@@ -192,7 +193,7 @@ std::string output_path(const RunOptions& options, const Scene& scene) {
 void run(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
-    if (options.points) scene.method.points = *options.points;
+    options.method.apply(scene);
     const Derivation derivation = derive(scene);
     const KernelSource source = emit(derivation);
     const double derivation_seconds = seconds_since(start);
@@ -252,8 +253,7 @@ void add_run(CLI::App& program) {
     const auto options = std::make_shared<RunOptions>();
     command->add_option("scene", options->scene, "Scene file")->required();
     command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
-    command->add_option("--points", options->points, "Points of the Lobatto quadrature; the order is 2 points - 2")
-        ->check(CLI::Range(2, 5));
+    options->method.add_to(*command);
     command->add_option("--step", options->overrides.step,
                         "Step h; may use the scene's parameters, as in 2*pi/omega/50");
     command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");

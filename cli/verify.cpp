@@ -6,6 +6,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/kernel_of.hpp"
+#include "cli/method_option.hpp"
 #include "generator/check.hpp"
 #include "runtime/convergence.hpp"
 #include "runtime/diagnostics.hpp"
@@ -20,7 +21,7 @@ namespace {
 
 struct VerifyOptions {
     std::string scene;
-    std::optional<int> points;
+    MethodOption method;
 };
 
 struct Row {
@@ -213,7 +214,7 @@ void print(const std::vector<Row>& rows, const Convergence& convergence) {
 
 void verify(const VerifyOptions& options) {
     Scene scene = read_scene(options.scene);
-    if (options.points) scene.method.points = *options.points;
+    options.method.apply(scene);
     const Start60 exact_start(scene);
     const Derivation derivation = derive(scene);
     Programs programs = build_programs(derivation);
@@ -223,7 +224,7 @@ void verify(const VerifyOptions& options) {
     const Kernel exact_kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
     optimise(programs);
 
-    fmt::print("{}: {} (Lobatto, {} points)\n", options.scene, scene.title, scene.method.points);
+    fmt::print("{}: {} ({})\n", options.scene, scene.title, scene.method.name());
     std::vector<Row> rows;
     for (const auto& checks :
          {check_quadrature(derivation.quadrature), check_equations(derivation), check_programs(derivation, programs)})
@@ -263,8 +264,7 @@ void add_verify(CLI::App& program) {
         "verify", "Check a scene's equations, its emitted code and the promises of its integrator");
     const auto options = std::make_shared<VerifyOptions>();
     command->add_option("scene", options->scene, "Scene file")->required();
-    command->add_option("--points", options->points, "Points of the Lobatto quadrature; the order is 2 points - 2")
-        ->check(CLI::Range(2, 5));
+    options->method.add_to(*command);
     command->footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
     command->callback([options] { verify(*options); });
 }

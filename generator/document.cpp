@@ -126,6 +126,10 @@ Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
             value.kind = Value::Kind::boolean;
             value.boolean = **node.as_boolean();
             break;
+        case toml::node_type::array:
+            value.kind = Value::Kind::list;
+            for (const toml::node& item : *node.as_array()) value.items.push_back(convert(source, cursor, item));
+            break;
         default:  // the guard leaves only tables
             assert(node.is_table());
             value.entries = convert_entries(source, cursor, *node.as_table());
@@ -155,6 +159,8 @@ std::string Value::kind_name() const {
             return "a number";
         case Kind::boolean:
             return "true or false";
+        case Kind::list:
+            return "a list";
         case Kind::table:
             break;
     }

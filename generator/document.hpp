@@ -12,12 +12,13 @@ namespace lobatto {
 struct Entry;
 
 struct Value {
-    enum class Kind { text, integer, real, boolean, table };
+    enum class Kind { text, integer, real, boolean, list, table };
     Kind kind = Kind::table;
     Position at;  // of its first character; of a [table]: its bracket
     Text text;    // text: the value; integer, real: the digits as a formula, positions kept
     long long integer = 0;
     bool boolean = false;
+    std::vector<Value> items;    // list: texts and numbers
     std::vector<Entry> entries;  // table: in the order of the file
 
     std::string kind_name() const;  // "a table"

@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Recursive descent over the tokens of a formula. Beside every constant subexpression goes its value at 60 digits, so
-// that what has no finite real value is refused where it stands; sizes are estimated before anything is computed.
-//     sum     = product { (+ | -) product }
-//     product = signed { (* | /) signed }
-//     signed  = { + | - } power
-//     power   = primary [ ^ signed ]
-//     primary = number | name | function ( sum ) | ( sum )
+// Walks the tree of a formula, with a value for each index; what cannot be computed is refused where it stands.
 #include "generator/expression.hpp"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <functional>
-#include <optional>
-
-#include "generator/real.hpp"
-#include "generator/suggest.hpp"
-#include "generator/token.hpp"
+#include <utility>
 
 namespace lobatto {
 namespace {
@@ -25,332 +13,266 @@ using GiNaC::ex;
 using GiNaC::ex_to;
 using GiNaC::is_a;
 using GiNaC::numeric;
+using Kind = Syntax::Kind;
 
-struct Operand {
-    ex expression;
-    std::optional<numeric> value;  // present when the expression is constant
-};
-
-// b bits: 2^(b-1) <= max(|numerator|, denominator) < 2^b.
-int bits(const numeric& number) {
-    return std::max(abs(number.numer()).int_length(), number.denom().int_length());
-}
-
-// The largest exact number in an expression, and the largest exponent of anything but a number.
-struct Extent {
-    int number_bits = 0;
-    numeric exponent = 0;
-    bool real = true;
-
-    void visit(const ex& expression) {
-        if (is_a<numeric>(expression)) {
-            real = real && expression.info(GiNaC::info_flags::real);
-            if (real) number_bits = std::max(number_bits, bits(ex_to<numeric>(expression)));
-        }
-        if (is_a<GiNaC::power>(expression) && is_a<numeric>(expression.op(1))) {
-            const numeric n = abs(ex_to<numeric>(expression.op(1)));
-            if (!is_a<numeric>(expression.op(0)) && n.is_integer() && n > exponent) exponent = n;
-        }
-        for (const ex& operand : expression) visit(operand);
-    }
-};
-
-class Parser {
+class Evaluator {
 public:
-    Parser(const Source& source, const Text& text, const Scope& scope, std::map<std::string, bool>* used)
-        : source_(source), scope_(scope), used_(used), tokens_(tokenise(source, text, scope.formula)) {}
+    Evaluator(const Source& source, Work& work, Names* names, bool motion_allowed)
+        : source_(source), work_(work), names_(names), motion_allowed_(motion_allowed) {}
 
-    ex run() {
-        if (token().kind == Token::Kind::end) fail(token(), fmt::format("{} is empty", scope_.formula));
-        const Operand whole = read_sum();
-        if (token().is(')')) fail(token(), "this ) closes nothing: remove it, or add a ( before it");
-        if (token().kind != Token::Kind::end) fail_missing_operator();
-        return whole.expression;
+    // The indices a formula has, by name and value; and how to speak of it.
+    struct Frame {
+        const std::string& formula;
+        std::vector<std::pair<std::string, long>> indices;
+    };
+
+    Operand evaluate(const Syntax& formula, Frame& frame) {
+        const Arithmetic arithmetic(frame.formula, work_);
+        try {
+            work_.spend(1);
+        } catch (const Refusal& refusal) {
+            fail(formula.at, frame, refusal.what());
+        }
+        if (++depth_ > deepest) fail_depth(formula.at, frame);
+        Operand result = value_of(formula, frame, arithmetic);
+        --depth_;
+        return result;
+    }
+
+    // A value that is needed as a whole number: a subscript, a bound.
+    long whole(const Syntax& formula, Frame& frame, const std::string& what) {
+        const ex value = evaluate(formula, frame).expression;
+        if (!is_a<numeric>(value))
+            fail(formula.at, frame,
+                 fmt::format("{} must be known when the kernel is written: numbers, indices and parameters declared "
+                             "constant",
+                             what));
+        const numeric number = ex_to<numeric>(value);
+        if (!number.is_integer())
+            fail(formula.at, frame, fmt::format("{} must be a whole number, not {:.6g}", what, number.to_double()));
+        if (abs(number) > largest) fail(formula.at, frame, fmt::format("{} is beyond {}", what, largest));
+        return number.to_long();
     }
 
 private:
-    const Token& token() const { return tokens_[next_]; }
-    [[noreturn]] void fail(const Token& at, const std::string& message) const { source_.fail(at.at, message); }
+    static constexpr int deepest = 1000;            // nodes in nodes, those of definitions too
+    static constexpr long largest = 1'000'000'000;  // subscript or bound
 
-    [[noreturn]] void fail_missing_operator() const {
-        const std::string_view left = tokens_[next_ - 1].text, right = token().text;
-        fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
+    [[noreturn]] void fail(const Token& at, const Frame& frame, std::string message) const {
+        std::string indices;
+        for (const auto& [name, value] : frame.indices)
+            indices += fmt::format("{}{} = {}", indices.empty() ? "" : ", ", name, value);
+        if (!indices.empty()) message += fmt::format(" ({})", indices);
+        source_.fail(at.at, message);
     }
 
-    // Computes an expression; what GiNaC throws, and what is too large or not real, is an error at the operator.
+    [[noreturn]] void fail_depth(const Token& at, const Frame& frame) const {
+        fail(at, frame,
+             definitions_ > 0
+                 ? fmt::format("definitions need one another without end here, or more than {} deep", deepest)
+                 : fmt::format("{} is nested more than {} deep", frame.formula, deepest));
+    }
+
     template <typename Compute>
-    Operand compute(const Token& at, const std::vector<Operand>& operands, const Compute& expression,
-                    const std::function<numeric(const std::vector<numeric>&)>& value) const {
+    Operand computed(const Token& at, const Frame& frame, const Compute& compute) const {
         try {
-            std::vector<numeric> values;
-            for (const Operand& operand : operands)
-                if (operand.value) values.push_back(*operand.value);
-            Operand result;
-            if (values.size() == operands.size()) result.value = value(values);
-            result.expression = expression();
-            bound(at, result.expression);
-            if (is_a<numeric>(result.expression)) result.value = real_value(ex_to<numeric>(result.expression));
-            return result;
-        } catch (const NoValue& error) {
-            fail(at, fmt::format("{} has no finite real value here: {}", scope_.formula, error.what()));
-        } catch (const InputError&) {
-            throw;
-        } catch (const std::exception&) {  // a pole that only GiNaC sees
-            fail(at, fmt::format("{} has no finite real value here: the result of {} is not finite", scope_.formula,
-                                 at.text));
+            return compute();
+        } catch (const Refusal& refusal) {
+            fail(at, frame, refusal.what());
         }
     }
 
-    void bound(const Token& at, const ex& expression) const {
-        Extent extent;
-        extent.visit(expression);
-        if (!extent.real) fail(at, fmt::format("{} is not a real number here", scope_.formula));
-        if (extent.number_bits > ExpressionLimits::number_bits) fail_number(at);
-        if (extent.exponent > ExpressionLimits::exponent)
-            fail(at, fmt::format("an exponent beyond {}; write the formula with smaller powers",
-                                 ExpressionLimits::exponent));
-    }
-    [[noreturn]] void fail_number(const Token& at) const {
-        fail(at, fmt::format("an exact number of more than {} bits (about {} digits) occurs here",
-                             ExpressionLimits::number_bits, ExpressionLimits::number_bits * 3 / 10));
-    }
+    // Adds or multiplies neighbours in pairs of like length, so that long sums cost n log n and no intermediate number
+    // can grow unseen.
+    class Fold {
+    public:
+        using Combine = Operand (Arithmetic::*)(const Operand&, const Operand&) const;
+        Fold(const Evaluator& evaluator, const Frame& frame, const Arithmetic& arithmetic, Combine combine)
+            : evaluator_(evaluator), frame_(frame), arithmetic_(arithmetic), combine_(combine) {}
 
-    // Combines neighbours in pairs, so that long sums cost n log n and no intermediate number can grow unseen.
-    using Combine = Operand (Parser::*)(const Token& at, const Operand& left, const Operand& right) const;
-    struct Part {
-        Operand operand;
-        Token at;  // the operator before it
+        void push(Operand operand, const Token& at) {
+            parts_.push_back({std::move(operand), at, 0});
+            while (parts_.size() > 1 && parts_[parts_.size() - 2].pairs == parts_.back().pairs) join();
+        }
+        Operand result() {
+            while (parts_.size() > 1) join();
+            return std::move(parts_.front().operand);
+        }
+
+    private:
+        struct Part {
+            Operand operand;
+            Token at;  // the operator before it
+            int pairs;
+        };
+        void join() {
+            const Part right = std::move(parts_.back());
+            parts_.pop_back();
+            Part& left = parts_.back();
+            left.operand = evaluator_.computed(right.at, frame_,
+                                               [&] { return (arithmetic_.*combine_)(left.operand, right.operand); });
+            ++left.pairs;
+        }
+
+        const Evaluator& evaluator_;
+        const Frame& frame_;
+        const Arithmetic& arithmetic_;
+        const Combine combine_;
+        std::vector<Part> parts_;
     };
-    Operand fold(std::vector<Part> parts, Combine combine) const {
-        while (parts.size() > 1) {
-            std::vector<Part> pairs;
-            for (std::size_t i = 0; i < parts.size(); i += 2) {
-                pairs.push_back(parts[i]);
-                if (i + 1 < parts.size())
-                    pairs.back().operand = (this->*combine)(parts[i + 1].at, parts[i].operand, parts[i + 1].operand);
+
+    Operand value_of(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        const auto operand = [&](std::size_t k) { return evaluate(formula.operands[k], frame); };
+        const auto compute = [&](const auto& operation) { return computed(formula.at, frame, operation); };
+        switch (formula.kind) {
+            case Kind::number:
+                return compute([&] { return arithmetic.number(std::string(formula.at.text)); });
+            case Kind::pi: {
+                static const Operand pi = operand_of(GiNaC::Pi);
+                return pi;
             }
-            parts = std::move(pairs);
-        }
-        return parts.front().operand;
-    }
-    Operand add(const Token& at, const Operand& a, const Operand& b) const {
-        return compute(
-            at, {a, b}, [&] { return a.expression + b.expression; }, real_sum);
-    }
-    Operand multiply(const Token& at, const Operand& a, const Operand& b) const {
-        return compute(
-            at, {a, b}, [&] { return a.expression * b.expression; }, real_product);
-    }
-    Operand negate(const Operand& a) const {
-        Operand result{-a.expression, a.value};
-        if (result.value) result.value = -*result.value;
-        return result;
-    }
-    Operand invert(const Token& at, const Operand& a) const {
-        if (a.expression.is_zero() || (a.value && a.value->is_zero()))
-            fail(at, fmt::format("division by zero in {}", scope_.formula));
-        return raise(at, a, {-1, numeric(-1)});
-    }
-
-    Operand raise(const Token& at, const Operand& base, const Operand& exponent) const {
-        if (is_a<numeric>(exponent.expression)) {
-            const numeric n = ex_to<numeric>(exponent.expression);
-            if (is_a<numeric>(base.expression)) {
-                // The size of b^n, before it is computed, is at least this; 1 and -1 have one bit and stay small.
-                if ((bits(ex_to<numeric>(base.expression)) - 1) * abs(n) > ExpressionLimits::number_bits)
-                    fail_number(at);
-            } else if (n.is_integer() && abs(n) > ExpressionLimits::exponent) {
-                fail(at, fmt::format("the exponent is beyond {}; write the formula with smaller powers",
-                                     ExpressionLimits::exponent));
+            case Kind::index:
+                return operand_of(frame.indices[formula.index].second);
+            case Kind::name:
+                return formula.name->definition ? defined(formula, frame) : declared(formula, frame);
+            case Kind::sum:
+                return folded(formula, frame, arithmetic, &Arithmetic::add);
+            case Kind::product:
+                return folded(formula, frame, arithmetic, &Arithmetic::multiply);
+            case Kind::negation: {
+                const Operand a = operand(0);
+                return compute([&] { return arithmetic.negate(a); });
             }
+            case Kind::inverse: {
+                const Operand a = operand(0);
+                return compute([&] { return arithmetic.invert(a); });
+            }
+            case Kind::power: {
+                const Operand base = operand(0), exponent = operand(1);
+                return compute([&] { return arithmetic.raise(base, exponent); });
+            }
+            case Kind::call: {
+                const Operand argument = operand(0);
+                return compute([&] { return arithmetic.call(*formula.function, argument); });
+            }
+            case Kind::series:
+                return series(formula, frame, arithmetic);
+            case Kind::remainder:
+                break;
         }
-        if (base.value && base.value->is_zero() && exponent.value && exponent.value->is_negative())
-            fail(at, fmt::format("division by zero in {}", scope_.formula));
-        if (base.expression.is_zero() && !exponent.value) fail(at, "0 to a power that is not a number");
-        return compute(
-            at, {base, exponent}, [&] { return GiNaC::pow(base.expression, exponent.expression); },
-            [](const std::vector<numeric>& v) { return real_power(v[0], v[1]); });
+        const long a = whole(formula.operands[0], frame, "what mod divides"),
+                   b = whole(formula.operands[1], frame, "what mod divides by");
+        if (b <= 0) fail(formula.operands[1].at, frame, fmt::format("mod divides by {}; it must be positive", b));
+        return operand_of((a % b + b) % b);
     }
 
-    Operand read_sum() {
-        std::vector<Part> terms{{read_product(), token()}};
-        while (token().is('+') || token().is('-')) {
-            const Token sign = tokens_[next_++];
-            const Operand term = read_product();
-            terms.push_back({sign.is('-') ? negate(term) : term, sign});
+    Operand folded(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic, Fold::Combine combine) {
+        Fold fold(*this, frame, arithmetic, combine);
+        for (std::size_t k = 0; k < formula.operands.size(); ++k)
+            fold.push(evaluate(formula.operands[k], frame), formula.signs[k]);
+        return fold.result();
+    }
+
+    Operand series(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        const long first = whole(formula.operands[0], frame, "the first index of a sum"),
+                   last = whole(formula.operands[1], frame, "the last index of a sum");
+        if (first > last) return operand_of(0);
+        Fold fold(*this, frame, arithmetic, &Arithmetic::add);
+        frame.indices.emplace_back(formula.index_name, first);
+        for (long i = first; i <= last; ++i) {
+            frame.indices.back().second = i;
+            fold.push(evaluate(formula.operands[2], frame), formula.at);
         }
-        return fold(std::move(terms), &Parser::add);
+        frame.indices.pop_back();
+        return fold.result();
     }
 
-    Operand read_product() {
-        std::vector<Part> factors{{read_signed(), token()}};
-        while (token().is('*') || token().is('/')) {
-            const Token sign = tokens_[next_++];
-            const Operand factor = read_signed();
-            factors.push_back({sign.is('/') ? invert(sign, factor) : factor, sign});
+    // A coordinate, a parameter, the time.
+    Operand declared(const Syntax& formula, Frame& frame) {
+        const Name& name = *formula.name;
+        const std::vector<Operand>& elements = formula.primed ? name.velocities : name.values;
+        if (!name.array) return elements.front();
+        const long k = whole(formula.operands[0], frame, fmt::format("the index of {}", formula.at.text));
+        if (k < 1 || k > static_cast<long>(elements.size()))
+            fail(formula.at, frame,
+                 fmt::format("there is no {0}[{1}]: the array has the elements {0}[1] to {0}[{2}]", formula.at.text, k,
+                             elements.size()));
+        return elements[static_cast<std::size_t>(k - 1)];
+    }
+
+    Operand defined(const Syntax& formula, Frame& frame) {
+        Definition& definition = *formula.name->definition;
+        std::vector<long> indices;
+        for (const Syntax& subscript : formula.operands)
+            indices.push_back(whole(subscript, frame, fmt::format("an index of {}", formula.at.name())));
+        Definition::Value& entry = definition.values[indices];
+        if (!entry.complete) {
+            if (entry.needed)
+                fail(formula.at, frame,
+                     fmt::format("{} needs its own value: definitions must not refer to one another in a circle",
+                                 definition.label));
+            entry.needed = true;
+            Frame own{definition.label, {}};
+            for (std::size_t k = 0; k < indices.size(); ++k)
+                own.indices.emplace_back(definition.indices[k], indices[k]);
+            ++definitions_;
+            entry.value = evaluate(definition.formula, own);
+            --definitions_;
+            entry.complete = true;
         }
-        return fold(std::move(factors), &Parser::multiply);
-    }
-
-    // Every way to nest passes through here.
-    Operand read_signed() {
-        if (++depth_ > ExpressionLimits::depth)
-            fail(token(), fmt::format("{} is nested more than {} deep; write it with fewer parentheses and powers",
-                                      scope_.formula, ExpressionLimits::depth));
-        bool negative = false;
-        for (; token().is('+') || token().is('-'); ++next_) negative ^= token().is('-');
-        const Operand power = read_power();
-        --depth_;
-        return negative ? negate(power) : power;
-    }
-
-    Operand read_power() {
-        const Operand base = read_primary();
-        if (!token().is('^')) return base;
-        const Token sign = tokens_[next_++];
-        return raise(sign, base, read_signed());
-    }
-
-    Operand read_primary() {
-        const Token first = token();
-        if (first.kind == Token::Kind::number) return ++next_, follow(read_number(first));
-        if (first.is('(')) return follow(read_parenthesis());
-        if (first.kind == Token::Kind::name) {
-            ++next_;
-            const Function* function = find_function(std::string(first.text));
-            return follow(function != nullptr ? read_call(first, *function) : read_name(first));
-        }
-        if (first.kind == Token::Kind::end && next_ > 0)
-            fail(first, fmt::format("{} ends after '{}': a number, a name or ( is missing", scope_.formula,
-                                    tokens_[next_ - 1].text));
-        if (first.is(')') && next_ > 0 && tokens_[next_ - 1].is('(')) fail(first, "nothing stands between ( and )");
-        fail(first, fmt::format("a number, a name or ( is missing before '{}'", first.text));
-    }
-
-    // After something complete, nothing that begins something new.
-    Operand follow(const Operand& operand) const {
-        if (token().kind == Token::Kind::number || token().kind == Token::Kind::name || token().is('('))
-            fail_missing_operator();
-        return operand;
-    }
-
-    Operand read_parenthesis() {
-        const Token open = tokens_[next_++];
-        const Operand inside = read_sum();
-        if (token().kind == Token::Kind::end) fail(open, "this ( is not closed: add a )");
-        ++next_;  // the only thing that ends a sum, but for the end, is )
-        return inside;
-    }
-
-    // Exact: 0.1 is 1/10. The number of digits, and so of bits, is checked first.
-    Operand read_number(const Token& number) const {
-        std::string digits(number.text);
-        long exponent = 0;
-        if (const std::size_t e = digits.find_first_of("eE"); e != std::string::npos) {
-            const std::string written = digits.substr(e + 1);
-            exponent = written.size() > 6 ? ExpressionLimits::number_bits : std::stol(written);
-            digits.resize(e);
-        }
-        if (const std::size_t point = digits.find('.'); point != std::string::npos) {
-            exponent -= static_cast<long>(digits.size() - point - 1);
-            digits.erase(point, 1);
-        }
-        digits.erase(0, std::min(digits.find_first_not_of('0'), digits.size() - 1));
-        constexpr long most_digits = ExpressionLimits::number_bits * 3 / 10;  // 10 > 2^(10/3)
-        if (static_cast<long>(digits.size()) > most_digits || std::abs(exponent) > most_digits) fail_number(number);
-        const numeric exact = numeric(digits.c_str()) * GiNaC::pow(numeric(10), numeric(exponent));
-        return compute(
-            number, {}, [&]() -> ex { return exact; }, real_sum);
-    }
-
-    Operand read_call(const Token& name, const Function& function) {
-        if (token().is('^')) fail(token(), fmt::format("write {0}(...)^2 instead of {0}^2(...)", name.text));
-        if (!token().is('('))
-            fail(name, fmt::format("{0} needs parentheses: write {0}({1})", name.text,
-                                   token().kind == Token::Kind::end ? "..." : token().text.substr(0, 40)));
-        if (++function_depth_ > ExpressionLimits::function_depth)
-            fail(name, fmt::format("functions of functions in {} are more than {} deep; write it with fewer",
-                                   scope_.formula, ExpressionLimits::function_depth));
-        const Operand argument = read_parenthesis();
-        --function_depth_;
-        return compute(
-            name, {argument}, [&] { return function.symbolic(argument.expression); },
-            [&](const std::vector<numeric>& v) { return real_function(function, v[0]); });
-    }
-
-    Operand read_name(const Token& token_of_name) {
-        const std::string name(token_of_name.text);
-        if (name == "pi") return {GiNaC::Pi, real_value(GiNaC::Pi)};
-        const auto found = scope_.names.find(name);
-        if (found == scope_.names.end()) fail_unknown(token_of_name, name);
-        const Name& meaning = found->second;
-        if (meaning.role == Name::Role::velocity && !scope_.velocities_allowed)
-            fail(token_of_name, fmt::format("the velocity {} cannot occur in {}: write it with numbers and parameters",
-                                            name, scope_.formula));
-        if (meaning.role == Name::Role::position && !scope_.positions_allowed)
-            fail(token_of_name,
-                 fmt::format("the coordinate {} cannot occur in {}: write it with numbers and parameters", name,
-                             scope_.formula));
-        if (used_ != nullptr) (*used_)[name] = true;
-        Operand operand{meaning.value, std::nullopt};
-        if (!has_symbols(meaning.value)) operand.value = real_value(meaning.value);
-        return operand;
-    }
-
-    static bool has_symbols(const ex& expression) {
-        for (auto i = expression.preorder_begin(); i != expression.preorder_end(); ++i)
-            if (is_a<GiNaC::symbol>(*i)) return true;
-        return false;
-    }
-
-    [[noreturn]] void fail_unknown(const Token& at, const std::string& name) const {
-        const std::string shown = name.substr(0, 40);
-        if (at.primed) {
-            const std::string base = name.substr(0, name.size() - 1);
-            if (scope_.names.count(base) > 0 && scope_.names.at(base).role == Name::Role::parameter)
-                fail(at, fmt::format("{} is a parameter and has no velocity; only coordinates have one", base));
-        }
-        std::vector<std::string> declared;
-        for (const auto& [declared_name, meaning] : scope_.names) {
-            const bool allowed = (meaning.role != Name::Role::velocity || scope_.velocities_allowed) &&
-                                 (meaning.role != Name::Role::position || scope_.positions_allowed);
-            if (allowed) declared.push_back(declared_name);
-        }
-        if (token().is('(')) {
-            std::vector<std::string> names;
-            for (const Function& function : functions()) names.push_back(function.name);
-            const std::string near = name == "ln" ? " Write log." : suggestion(name, names);
-            fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula, listing(names),
-                                 near));
-        }
-        if (declared.empty())
-            fail(at, fmt::format("unknown name '{}' in {}: only numbers, pi and functions of them may stand here",
-                                 shown, scope_.formula));
-        fail(at, fmt::format("unknown name '{}' in {}; declared: {}.{}", shown, scope_.formula, listing(declared),
-                             suggestion(name, declared)));
+        if (!motion_allowed_ && (entry.value.moves || entry.value.velocities))
+            fail(formula.at, frame,
+                 fmt::format("{} holds coordinates or the time, which cannot occur in {}: write it with numbers and "
+                             "parameters",
+                             definition.label, frame.formula));
+        if (!formula.primed) return entry.value;
+        if (entry.value.velocities)
+            fail(formula.at, frame,
+                 fmt::format("{} holds a velocity, so its time derivative would hold an acceleration",
+                             definition.label));
+        if (!entry.rate)
+            entry.rate = computed(formula.at, frame, [&] {
+                return Arithmetic(definition.label, work_).derivative(entry.value, names_->flow);
+            });
+        return *entry.rate;
     }
 
     const Source& source_;
-    const Scope& scope_;
-    std::map<std::string, bool>* used_;
-    const std::vector<Token> tokens_;
-    std::size_t next_ = 0;
+    Work& work_;
+    Names* names_;
+    const bool motion_allowed_;
     int depth_ = 0;
-    int function_depth_ = 0;
+    int definitions_ = 0;
 };
+
+Evaluator::Frame frame_of(const Scope& scope, const std::vector<long>& indices) {
+    Evaluator::Frame frame{scope.formula, {}};
+    for (std::size_t k = 0; k < indices.size(); ++k) frame.indices.emplace_back(scope.indices[k], indices[k]);
+    return frame;
+}
 
 }  // namespace
 
-GiNaC::ex parse_expression(const Source& source, const Text& text, const Scope& scope,
-                           std::map<std::string, bool>* used) {
-    if (text.value.size() > ExpressionLimits::length)
-        source.fail(text.at.front(), fmt::format("{} has {} characters; at most {} are read", scope.formula,
-                                                 text.value.size(), ExpressionLimits::length));
-    return Parser(source, text, scope, used).run();
+Operand evaluate(const Source& source, const Syntax& formula, const Scope& scope, const std::vector<long>& indices) {
+    Work own;
+    Evaluator::Frame frame = frame_of(scope, indices);
+    Work& work = scope.names != nullptr ? scope.names->work : own;
+    return Evaluator(source, work, scope.names, scope.motion_allowed).evaluate(formula, frame);
 }
 
-GiNaC::numeric value_in_range(const Source& source, Position at, const GiNaC::ex& expression,
-                              const std::string& formula, const GiNaC::exmap& symbols) {
+long evaluate_whole(const Source& source, const Syntax& formula, const Scope& scope) {
+    Work own;
+    Evaluator::Frame frame = frame_of(scope, {});
+    Work& work = scope.names != nullptr ? scope.names->work : own;
+    return Evaluator(source, work, scope.names, scope.motion_allowed).whole(formula, frame, scope.formula);
+}
+
+ex parse_expression(const Source& source, const Text& text, const Scope& scope) {
+    return evaluate(source, parse_formula(source, text, scope), scope).expression;
+}
+
+GiNaC::numeric value_in_range(const Source& source, Position at, const ex& expression, const std::string& formula,
+                              const GiNaC::exmap& symbols) {
     static const numeric largest = GiNaC::pow(numeric(10), numeric(300));
     try {
         const numeric value = real_value(expression, symbols);

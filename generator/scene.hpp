@@ -18,6 +18,8 @@ struct Coordinate {
     GiNaC::symbol velocity;  // prints as name'
     GiNaC::ex force = 0;  // generalised force beside the Lagrangian's own, in positions, velocities, time, parameters
     Position rate_at = {};  // where its initial velocity or momentum stands
+    std::string written = name;  // in formulas: x[3]
+    Position force_at = {};      // where its first force stands
 };
 
 struct Parameter {
@@ -25,6 +27,7 @@ struct Parameter {
     std::string unit;
     GiNaC::ex value;  // exact, free of symbols
     GiNaC::symbol symbol;
+    std::string written = name;  // in formulas: m[3]
 };
 
 enum class Family { lobatto, gauss };
@@ -48,6 +51,7 @@ struct Event {
     std::string text;   // as written, white space collapsed: "theta = 0 rising"
     GiNaC::ex value;    // left side minus right side, in positions, velocities, time and parameters
     int direction = 0;  // 1: rising only, -1: falling only, 0: both
+    Position at = {};
 };
 
 // What a kernel computes beside the motion itself; it has no code for anything else.
@@ -74,7 +78,7 @@ struct Scene {
     GiNaC::symbol time{"t"};                  // prints as the name the scene gives it
     std::vector<Parameter> parameters;        // run-time parameters, in the order of the file
     std::vector<Parameter> constants;         // declared constant: already substituted everywhere
-    std::string lagrangian_text;              // as written, white space collapsed
+    std::string lagrangian_text;              // as written, white space collapsed, without comments
     GiNaC::ex lagrangian;                     // in position and velocity symbols, time and run-time parameters
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
@@ -88,6 +92,10 @@ struct Scene {
     GiNaC::numeric evaluate(const GiNaC::ex& expression, const std::string& what,
                             const std::vector<GiNaC::ex>& parameter_values = {}) const;
 };
+
+// The parameters and constants of a scene, for further formulas in them.
+struct Names;
+Names parameter_names(const Scene& scene);
 
 // Throws InputError: what, where, why, how to mend.
 Scene read_scene(const std::string& path);

@@ -100,40 +100,57 @@ private:
     }
 
     void name_culprit() {
-        const auto require = [&](const ex& formula, const auto& what) {
+        const auto require = [&](const ex& formula, const auto& what, Position place) {
             try {
                 start_({formula});
             } catch (const DomainError& error) {
-                refuse(fmt::format("{} at the start, {}: {}; start elsewhere, or mend the formula", what(),
-                                   values_in(formula), error.what()));
+                scene_.source.fail(place, fmt::format("{} at the start, {}: {}; start elsewhere, or mend the formula",
+                                                      what(), values_in(formula), error.what()));
             }
         };
+        const Position lagrangian = scene_.lagrangian_at;
         for (const ex& term : system_.terms)
-            require(term, [&] {
-                return fmt::format("the Lagrangian has no value because of its term {}", short_text(term));
-            });
-        for (std::size_t k = 0; k < system_.outer_force.size(); ++k)
-            require(system_.outer_force[k],
-                    [&] { return fmt::format("the force on {} has no value", system_.q[k].get_name()); });
-        for (std::size_t k = 0; k < system_.momentum.size(); ++k) {
-            require(system_.momentum[k], [&] { return slope(system_.v[k], system_.momentum[k]); });
-            require(system_.force[k], [&] { return slope(system_.q[k], system_.force[k]); });
+            require(
+                term, [&] { return "the Lagrangian has no value because of its term " + short_text(term); },
+                lagrangian);
+        for (std::size_t k = 0; k < system_.outer_force.size(); ++k) {
+            const ex& force = system_.outer_force[k];
+            const std::string on = "the force on " + scene_.coordinates[k].written;
+            const Position place = scene_.coordinates[k].force_at;
+            require(
+                force, [&] { return on + " has no value"; }, place);
+            for (const auto* symbols : {&system_.q, &system_.v})
+                for (const auto& symbol : *symbols)
+                    require(
+                        force.diff(symbol), [&] { return on + " has no derivative in " + symbol.get_name(); }, place);
         }
-        for (const auto& [matrix, of, by] : {std::tuple{&system_.momentum_v, &system_.v, &system_.v},
-                                             std::tuple{&system_.momentum_q, &system_.v, &system_.q},
-                                             std::tuple{&system_.force_v, &system_.q, &system_.v},
-                                             std::tuple{&system_.force_q, &system_.q, &system_.q}})
-            for (const auto& [place, value] : matrix->entries())
-                require(value, [&, of = of, by = by, place = place, value = value] {
-                    return fmt::format("the second derivative d2L/d{}d{} = {} has no value",
-                                       (*of)[at(place.first)].get_name(), (*by)[at(place.second)].get_name(),
-                                       short_text(value));
-                });
+        const auto first = [&](const GiNaC::symbol& by, const ex& value) {
+            require(
+                value,
+                [&] {
+                    return fmt::format("the derivative dL/d{} = {} has no value", by.get_name(), short_text(value));
+                },
+                lagrangian);
+        };
+        for (std::size_t k = 0; k < system_.momentum.size(); ++k) {
+            first(system_.v[k], system_.momentum[k]);
+            first(system_.q[k], system_.force[k]);
+        }
+        const auto second = [&](const SparseMatrix& matrix, const auto& of, const auto& by) {
+            for (const auto& [place, value] : matrix.entries())
+                require(
+                    value,
+                    [&, row = place.first, column = place.second, entry = value] {
+                        return fmt::format("the second derivative d2L/d{}d{} = {} has no value", of[at(row)].get_name(),
+                                           by[at(column)].get_name(), short_text(entry));
+                    },
+                    lagrangian);
+        };
+        second(system_.momentum_v, system_.v, system_.v);
+        second(system_.momentum_q, system_.v, system_.q);
+        second(system_.force_v, system_.q, system_.v);
+        second(system_.force_q, system_.q, system_.q);
         throw std::logic_error("formulas have no values together, but each by itself");
-    }
-
-    static std::string slope(const GiNaC::symbol& by, const ex& value) {
-        return fmt::format("the derivative dL/d{} = {} has no value", by.get_name(), short_text(value));
     }
 
     Elimination eliminate_mass(const std::vector<cln::cl_R>& right) const {

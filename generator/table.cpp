@@ -31,8 +31,12 @@ const Entry& Table::get(const std::string& key, const std::string& example) cons
 
 namespace {
 
+[[noreturn]] void fail_type(const Source& source, const std::string& key, const Value& value,
+                            const std::string& expected) {
+    source.fail(value.at, fmt::format("{} must be {}, not {}", key, expected, value.kind_name()));
+}
 [[noreturn]] void fail_type(const Source& source, const Entry& entry, const std::string& expected) {
-    source.fail(entry.value.at, fmt::format("{} must be {}, not {}", entry.key, expected, entry.value.kind_name()));
+    fail_type(source, entry.key, entry.value, expected);
 }
 
 }  // namespace
@@ -43,10 +47,13 @@ const std::vector<Entry>& table_of(const Source& source, const Entry& entry, con
 }
 
 const Text& formula_of(const Source& source, const Entry& entry) {
-    const Value::Kind kind = entry.value.kind;
-    if (kind != Value::Kind::text && kind != Value::Kind::integer && kind != Value::Kind::real)
-        fail_type(source, entry, "a number or a formula in quotes");
-    return entry.value.text;
+    return formula_of(source, entry.key, entry.value);
+}
+
+const Text& formula_of(const Source& source, const std::string& key, const Value& value) {
+    if (value.kind != Value::Kind::text && value.kind != Value::Kind::integer && value.kind != Value::Kind::real)
+        fail_type(source, key, value, "a number or a formula in quotes");
+    return value.text;
 }
 
 long long integer_of(const Source& source, const Entry& entry, long long least, long long most,

@@ -30,6 +30,7 @@ private:
 // The value of an entry; any other type is an error.
 const std::vector<Entry>& table_of(const Source& source, const Entry& entry, const std::string& example);
 const Text& formula_of(const Source& source, const Entry& entry);  // a number, or a text that holds a formula
+const Text& formula_of(const Source& source, const std::string& key, const Value& value);
 long long integer_of(const Source& source, const Entry& entry, long long least, long long most,
                      const std::string& range);
 bool boolean_of(const Source& source, const Entry& entry);

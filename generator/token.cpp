@@ -39,10 +39,8 @@ constexpr Mend mends[] = {{"−–—", "write - instead"},
                           {"′’‘`´", "write ' instead"},
                           {"″\"\u0307", "write q' for the velocity of q"},
                           {"αβγδεζηθικλμνξρστυφχψωΓΔΘΛΞΠΣΦΨΩ", "write the name of the letter, such as alpha"},
-                          {"[{", "write ( instead"},
-                          {"]}", "write ) instead"},
-                          {",", "decimals have a point, and every function one argument"},
-                          {"=", "a formula is one side only"},
+                          {"{", "write ( instead"},
+                          {"}", "write ) instead"},
                           {"_", "a name begins with a letter"},
                           {"\u00A0", "this is a no-break space: type a plain one"}};
 
@@ -54,7 +52,7 @@ public:
     std::vector<Token> run() {
         std::vector<Token> tokens;
         for (;;) {
-            while (is_blank(at(0))) ++next_;
+            skip_blanks();
             begin_ = next_;
             if (next_ == value_.size()) {
                 tokens.push_back({Token::Kind::end, value_.substr(next_), text_.at[next_]});
@@ -65,6 +63,10 @@ public:
     }
 
 private:
+    void skip_blanks() {
+        while (is_blank(at(0)) || at(0) == '#')
+            next_ = at(0) == '#' ? std::min(value_.find('\n', next_), value_.size()) : next_ + 1;
+    }
     char at(std::size_t ahead) const { return next_ + ahead < value_.size() ? value_[next_ + ahead] : '\0'; }
     Token token(Token::Kind kind) const { return {kind, value_.substr(begin_, next_ - begin_), text_.at[begin_]}; }
     [[noreturn]] void fail(std::size_t byte, const std::string& message) const {
@@ -76,18 +78,22 @@ private:
         if (is_digit(c) || (c == '.' && is_digit(at(1)))) return read_number();
         if (is_letter(c)) return read_name();
         if (c == '*' && at(1) == '*') fail(next_, "'**' is not an operator: write ^ for powers");
-        if (c == '\'') fail(next_, "a prime ' belongs directly after the name of a coordinate");
-        if (std::string_view("+-*/^()").find(c) == std::string_view::npos) refuse_character();
-        ++next_;
+        const bool range = c == '.' && at(1) == '.';
+        const bool prime = c == '\'' && next_ > 0 && value_[next_ - 1] == ']';
+        if (c == '\'' && !prime) fail(next_, "a prime ' belongs directly after the name of a coordinate");
+        if (std::string_view("+-*/^()[],=").find(c) == std::string_view::npos && !range && !prime) refuse_character();
+        next_ += range ? 2 : 1;
+        if (prime && at(0) == '\'') fail_acceleration("x[...]''");
         return token(Token::Kind::sign);
     }
 
-    // 12, 0.5, .5, 1.5e-3; the e belongs to the number only when digits follow.
+    // 12, 0.5, .5, 1.5e-3, not the points of 1..n; the e belongs to the number only when digits follow.
     Token read_number() {
         const auto skip_digits = [&] {
             while (is_digit(at(0))) ++next_;
         };
         skip_digits();
+        if (at(0) == '.' && at(1) == '.') return token(Token::Kind::number);  // 1..n
         if (at(0) == '.') ++next_;
         skip_digits();
         if (at(0) == 'e' || at(0) == 'E') {
@@ -111,10 +117,12 @@ private:
         ++next_;
         Token name = token(Token::Kind::name);
         name.primed = true;
-        if (at(0) == '\'')
-            fail(next_,
-                 fmt::format("{}' is an acceleration; a Lagrangian has positions and velocities only", name.text));
+        if (at(0) == '\'') fail_acceleration(fmt::format("{}'", name.text));
         return name;
+    }
+
+    [[noreturn]] void fail_acceleration(const std::string& written) const {
+        fail(next_, fmt::format("{} is an acceleration; formulas have positions and velocities only", written));
     }
 
     [[noreturn]] void refuse_character() const {

@@ -14,20 +14,21 @@ namespace {
 
 const GiNaC::symbol m("m"), omega("omega"), q("q"), velocity("q'");
 
-lobatto::Scope scope_of_a_lagrangian() {
-    using Role = lobatto::Name::Role;
-    return {{{"m", {m, Role::parameter}},
-             {"omega", {omega, Role::parameter}},
-             {"q", {q, Role::position}},
-             {"q'", {velocity, Role::velocity}}},
-            "the Lagrangian",
-            true,
-            true};
-}
+// A Lagrangian with a parameter m and a coordinate q, ...
+struct Language {
+    lobatto::Names names;
+    lobatto::Scope scope{&names, "the Lagrangian", true, {}};
+
+    Language() {
+        names.add_parameter("m", {m});
+        names.add_parameter("omega", {omega});
+        names.add_coordinate("q", {q}, {velocity});
+    }
+    Language(const Language&) = delete;
+};
 
 // A formula that is a whole file of one line.
-ex parse(const std::string& formula, const lobatto::Scope& scope = scope_of_a_lagrangian(),
-         std::map<std::string, bool>* used = nullptr) {
+lobatto::Text text_of(const std::string& formula) {
     lobatto::Text text{formula, {}};
     lobatto::Position here;
     for (std::size_t i = 0; i <= formula.size(); ++i) {
@@ -36,16 +37,28 @@ ex parse(const std::string& formula, const lobatto::Scope& scope = scope_of_a_la
         text.at.push_back(here);
         ++here.column;
     }
-    return lobatto::parse_expression(lobatto::Source("formula", formula), text, scope, used);
+    return text;
 }
 
-std::string error_of(const std::string& formula, const lobatto::Scope& scope = scope_of_a_lagrangian()) {
+ex parse(const std::string& formula, const lobatto::Scope& scope) {
+    return lobatto::parse_expression(lobatto::Source("formula", formula), text_of(formula), scope);
+}
+ex parse(const std::string& formula) {
+    Language language;
+    return parse(formula, language.scope);
+}
+
+std::string error_of(const std::string& formula, const lobatto::Scope& scope) {
     try {
         parse(formula, scope);
     } catch (const lobatto::InputError& error) {
         return error.what();
     }
     return "no error";
+}
+std::string error_of(const std::string& formula) {
+    Language language;
+    return error_of(formula, language.scope);
 }
 
 std::string layout(const std::string& formula, int column, const std::string& message) {
@@ -108,9 +121,11 @@ TEST_CASE("every function of the grammar means GiNaC's function of that name") {
 }
 
 TEST_CASE("the names that occur are collected, even where they cancel") {
-    std::map<std::string, bool> used;
-    parse("0*m + q'^2", scope_of_a_lagrangian(), &used);
-    CHECK(used == std::map<std::string, bool>{{"m", true}, {"q'", true}});
+    Language language;
+    parse("0*m + q'^2", language.scope);
+    CHECK(language.names.all.at("m").used);
+    CHECK(language.names.all.at("q").used);
+    CHECK_FALSE(language.names.all.at("omega").used);
 }
 
 TEST_CASE("missing operators and parentheses are named with their mend") {
@@ -144,14 +159,14 @@ TEST_CASE("unknown names come with the declared ones and the nearest") {
     check_error("xyz", 1, "unknown name 'xyz' in the Lagrangian; declared: m, omega, q, q'.");
     check_error("ln(q)", 1,
                 "unknown function 'ln' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, tanh, "
-                "asin, acos, atan. Write log.");
+                "asin, acos, atan, sum, mod. Write log.");
     check_error("coss(q)", 1,
                 "unknown function 'coss' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, "
-                "tanh, asin, acos, atan. Did you mean 'cos'?");
+                "tanh, asin, acos, atan, sum, mod. Did you mean 'cos'?");
 }
 
 TEST_CASE("primes belong to coordinates, one each") {
-    check_error("m*q''", 5, "q'' is an acceleration; a Lagrangian has positions and velocities only");
+    check_error("m*q''", 5, "q'' is an acceleration; formulas have positions and velocities only");
     check_error("m'", 1, "m is a parameter and has no velocity; only coordinates have one");
     check_error("2'", 2, "a prime ' belongs directly after the name of a coordinate");
     check_error("q '", 3, "a prime ' belongs directly after the name of a coordinate");
@@ -235,9 +250,10 @@ TEST_CASE("functions stand 16 deep in one another, not 17, and any number beside
 }
 
 TEST_CASE("an initial value is made of parameters and numbers") {
-    lobatto::Scope scope = scope_of_a_lagrangian();
+    Language language;
+    lobatto::Scope& scope = language.scope;
     scope.formula = "the initial position of q";
-    scope.velocities_allowed = scope.positions_allowed = false;
+    scope.motion_allowed = false;
     CHECK(parse("2*m", scope).is_equal(2 * m));
     CHECK(error_of("2*q", scope) ==
           layout("2*q", 3,

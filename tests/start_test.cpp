@@ -15,10 +15,10 @@ namespace {
 // The first line of the refusal; the Lagrangian stands at 2:15, the first coordinate in line 4.
 std::string refusal(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters = "") {
     try {
-        derive(read_scene(Source("scene.toml", "title = \"test\"\nlagrangian = \"" + lagrangian +
-                                                   "\"\n[coordinates]\n" + coordinates +
-                                                   (parameters.empty() ? "" : "[parameters]\n" + parameters) +
-                                                   "[run]\nstep = 0.1\nuntil = 1\n")));
+        derive(read_scene(Source(
+            "scene.toml", "title = \"test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" + coordinates +
+                              (parameters.empty() ? "" : "[parameters]\n" + parameters) +
+                              (forces.empty() ? "" : "[forces]\n" + forces) + "[run]\nstep = 0.1\nuntil = 1\n")));
     } catch (const InputError& error) {
         const std::string text = error.what();
         return text.substr(0, text.find('\n'));
@@ -48,6 +48,12 @@ TEST_CASE("a start at a singularity is refused with the term, the place and the 
     CHECK(refusal("x'^2/2 - x*sqrt(x)", at_origin) ==
           "scene.toml:2:15: the second derivative d2L/dxdx = -3/(4*sqrt(x)) has no value at the start, x = 0: division "
           "by zero; start elsewhere, or mend the formula");
+    CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-x'/sqrt(x)\"\n") ==
+          "scene.toml:6:6: the force on x has no value at the start, x = 0, x' = 0: division by zero; start elsewhere, "
+          "or mend the formula");
+    CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-sqrt(x')\"\n") ==
+          "scene.toml:6:6: the force on x has no derivative in x' at the start, x' = 0: division by zero; start "
+          "elsewhere, or mend the formula");
     CHECK(refusal("x'^2/2 - sqrt(x)", "x = { position = 1e-30, velocity = 0 }\n") == "accepted");
 }
 

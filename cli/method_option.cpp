@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/method_option.hpp"
+
+namespace lobatto {
+
+void MethodOption::add_to(CLI::App& command) {
+    CLI::Option* lobatto = command.add_option("--points", points, "Lobatto with this many points: order 2 points - 2");
+    CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
+    lobatto->check(CLI::Range(2, 12));
+    gauss->check(CLI::Range(1, 10))->excludes(lobatto);
+}
+
+void MethodOption::apply(Scene& scene) const {
+    if (points) scene.method = {Family::lobatto, *points};
+    if (stages) scene.method = {Family::gauss, *stages};
+}
+
+}  // namespace lobatto

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The method on the command line, instead of the scene's: --points or --stages.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+
+#include "generator/scene.hpp"
+
+namespace lobatto {
+
+struct MethodOption {
+    std::optional<int> points, stages;
+
+    void add_to(CLI::App& command);
+    void apply(Scene& scene) const;
+};
+
+}  // namespace lobatto
