@@ -12,6 +12,7 @@
 
 namespace lobatto {
 
+void add_check(CLI::App& program);
 void add_derive(CLI::App& program);
 void add_emit(CLI::App& program);
 void add_run(CLI::App& program);

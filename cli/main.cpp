@@ -67,6 +67,7 @@ void flush_output() {
 void describe(CLI::App& program) {
     program.set_version_flag("--version", "lobatto " LOBATTO_VERSION);
     program.require_subcommand(0, 1);
+    add_check(program);
     add_derive(program);
     add_emit(program);
     add_run(program);

@@ -29,6 +29,7 @@ struct RunOptions {
     std::string scene;
     std::string output;  // empty: out/NAME.csv
     MethodOption method;
+    bool general = false;
     Overrides overrides;
     bool quiet = false;
 };
@@ -194,7 +195,7 @@ void run(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
-    const Derivation derivation = derive(scene);
+    const Derivation derivation = derive(scene, options.general);
     const KernelSource source = emit(derivation);
     const double derivation_seconds = seconds_since(start);
     apply(options.overrides, scene);  // after the derivation: one kernel serves all values
@@ -254,6 +255,8 @@ void add_run(CLI::App& program) {
     command->add_option("scene", options->scene, "Scene file")->required();
     command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
     options->method.add_to(*command);
+    command->add_flag("--general", options->general,
+                      "use nothing of what the scene's structure allows, for comparison");
     command->add_option("--step", options->overrides.step,
                         "Step h; may use the scene's parameters, as in 2*pi/omega/50");
     command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
