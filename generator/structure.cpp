@@ -138,7 +138,7 @@ private:
             return;
         }
         find("constant mass matrix", system_.separable,
-             system_.separable ? "the masses are the same everywhere, so only the points inside a step are solved for"
+             system_.separable ? "the masses are the same everywhere, so the end of a step needs no equations of its own"
                                : system_.not_separable + ", so the end of a step is solved for with the points inside");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
@@ -195,6 +195,7 @@ private:
         for (const auto& [row, column] : result_.entries) couplings.add(row, column);
         result_.groups = couplings.groups();
         describe_groups();
+        if (result_.form == Form::linear_map) return;
         find("small enough to write out", result_.unrolled,
              result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
                                             interior_, unrolled_limit)
