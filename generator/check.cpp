@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Identities of the quadrature and of the discrete equations, by routes that the derivation does not take.
+// Identities of the discrete equations, by routes that the derivation does not take.
 #include "generator/check.hpp"
 
 #include <algorithm>
@@ -112,71 +112,7 @@ Expressions flat(const std::vector<Expressions>& rows) {
     return result;
 }
 
-// The integral over [0, 1] of a polynomial in theta.
-ex integral(const ex& polynomial, const GiNaC::symbol& theta) {
-    const ex expanded = polynomial.expand();
-    ex sum = 0;
-    for (int degree = 0; degree <= expanded.degree(theta); ++degree)
-        sum += expanded.coeff(theta, degree) / (degree + 1);
-    return sum;
-}
-
 }  // namespace
-
-std::vector<Check> check_quadrature(const Quadrature& quadrature) {
-    const Expressions &c = quadrature.c, &b = quadrature.b, &l = quadrature.basis;
-    const std::size_t s = c.size(), m = s - 2;
-    const GiNaC::symbol& theta = quadrature.theta;
-    const auto moment_error = [&](std::size_t degree) {
-        ex sum = -numeric(1, static_cast<long>(degree) + 1);
-        for (std::size_t i = 0; i < s; ++i)
-            sum += b[i] * (degree == 0 ? ex(1) : GiNaC::pow(c[i], static_cast<int>(degree)));
-        return sum;
-    };
-    Expressions moments, basis, rigidity, inverse, symplectic, parabola, weights{-1};
-    for (std::size_t degree = 0; degree <= 2 * s - 3; ++degree) moments.push_back(moment_error(degree));
-    for (std::size_t i = 0; i < s; ++i) {
-        weights[0] += b[i];
-        basis.push_back(b[i] - integral(l[i], theta));
-        ex row = 0;
-        for (std::size_t j = 0; j < s; ++j) {
-            basis.push_back(l[j].subs(theta == c[i]) - (i == j ? 1 : 0));
-            basis.push_back(l[j].diff(theta).subs(theta == c[i]) - quadrature.D(at(i), at(j)));
-            rigidity.push_back(quadrature.K(at(i), at(j)) - integral(l[i].diff(theta) * l[j].diff(theta), theta));
-            rigidity.push_back(quadrature.K(at(i), at(j)) - quadrature.K(at(j), at(i)));
-            row += quadrature.K(at(i), at(j));
-        }
-        rigidity.push_back(row);
-    }
-    for (std::size_t i = 0; i < m; ++i) {
-        ex position = b[0] * c[i + 1] - c[i + 1] * c[i + 1] / 2;
-        for (std::size_t j = 0; j < m; ++j) {
-            ex product = i == j ? -1 : 0;
-            for (std::size_t k = 0; k < m; ++k)
-                product += quadrature.G(at(i), at(k)) * quadrature.K(at(k + 1), at(j + 1));
-            inverse.push_back(product);
-            symplectic.push_back(b[i + 1] * quadrature.A(at(i), at(j)) - b[j + 1] * quadrature.A(at(j), at(i)) -
-                                 b[i + 1] * b[j + 1] * (c[i + 1] - c[j + 1]));
-            position += quadrature.A(at(i), at(j));
-        }
-        parabola.push_back(position);
-    }
-    const std::string degree = std::to_string(2 * s - 3);
-    return {
-        exactly("the quadrature is exact to degree " + degree, vanish(moments),
-                "the nodes or weights are not Lobatto's"),
-        exactly("and not beyond degree " + degree, !vanish({moment_error(2 * s - 2)}),
-                "the order claimed is lower than the rule allows"),
-        exactly("its weights sum to 1", vanish(weights), "constants are not integrated exactly"),
-        exactly("the basis is Lagrange's on the nodes", vanish(basis),
-                "a basis polynomial, its slope or its integral is wrong"),
-        exactly("K integrates products of slopes", vanish(rigidity), "K is not the rigidity matrix of the basis"),
-        exactly("G inverts the interior of K", vanish(inverse), "the stage equations are solved with a wrong inverse"),
-        exactly("a constant force bends into a parabola", vanish(parabola), "the stage matrix A is inconsistent"),
-        exactly("the stage matrix is symplectic", vanish(symplectic),
-                "b_i A_ij - b_j A_ji = b_i b_j (c_i - c_j) fails: the step would not be symplectic"),
-    };
-}
 
 std::vector<Check> check_equations(const Derivation& derivation) {
     const Discretisation& d = derivation.discretisation();

@@ -146,7 +146,9 @@ std::string solver_text(const Derivation& derivation) {
         auto& list = known == kinds.end() ? kinds.back().second : known->second;
         list.push_back(solve.coordinates.front());
     }
-    std::string text = derivation.structure.linear ? "once a step, without iteration; " : "by Newton's iteration; ";
+    std::string text = derivation.structure.linear     ? "once a step, without iteration; "
+                       : derivation.structure.absorbed ? "by iterations with one matrix for all steps; "
+                                                       : "by Newton's iteration; ";
     if (solves.size() == 1) return text + kinds.front().first;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
         const auto& [how, list] = kinds[i];

@@ -8,6 +8,7 @@
 #include <cctype>
 #include <set>
 
+#include "generator/emit_declarations.hpp"
 #include "generator/identifier.hpp"
 #include "generator/programs.hpp"
 
@@ -34,6 +35,12 @@ std::string plain_name(const Graph& graph, Id id) {
     return "";
 }
 
+// Programs whose values prepare() stores itself.
+bool is_prepared(const Program& program) {
+    static const std::set<std::string> names = {"prepare", "prepare_map", "mass", "inverse_mass"};
+    return names.contains(program.name) || program.name.ends_with("_a");
+}
+
 }  // namespace
 
 Hoisted::Hoisted(const Programs& programs) {
@@ -44,7 +51,7 @@ Hoisted::Hoisted(const Programs& programs) {
     std::set<Id> wanted;
     std::vector<Id> roots;
     for (const Program& program : programs.programs) {
-        if (program.name == "prepare" || program.name == "prepare_map") continue;
+        if (is_prepared(program)) continue;
         for (const Output& output : program.outputs) {
             roots.push_back(output.value);
             if (is_early(output.value)) wanted.insert(output.value);
@@ -83,6 +90,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     for (const Statement& statement : statements) roots.push_back(statement.value);
     // What this function computes: everything below the roots that is not given.
     std::vector<Id> computed;
+    std::set<Id> here;
     std::map<Id, int> uses;
     {
         std::set<Id> seen;
@@ -94,6 +102,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
                 return;
             for (const Id operand : graph[id].operands) visit(operand);
             computed.push_back(id);
+            here.insert(id);
         };
         for (const Id root : roots) visit(root);
     }
@@ -105,60 +114,13 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     // Local names: scene names for inputs such as q[0], then temporaries.
     std::set<std::string> taken;
     for (const Input& input : graph.inputs()) taken.insert(input.code.substr(0, input.code.find('[')));
-    for (const char* name : {"k",
-                             "p",
-                             "h",
-                             "q",
-                             "u",
-                             "v",
-                             "W",
-                             "S",
-                             "Q",
-                             "F",
-                             "J",
-                             "W0",
-                             "W1",
-                             "q1",
-                             "p1",
-                             "u1",
-                             "W_before",
-                             "base",
-                             "delta",
-                             "velocity",
-                             "real",
-                             "name",
-                             "digest",
-                             "coordinates",
-                             "points",
-                             "order",
-                             "unknowns",
-                             "linear",
-                             "parameter_count",
-                             "entries",
-                             "entry_row",
-                             "entry_column",
-                             "c",
-                             "b",
-                             "A",
-                             "parameter",
-                             "prepare",
-                             "energy",
-                             "momentum",
-                             "node",
-                             "acceleration",
-                             "drift",
-                             "simple_start",
-                             "extrapolated_start",
-                             "residual",
-                             "jacobian",
-                             "correction",
-                             "carry",
-                             "arrive",
-                             "finish",
-                             "propagate",
-                             "not_finite",
-                             "Status"})
+    for (const char* name : {"k",  "p",     "h",  "q",  "u",  "v",        "W",    "S",          "Q",        "F", "J",
+                             "W0", "W1",    "q1", "p1", "u1", "W_before", "base", "delta",      "velocity", "z", "g",
+                             "H",  "value", "Lv", "Lq", "M",  "S0",       "time", "not_finite", "Status"})
         taken.insert(name);
+    const auto take = [&taken](const std::string& name) {  // false when it has another meaning
+        return !is_member_name(name) && taken.insert(name).second;
+    };
     std::map<Id, std::string> local;
     std::string aliases;
     for (const auto& [id, count] : uses) {
@@ -166,7 +128,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         const Input& input = graph.input_of(id);
         if (input.name == input.code || !is_identifier(input.name)) continue;
         const std::string name = identifier(input.name);
-        if (!taken.insert(name).second) continue;
+        if (!take(name)) continue;
         local[id] = name;
         aliases += fmt::format("        const real {} = {};\n", name, input.code);
     }
@@ -175,8 +137,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     int counter = 0;
     const auto fresh = [&](const std::string& wish) {
         std::string name = wish;
-        while (name.empty() || taken.contains(name)) name = fmt::format("t{}", ++counter);
-        taken.insert(name);
+        while (name.empty() || !take(name)) name = fmt::format("t{}", ++counter);
         return name;
     };
     const Naming naming = [&](Id id) -> std::string {
@@ -194,6 +155,8 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         else if (statement.target == "return finite")
             text_ += wrapped(fmt::format("        return lobatto::is_finite({});", text_of(statement.value)),
                              "            ");
+        else if (statement.target.ends_with("+="))
+            text_ += wrapped(fmt::format("        {} {};", statement.target, text_of(statement.value)), "            ");
         else
             text_ +=
                 wrapped(fmt::format("        {} = {};", statement.target, text_of(statement.value)), "            ");
@@ -204,7 +167,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     };
     std::set<Id> emitted;
     const std::function<void(Id)> compute = [&](Id id) {
-        if (!emitted.insert(id).second || std::find(computed.begin(), computed.end(), id) == computed.end()) return;
+        if (!emitted.insert(id).second || !here.contains(id)) return;
         if (local.contains(id)) return;
         for (const Id operand : graph[id].operands) compute(operand);
         const Node& node = graph[id];

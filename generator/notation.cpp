@@ -16,6 +16,9 @@ namespace {
 // Binding strength of what was printed last.
 enum Strength { sum = 1, product = 2, sign = 3, power = 4, atom = 5 };
 
+// Of a float, in what people read: enough to recognise it, and more than double has.
+constexpr int shown_digits = 25;
+
 struct Printed {
     std::string text;
     Strength strength = atom;
@@ -154,13 +157,15 @@ private:
         return text + suffix;
     }
 
+    // Shown by its digits.
+    static bool is_plain(const Constant& c) { return is_rational(c.value) || c.label.empty(); }
+
     Printed constant(Id id) const {
         const Constant& c = graph_.constant_of(id);
         if (notation_ == Notation::cpp) return {literal(c.value), cln::minusp(c.value) ? sign : atom};
-        if (is_rational(c.value)) return fraction({id});
+        if (is_plain(c)) return fraction({id});
         if (c.label == "pi") return {notation_ == Notation::latex ? "\\pi" : "pi", atom};
-        return {c.label.empty() ? decimal(c.value, 17) : c.label,
-                c.label.find_first_of("+- ") == std::string::npos ? power : sum};
+        return {c.label, c.label.find_first_of("+- ") == std::string::npos ? power : sum};
     }
 
     Printed addition(const Node& node) const {
@@ -191,7 +196,7 @@ private:
             const Node& node = graph_[factor];
             const bool named = naming_ && factors.size() > 1 && !naming_(factor).empty();
             if (!named && node.op == Op::constant &&
-                (notation_ == Notation::cpp || is_rational(graph_.constant_of(factor).value))) {
+                (notation_ == Notation::cpp || is_plain(graph_.constant_of(factor)))) {
                 cln::cl_R value = graph_.constant_of(factor).value;
                 if (cln::minusp(value)) {
                     negative = !negative;
@@ -199,6 +204,8 @@ private:
                 }
                 if (notation_ == Notation::cpp) {
                     if (value != 1 || factors.size() == 1) above.push_back(literal(value));
+                } else if (!is_rational(value)) {
+                    above.push_back(decimal(value, shown_digits));
                 } else {
                     const cln::cl_RA rational = cln::the<cln::cl_RA>(value);
                     if (cln::numerator(rational) != 1 || factors.size() == 1)

@@ -21,12 +21,20 @@ struct Program {
     std::vector<Output> outputs;
 };
 
+// A linear system that the program `correction` leaves to the elimination of the support header: J_mark delta_mark =
+// -F, and the unknowns that delta_mark are.
+struct Solve {
+    std::string mark;  // "" when it is the only one
+    std::vector<std::size_t> unknowns;
+};
+
 // All programs of a kernel over one graph, so that what they hoist is shared; and names for values that deserve one
 // when hoisted.
 struct Programs {
     Graph graph;
     std::vector<Program> programs;
     std::vector<std::pair<Id, std::string>> names;  // value -> identifier
+    std::vector<Solve> solves;
 };
 
 // The values that the programs and the names ask for.

@@ -1,367 +1,68 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What a kernel computes, as programs over one graph: node, drift, start values, correction, arrival, energy ...
-// (docs/derivation.md).
+// What a kernel computes, as programs over one graph (docs/derivation.md): what all forms share.
 #include "generator/programs.hpp"
 
-#include <algorithm>
-#include <numeric>
-
 #include "generator/identifier.hpp"
-#include "generator/pipeline.hpp"
-#include "generator/propagation.hpp"
+#include "generator/looped.hpp"
+#include "generator/program_builder.hpp"
 
 namespace lobatto {
 
-namespace {
+ProgramBuilder::ProgramBuilder(const Derivation& derivation)
+    : d_(derivation),
+      n_(static_cast<std::size_t>(derivation.system.n)),
+      s_(static_cast<std::size_t>(derivation.quadrature.points)) {
+    const auto start_of = [&](const GiNaC::ex& value, const std::string& what) {
+        return d_.scene.evaluate(value, what).to_double();
+    };
+    for (std::size_t i = 0; i < d_.scene.parameters.size(); ++i) {
+        const std::string& name = d_.scene.parameters[i].name;
+        const double value = start_of(d_.scene.parameters[i].value, "the parameter " + name);
+        symbols_[d_.system.parameters[i]] = g().input({identifier(name), name, Stage::parameter, value});
+    }
+    h_ = g().input({"h", "h", Stage::step_size});
+    for (std::size_t k = 0; k < n_; ++k) {
+        const std::string& name = d_.scene.coordinates[k].name;
+        const double value = start_of(d_.scene.initial_position[k], "the initial position of " + name);
+        q_.push_back(g().input({at("q", k), name, Stage::step, value}));
+        symbols_[d_.system.q[k]] = q_.back();
+    }
+    if (!d_.system.autonomous) symbols_[d_.system.t] = g().input({"time", d_.system.t.get_name(), Stage::step, 0});
+}
 
-using Ids = std::vector<Id>;
-using Rows = std::vector<Ids>;
-
-// M^-1 as straight-line code: Gauss-Jordan elimination on the graph, zeros skipped. The pivots are the values that must
-// not vanish.
-Rows invert(Graph& graph, Rows matrix, Ids& pivots) {
-    const std::size_t n = matrix.size();
-    Rows result(n, Ids(n, graph.number(0)));
-    for (std::size_t k = 0; k < n; ++k) result[k][k] = graph.number(1);
-    for (std::size_t k = 0; k < n; ++k) {
-        std::size_t row = k;
-        while (row < n && graph.is_number(matrix[row][k], 0)) ++row;
-        if (row == n) throw std::logic_error("the mass matrix is singular: the system stage should have refused it");
-        std::swap(matrix[k], matrix[row]);
-        std::swap(result[k], result[row]);
-        pivots.push_back(matrix[k][k]);
-        const Id reciprocal = graph.power(matrix[k][k], -1);
-        for (std::size_t j = 0; j < n; ++j) {
-            matrix[k][j] = graph.multiply({reciprocal, matrix[k][j]});
-            result[k][j] = graph.multiply({reciprocal, result[k][j]});
-        }
-        for (std::size_t i = 0; i < n; ++i) {
-            if (i == k || graph.is_number(matrix[i][k], 0)) continue;
-            const Id factor = matrix[i][k];
-            for (std::size_t j = 0; j < n; ++j) {
-                matrix[i][j] = graph.subtract(matrix[i][j], graph.multiply({factor, matrix[k][j]}));
-                result[i][j] = graph.subtract(result[i][j], graph.multiply({factor, result[k][j]}));
-            }
-        }
+Ids ProgramBuilder::times(const Rows& matrix, const Ids& vector) {
+    Ids result;
+    for (const Ids& row : matrix) {
+        Ids terms;
+        for (std::size_t l = 0; l < row.size(); ++l)
+            if (!g().is_number(row[l], 0)) terms.push_back(g().multiply({row[l], vector[l]}));
+        result.push_back(g().add(terms));
     }
     return result;
 }
 
-class Builder {
-public:
-    explicit Builder(const Derivation& derivation)
-        : d_(derivation),
-          n_(static_cast<std::size_t>(derivation.system.n)),
-          s_(static_cast<std::size_t>(derivation.quadrature.points)) {
-        for (std::size_t i = 0; i < d_.scene.parameters.size(); ++i) {
-            const std::string& name = d_.scene.parameters[i].name;
-            const double value = start_of(d_.scene.parameters[i].value, "the parameter " + name);
-            symbols_[d_.system.parameters[i]] = g().input({identifier(name), name, Stage::parameter, value});
-        }
-        h_ = g().input({"h", "h", Stage::step_size});
-        for (std::size_t k = 0; k < n_; ++k) {
-            const std::string& name = d_.scene.coordinates[k].name;
-            const double value = start_of(d_.scene.initial_position[k], "the initial position of " + name);
-            q_.push_back(g().input({at("q", k), name, Stage::step, value}));
-            symbols_[d_.system.q[k]] = q_.back();
-        }
-        for (std::size_t k = 0; k < n_; ++k)
-            for (std::size_t l = 0; l < n_; ++l) {
-                if (l == 0) mass_.emplace_back();
-                mass_.back().push_back(convert(d_.system.mass(static_cast<unsigned>(k), static_cast<unsigned>(l))));
-            }
-        inverse_mass_ = invert(g(), mass_, pivots_);
+void ProgramBuilder::program(const std::string& name, const std::string& array, const Ids& values) {
+    Program program{name, {}};
+    for (std::size_t i = 0; i < values.size(); ++i) program.outputs.push_back({at(array, i), values[i]});
+    p_.programs.push_back(std::move(program));
+}
+
+void ProgramBuilder::velocities_as_inputs() {
+    for (std::size_t k = 0; k < n_; ++k) {
+        velocity_.push_back(in("velocity", k));
+        symbols_[d_.system.v[k]] = velocity_.back();
     }
+}
 
-    Programs build() {
-        prepare();
-        mechanics();
-        if (d_.structure.linear) {
-            if (n_ == 1) propagation_of_one();
-        } else {
-            step();
-        }
-        return std::move(p_);
-    }
-
-private:
-    Graph& g() { return p_.graph; }
-    double start_of(const GiNaC::ex& value, const std::string& what) const {
-        return d_.scene.evaluate(value, what).to_double();
-    }
-    static std::string at(const std::string& array, std::size_t index) {
-        return array + "[" + std::to_string(index) + "]";
-    }
-    Id in(const std::string& array, std::size_t index, Stage stage = Stage::step) {
-        return g().input({at(array, index), at(array, index), stage});
-    }
-    Id convert(const GiNaC::ex& expression) { return g().from(expression, symbols_); }
-    Id c(std::size_t i) { return convert(d_.quadrature.c[i]); }
-    Id b(std::size_t i) { return convert(d_.quadrature.b[i]); }
-    Id A(std::size_t i, std::size_t j) {
-        return convert(d_.quadrature.A(static_cast<unsigned>(i), static_cast<unsigned>(j)));
-    }
-    Id h2() { return g().power(h_, 2); }
-    Id named(const std::string& name, Id value) {
-        p_.names.emplace_back(value, name);
-        return value;
-    }
-    // h^2 A_ij and its kin, named for the hoisted coefficients. Node numbers are those of the derivation, from 1.
-    Id h2A(std::size_t i, std::size_t j) {
-        return named("h2_A" + std::to_string(i + 2) + std::to_string(j + 2), g().multiply({h2(), A(i, j)}));
-    }
-    Id hb(std::size_t i) { return named("h_b" + std::to_string(i + 1), g().multiply({h_, b(i)})); }
-    Id hc(std::size_t i) { return named("h_c" + std::to_string(i + 1), g().multiply({h_, c(i)})); }
-
-    Ids times(const Rows& matrix, const Ids& vector) {
-        Ids result;
-        for (const Ids& row : matrix) {
-            Ids terms;
-            for (std::size_t l = 0; l < row.size(); ++l) terms.push_back(g().multiply({row[l], vector[l]}));
-            result.push_back(g().add(terms));
-        }
-        return result;
-    }
-
-    void program(const std::string& name, const std::string& array, const Ids& values) {
-        Program program{name, {}};
-        for (std::size_t i = 0; i < values.size(); ++i) program.outputs.push_back({at(array, i), values[i]});
-        p_.programs.push_back(std::move(program));
-    }
-
-    // What prepare must refuse: a mass matrix without inverse.
-    void prepare() {
-        Program program{"prepare", {}};
-        for (const Id pivot : pivots_)
-            if (!g().is_constant(pivot)) program.outputs.push_back({"pivot", pivot});
-        p_.programs.push_back(std::move(program));
-    }
-
-    // Formulas of the system itself: (D1) ... (D3).
-    void mechanics() {
-        Ids gradient, p, velocity;
-        for (std::size_t k = 0; k < n_; ++k) {
-            gradient.push_back(convert(d_.system.gradient[k]));
-            p.push_back(in("p", k));
-            velocity.push_back(in("velocity", k));
-        }
-        Ids kinetic;
-        const Ids rates = times(inverse_mass_, p);
-        for (std::size_t k = 0; k < n_; ++k)
-            kinetic.push_back(
-                g().raw(Op::multiply, {p[k], g().multiply({g().number(1, 2), rates[k]})}));  // p^2 may overflow
-        kinetic.push_back(convert(d_.system.potential));
-        p_.programs.push_back({"energy", {{"return", g().add(kinetic)}}});
-        program("momentum", "p", times(mass_, velocity));
-        program("velocity", "velocity", rates);
-
-        W_of_q_ = times(inverse_mass_, gradient);
-        Program node{"node", {}};
-        for (std::size_t k = 0; k < n_; ++k) node.outputs.push_back({at("W", k), W_of_q_[k]});
-        for (std::size_t e = 0; e < d_.structure.entries.size(); ++e) {
-            const auto [row, column] = d_.structure.entries[e];
-            Ids terms;
-            for (std::size_t l = 0; l < n_; ++l)
-                terms.push_back(g().multiply(
-                    {inverse_mass_[static_cast<std::size_t>(row)][l],
-                     convert(d_.system.hessian(static_cast<unsigned>(l), static_cast<unsigned>(column)))}));
-            node.outputs.push_back({at("S", e), g().add(terms)});
-        }
-        p_.programs.push_back(std::move(node));
-        program("acceleration", "W", W_of_q_);
-    }
-
-    // (D20): the paper's Phi for one coordinate, the shift for a constant force.
-    void propagation_of_one() {
-        const Propagation exact = propagation(d_.quadrature);
-        const Id k = convert(d_.system.hessian(0, 0).expand());
-        const Id m = mass_[0][0];
-        const Id force = g().negate(convert(d_.system.gradient[0].subs(d_.system.q[0] == 0)));
-        // The polynomials as locals of prepare(): each is an input to what follows.
-        Program prepare_map{"prepare_map", {}};
-        const auto local = [&](std::string name, Id value) {
-            const auto& inputs = g().inputs();  // a parameter may have the name already
-            while (std::any_of(inputs.begin(), inputs.end(), [&](const Input& other) { return other.code == name; }))
-                name += "_";
-            prepare_map.outputs.push_back({"const real " + name, value});
-            return g().input({name, name, Stage::step_size});
-        };
-        const Id h_by_m = g().multiply({h_, g().power(m, -1)});
-        const Id z = local("z", g().multiply({h_by_m, h_, k}));
-        const auto polynomial = [&](const std::string& name, const GiNaC::ex& e) {
-            return local(name, g().from(e, {{exact.z, z}}));
-        };
-        const Id inverse_delta = g().power(polynomial("delta", exact.delta), -1);
-        // The kernel stores E = Phi - I: for a small step it keeps the digits that Phi would round off.
-        const Id a = polynomial("a_minus_delta", (exact.a - exact.delta).expand()), b = polynomial("phi_b", exact.b),
-                 c = polynomial("phi_c", exact.c);
-        const Ids position = {a, g().multiply({h_by_m, c}),
-                              g().multiply({h_, h_by_m, force, g().from(exact.e_q, {{exact.z, z}})})};
-        const Ids momentum = {g().multiply({g().power(h_by_m, -1), b}), a,
-                              g().multiply({h_, force, g().from(exact.e_p, {{exact.z, z}})})};
-        std::size_t index = 0;
-        for (const Ids& row : {position, momentum})
-            for (const Id entry : row)
-                prepare_map.outputs.push_back({at("k.Phi_minus_I", index++), g().multiply({entry, inverse_delta})});
-        p_.programs.push_back(std::move(prepare_map));
-
-        const auto row = [&](std::size_t r) {
-            Ids terms = {g().multiply({in("k.Phi_minus_I", 3 * r), q_[0]}),
-                         g().multiply({in("k.Phi_minus_I", 3 * r + 1), in("p", 0)})};
-            if (!g().is_number(force, 0)) terms.push_back(in("k.Phi_minus_I", 3 * r + 2));
-            // Small terms first, then the state they are added to.
-            return g().raw(Op::add, {r == 0 ? q_[0] : in("p", 0), g().add(terms)});
-        };
-        p_.programs.push_back({"propagate", {{"q1[0]", row(0)}, {"p1[0]", row(1)}}});
-    }
-
-    // The step of a nonlinear system with constant mass: (D11) ... (D17).
-    void step() {
-        const std::size_t m = s_ - 2, N = n_ * m;
-        const auto& entries = d_.structure.entries;
-        Ids drift, base;
-        for (std::size_t k = 0; k < n_; ++k)
-            drift.push_back(g().subtract(in("u", k), g().multiply({hb(0), in("W0", k)})));
-        Program drift_program{"drift", {}};
-        for (std::size_t k = 0; k < n_; ++k) drift_program.outputs.push_back({at("v", k), drift[k]});
-        for (std::size_t i = 1; i < s_; ++i)
-            for (std::size_t k = 0; k < n_; ++k)
-                drift_program.outputs.push_back({at("base", (i - 1) * n_ + k),
-                                                 g().add({q_[k], g().multiply({i + 1 < s_ ? hc(i) : h_, drift[k]})})});
-        p_.programs.push_back(std::move(drift_program));
-
-        if (N > 0) {
-            Ids simple, extrapolated;
-            for (std::size_t i = 0; i < m; ++i) {
-                Ids row;
-                for (std::size_t j = 0; j < m; ++j) row.push_back(A(i, j));
-                const Id sum = named("h2_A" + std::to_string(i + 2), g().multiply({h2(), g().add(row)}));
-                Ids weights;  // h^2 (A E)_ij
-                for (std::size_t j = 0; j < s_; ++j) {
-                    GiNaC::ex weight = 0;
-                    for (std::size_t l = 0; l < m; ++l)
-                        weight += d_.quadrature.A(static_cast<unsigned>(i), static_cast<unsigned>(l)) *
-                                  d_.quadrature.E(static_cast<unsigned>(l), static_cast<unsigned>(j));
-                    weights.push_back(named("h2_AE" + std::to_string(i + 2) + std::to_string(j + 1),
-                                            g().multiply({h2(), convert(weight.expand())})));
-                }
-                for (std::size_t k = 0; k < n_; ++k) {
-                    simple.push_back(g().subtract(in("base", i * n_ + k), g().multiply({sum, in("W0", k)})));
-                    Ids terms{in("base", i * n_ + k)};
-                    for (std::size_t j = 0; j < s_; ++j)
-                        terms.push_back(g().negate(g().multiply({weights[j], in("W_before", j * n_ + k)})));
-                    extrapolated.push_back(g().add(terms));
-                }
-            }
-            program("simple_start", "Q", simple);
-            program("extrapolated_start", "Q", extrapolated);
-
-            // (D12) F_i = Q_i - base_i + h^2 sum_j A_ij W_j and (D13) J = I + h^2 A (x) S.
-            Ids F;
-            for (std::size_t i = 0; i < m; ++i)
-                for (std::size_t k = 0; k < n_; ++k) {
-                    Ids terms{in("Q", i * n_ + k, Stage::iterate), g().negate(in("base", i * n_ + k))};
-                    for (std::size_t j = 0; j < m; ++j)
-                        terms.push_back(g().multiply({h2A(i, j), in("W", j * n_ + k, Stage::iterate)}));
-                    F.push_back(g().add(terms));
-                }
-            Rows J(N, Ids(N, g().number(0)));
-            for (std::size_t i = 0; i < N; ++i) J[i][i] = g().number(1);
-            for (std::size_t i = 0; i < m; ++i)
-                for (std::size_t j = 0; j < m; ++j)
-                    for (std::size_t e = 0; e < entries.size(); ++e) {
-                        Id& entry = J[i * n_ + static_cast<std::size_t>(entries[e].first)]
-                                     [j * n_ + static_cast<std::size_t>(entries[e].second)];
-                        entry = g().add(
-                            {entry, g().multiply({h2A(i, j), in("S", j * entries.size() + e, Stage::iterate)})});
-                    }
-            program("residual", "F", F);
-            Ids flat;
-            for (const Ids& row : J) flat.insert(flat.end(), row.begin(), row.end());
-            program("jacobian", "J", flat);
-            correction(F, J);
-
-            Program carry{"carry", {}};
-            for (std::size_t j = 0; j < m; ++j)
-                for (std::size_t k = 0; k < n_; ++k) {
-                    Ids terms{in("W", j * n_ + k, Stage::iterate)};
-                    for (std::size_t e = 0; e < entries.size(); ++e)
-                        if (static_cast<std::size_t>(entries[e].first) == k)
-                            terms.push_back(g().multiply(
-                                {in("S", j * entries.size() + e, Stage::iterate),
-                                 in("delta", j * n_ + static_cast<std::size_t>(entries[e].second), Stage::iterate)}));
-                    carry.outputs.push_back({at("W", j * n_ + k), g().add(terms)});
-                }
-            p_.programs.push_back(std::move(carry));
-        }
-
-        Ids position, rate;
-        for (std::size_t k = 0; k < n_; ++k) {
-            Ids terms{in("base", (s_ - 2) * n_ + k)}, rates{in("v", k)};
-            for (std::size_t j = 0; j < m; ++j) {
-                const GiNaC::ex weight = (d_.quadrature.b[j + 1] * (1 - d_.quadrature.c[j + 1])).expand();
-                const Id h2d = named("h2_d" + std::to_string(j + 2), g().multiply({h2(), convert(weight)}));
-                terms.push_back(g().negate(g().multiply({h2d, in("W", j * n_ + k, Stage::iterate)})));
-                rates.push_back(g().negate(g().multiply({hb(j + 1), in("W", j * n_ + k, Stage::iterate)})));
-            }
-            rates.push_back(g().negate(g().multiply({hb(s_ - 1), in("W1", k)})));
-            position.push_back(g().add(terms));
-            rate.push_back(g().add(rates));
-        }
-        program("arrive", "q1", position);
-        program("finish", "u1", rate);
-    }
-
-    // Newton's correction delta = -J^-1 F: Cramer's rule for few unknowns, else J and F for the elimination in
-    // kernel.hpp.
-    void correction(const Ids& F, const Rows& J) {
-        const std::size_t N = F.size();
-        Program program{"correction", {}};
-        if (N > closed_form_limit) {
-            for (std::size_t i = 0; i < N; ++i) program.outputs.push_back({at("delta", i), g().negate(F[i])});
-            for (std::size_t i = 0; i < N; ++i)
-                for (std::size_t j = 0; j < N; ++j) program.outputs.push_back({at("J", i * N + j), J[i][j]});
-            p_.programs.push_back(std::move(program));
-            return;
-        }
-        const auto minor = [&](std::size_t row, std::size_t column) {  // signed cofactor of J
-            std::vector<std::size_t> r, c;
-            for (std::size_t i = 0; i < N; ++i) {
-                if (i != row) r.push_back(i);
-                if (i != column) c.push_back(i);
-            }
-            Id value = g().number(1);
-            if (N == 2) value = J[r[0]][c[0]];
-            if (N == 3)
-                value = g().subtract(g().multiply({J[r[0]][c[0]], J[r[1]][c[1]]}),
-                                     g().multiply({J[r[0]][c[1]], J[r[1]][c[0]]}));
-            return (row + column) % 2 == 0 ? value : g().negate(value);
-        };
-        Ids terms;
-        for (std::size_t j = 0; j < N; ++j) terms.push_back(g().multiply({J[0][j], minor(0, j)}));
-        const Id inverse = named("inverse_determinant", g().power(g().add(terms), -1));
-        for (std::size_t i = 0; i < N; ++i) {
-            Ids sum;
-            for (std::size_t j = 0; j < N; ++j) sum.push_back(g().negate(g().multiply({minor(j, i), F[j]})));
-            program.outputs.push_back({at("delta", i), g().multiply({inverse, g().add(sum)})});
-        }
-        program.outputs.push_back({"return finite", inverse});
-        p_.programs.push_back(std::move(program));
-    }
-
-    const Derivation& d_;
-    std::size_t n_, s_;
-    Programs p_;
-    GiNaC::exmap symbols_;  // scene symbols -> inputs
-    Id h_ = 0;
-    Ids q_, pivots_, W_of_q_;
-    Rows mass_, inverse_mass_;
-};
-
-}  // namespace
+void ProgramBuilder::events() {
+    Ids values;
+    for (const Event& event : d_.scene.outputs.events) values.push_back(convert(event.value));
+    if (!values.empty()) program("event", "value", values);
+}
 
 Programs build_programs(const Derivation& derivation) {
-    return Builder(derivation).build();
+    if (derivation.structure.looped) return looped_programs(derivation);
+    return derivation.structure.form == Form::general ? general_programs(derivation) : separable_programs(derivation);
 }
 
 }  // namespace lobatto

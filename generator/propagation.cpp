@@ -1,79 +1,59 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The exact step of a linear system with one coordinate: the interior unknowns eliminated symbolically.
+// The exact step of a linear system with one coordinate: a continued fraction.
 #include "generator/propagation.hpp"
-
-#include <array>
-#include <stdexcept>
-#include <vector>
 
 namespace lobatto {
 
 namespace {
 
 using GiNaC::ex;
+using GiNaC::numeric;
 
-// The image of one start: q0, the scaled velocity h u0 and the scaled force h^2 f/m, each 0 or 1, times the determinant
-// of the stage equations.
-struct Image {
-    ex position, velocity;
+// Write the path as a Legendre series, q(theta) = sum_{n <= r} x_n P_n(2 theta - 1), and its slope as
+// (q1 - q0) + sum_{n=1}^{r-1} 2 (2 n + 1) y_n P_n with y_0 = (q1 - q0)/2, y_r = 0; then x_n = y_{n-1} - y_{n+1} for
+// n >= 1 and x_0 = (q0 + q1)/2 - y_1. Both rules are exact for products of degree 2 r - 1, so that the action of a step
+// is a sum of squares, in units of m/h,
+//     L_d = 1/2 sum_{n=0}^{r-1} 4 (2 n + 1) y_n^2 - z/2 sum_{n=0}^{r} w_n x_n^2,   w_n = 1/(2 n + 1) for n < r,
+//     w_r = sum_i b_i P_r(2 c_i - 1)^2 = 1/r (Lobatto), 0 (Gauss):
+// two chains of springs, one of mean and y_1, y_3, ..., one of y_0, y_2, ... . Springs in series add their reciprocals.
+// Eliminating the chains from their far ends leaves, with t_n = x^2/(2 n + 1 - t_{n+1}) and x^2 = z/4,
+//     L_d = -4 A mean^2/2 + T (q1 - q0)^2/2,   A = t_0,   T = 1 - t_1,   t_r = x^2 w_r or 0:
+// x^2 w_r in the chain that contains x_r (A for even r, T for odd), 0 in the other. As r grows A and T tend to x tan x
+// and x cot x. From p0 = -dL_d/dq0, p1 = dL_d/dq1:
+//     q1 = ((T - A) q0 + (h/m) p0) / (T + A),   p1 = (-4 A T (m/h) q0 + (T - A) p0) / (T + A).
+struct Fraction {
+    ex above, below;  // t_0 = x^2 below/above, 1 - t_1 = above/below: the denominators of t_0 and t_1
 };
 
-Image image(const Quadrature& quadrature, const ex& z, const GiNaC::matrix& stage, const ex& determinant, int q0,
-            int u0, int force) {
-    const unsigned m = static_cast<unsigned>(quadrature.points) - 2;
-    const auto& c = quadrature.c;
-    const auto& b = quadrature.b;
-    const ex v = u0 - b[0] * (z * q0 - force);  // (D11) times h
-    std::vector<ex> right;
-    for (unsigned i = 0; i < m; ++i) {
-        ex sum = q0 + c[i + 1] * v;
-        for (unsigned j = 0; j < m; ++j) sum += quadrature.A(i, j) * force;
-        right.push_back(sum);
+Fraction fraction(int r, const numeric& end, const ex& z) {
+    ex numerator = end, denominator = 1, below = 1;  // t_n = x^2 numerator/denominator, from n = r down
+    for (int n = r - 1; n >= 0; --n) {
+        below = denominator;
+        denominator = ((2 * n + 1) * denominator - z / 4 * numerator).expand();
+        numerator = below;
     }
-    // (D12) by Cramer's rule: determinant * Q_i.
-    std::vector<ex> Q;
-    for (unsigned i = 0; i < m; ++i) {
-        GiNaC::matrix replaced = stage;
-        for (unsigned row = 0; row < m; ++row) replaced(row, i) = right[row];
-        Q.push_back(expand_exactly(replaced.determinant(GiNaC::determinant_algo::laplace)));
-    }
-    ex position = determinant * (q0 + v), velocity = determinant * v;
-    for (unsigned j = 0; j < m; ++j) {
-        const ex acceleration = z * Q[j] - determinant * force;
-        position -= b[j + 1] * (1 - c[j + 1]) * acceleration;
-        velocity -= b[j + 1] * acceleration;
-    }
-    position = expand_exactly(position);
-    velocity = expand_exactly(velocity - b.back() * (z * position - determinant * force));
-    return {position, velocity};
+    return {denominator, below};
 }
 
 }  // namespace
 
 Propagation propagation(const Quadrature& quadrature) {
+    const bool lobatto = quadrature.method.family == Family::lobatto;
+    const int r = quadrature.method.points - (lobatto ? 1 : 0);  // degree of the path
     Propagation result;
     const ex z = result.z;
-    const unsigned m = static_cast<unsigned>(quadrature.points) - 2;
-    GiNaC::matrix stage(m, m);
-    for (unsigned i = 0; i < m; ++i)
-        for (unsigned j = 0; j < m; ++j) stage(i, j) = (i == j ? 1 : 0) + z * quadrature.A(i, j);
-    const ex determinant = m == 0 ? ex(1) : expand_exactly(stage.determinant(GiNaC::determinant_algo::laplace));
-    const Image q = image(quadrature, z, stage, determinant, 1, 0, 0);
-    const Image u = image(quadrature, z, stage, determinant, 0, 1, 0);
-    const Image f = image(quadrature, z, stage, determinant, 0, 0, 1);
-
-    std::array<ex*, 6> parts = {&result.delta, &result.a, &result.b, &result.c, &result.e_q, &result.e_p};
-    const std::array<ex, 6> polynomials = {determinant, q.position, q.velocity, u.position, f.position, f.velocity};
-    ex common = 0;
-    for (const ex& polynomial : polynomials) {
-        for (int degree = 0; degree <= polynomial.degree(z); ++degree)
-            if (!polynomial.coeff(z, degree).info(GiNaC::info_flags::rational))
-                throw std::logic_error("a radical survived in the propagation");
-        common = GiNaC::gcd(common, polynomial);
-    }
-    const ex scale = determinant.subs(z == 0) / common.subs(z == 0);  // delta(0) = 1
-    for (std::size_t i = 0; i < parts.size(); ++i) *parts[i] = GiNaC::quo(polynomials[i], common, z).expand() / scale;
-    for (ex* part : parts) *part = part->expand();
+    const numeric end = lobatto ? numeric(1, r) : numeric(0);
+    const Fraction A = fraction(r, r % 2 == 0 ? end : 0, z), T = fraction(r, r % 2 == 1 ? end : 0, z);
+    // Consecutive denominators have no common factor, so neither have these.
+    const ex stretch = (A.above * T.above).expand(), pull = (z / 4 * A.below * T.below).expand();
+    const ex scale = stretch.subs(z == 0);  // delta(0) = 1
+    result.delta = ((stretch + pull) / scale).expand();
+    result.a = ((stretch - pull) / scale).expand();
+    result.b = (-z * A.below * T.above / scale).expand();
+    result.c = (A.above * T.below / scale).expand();
+    // A constant force moves the centre to f/k.
+    result.e_q = ((result.delta - result.a) / z).expand();
+    result.e_p = (-result.b / z).expand();
     return result;
 }
 

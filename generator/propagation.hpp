@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The exact step of a linear system with one coordinate: the interior unknowns eliminated symbolically.
+// The exact step of a linear system with one coordinate: a continued fraction.
 #pragma once
 
 #include <ginac/ginac.h>

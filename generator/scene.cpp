@@ -290,7 +290,8 @@ private:
             const Subject subject =
                 parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, "[definitions]", true, {}});
             if (subject.subscripted && subject.indices.empty())
-                fail(subject.subscript.at.at, "the indices of a definition are new names, as in \"r[i,j]\"");
+                fail(subject.subscript.at.at,
+                     "the indices of a definition are names without another meaning, as in \"r[i,j]\"");
             const std::string name(subject.name.text);
             declarations_.declare(name, subject.name.at, "definition");
             const auto definition = std::make_shared<Definition>();
@@ -413,7 +414,7 @@ private:
             values.push_back(read_formula(entry, {&names_, label(0), false, {}}));
             return;
         }
-        if (names_.all.count("i") > 0)
+        if (entry.value.kind == Value::Kind::text && names_.all.count("i") > 0)
             fail(entry.value.at,
                  fmt::format("in the initial {} of an array, i is the number of the element; rename what "
                              "else is called i",

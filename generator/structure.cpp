@@ -5,11 +5,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <tuple>
 
 #include "generator/notation.hpp"
 #include "generator/routhian.hpp"
+#include "generator/sample.hpp"
 
 namespace lobatto {
 
@@ -96,7 +98,11 @@ private:
 class Finder {
 public:
     Finder(const Scene& scene, const System& system, const Quadrature& quadrature, bool general)
-        : scene_(scene), system_(system), n_(system.n), interior_(n_ * (quadrature.points - 2)) {
+        : scene_(scene),
+          system_(system),
+          quadrature_(quadrature),
+          n_(system.n),
+          interior_(n_ * (quadrature.points - 2)) {
         result_.general = general;
     }
 
@@ -138,8 +144,9 @@ private:
             return;
         }
         find("constant mass matrix", system_.separable,
-             system_.separable ? "the masses are the same everywhere, so the end of a step needs no equations of its own"
-                               : system_.not_separable + ", so the end of a step is solved for with the points inside");
+             system_.separable
+                 ? "the masses are the same everywhere, so the end of a step needs no equations of its own"
+                 : system_.not_separable + ", so the end of a step is solved for with the points inside");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         result_.diagonal_mass = system_.separable && diagonal;
@@ -196,6 +203,8 @@ private:
         result_.groups = couplings.groups();
         describe_groups();
         if (result_.form == Form::linear_map) return;
+        repetition();
+        absorption();
         find("small enough to write out", result_.unrolled,
              result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
                                             interior_, unrolled_limit)
@@ -238,6 +247,90 @@ private:
              fmt::format("{} of {} second derivatives of L are not zero, and only they are computed",
                          result_.routhian.second.entries().size(), size * size));
         describe_groups();
+        if (cyclic.empty()) repetition();
+    }
+
+    // Terms of V, or of L, that are one formula of many variables.
+    void repetition() {
+        const bool general = result_.form == Form::general;
+        if (result_.form == Form::linear_map || (!general && result_.unrolled)) return;
+        GiNaC::exmap at_rest;
+        for (const auto& velocity : system_.v) at_rest[velocity] = 0;
+        std::vector<ex> terms;
+        std::vector<std::pair<int, ex>> forces;
+        for (const ex& term : system_.terms) {
+            const ex value = general ? term : -term.subs(at_rest, GiNaC::subs_options::no_pattern);
+            if (!value.is_zero()) terms.push_back(value);
+        }
+        std::vector<GiNaC::symbol> all = system_.q;
+        all.insert(all.end(), system_.v.begin(), system_.v.end());
+        for (int k = 0; k < n_; ++k)
+            for (const ex& term : terms_of(system_.outer_force[static_cast<std::size_t>(k)], all))
+                if (!term.is_zero()) forces.emplace_back(general ? n_ + k : k, term);
+        const std::size_t count = terms.size() + forces.size();
+        if (count < looped_from) return;
+        Elements elements = find_elements(system_, general ? result_.routhian.z : system_.q, terms, forces);
+        const std::size_t single = elements.others.size() + elements.other_forces.size();
+        result_.looped = 4 * single <= count;
+        if (result_.looped) result_.elements = std::move(elements);
+        find("repeated terms", result_.looped,
+             result_.looped ? fmt::format("{} terms of L are {} formulas in loops over tables, and {} written out",
+                                          count, result_.elements.repeated.size(), single)
+                            : fmt::format("of {} terms of L {} are unlike all others", count, single));
+    }
+
+    // The quadratic part of V: worth a frozen Jacobian when the rest bends the forces little at the start.
+    void absorption() {
+        if (result_.form != Form::separable || result_.unrolled || result_.linear || !result_.diagonal_mass) return;
+        SparseMatrix rest(n_, n_);
+        result_.constant_hessian = SparseMatrix(n_, n_);
+        std::vector<GiNaC::symbol> variables = system_.q;
+        variables.push_back(system_.t);
+        std::vector<ex> stiffness;
+        for (const auto& [place, value] : system_.hessian.entries()) {
+            const ex constant = constant_part(value, variables);
+            if (!constant.is_zero()) result_.constant_hessian.put(place.first, place.second, constant);
+            stiffness.push_back((value - constant) / system_.mass(static_cast<std::size_t>(place.first),
+                                                                  static_cast<std::size_t>(place.first)));
+        }
+        double contraction = 1;
+        try {
+            contraction = rest_of_stiffness(stiffness);
+        } catch (const DomainError&) {  // then Newton's iteration
+        }
+        result_.absorbed = !result_.constant_hessian.entries().empty() && contraction < 0.1;
+        find("quadratic part absorbed", result_.absorbed,
+             result_.absorbed
+                 ? fmt::format("V is nearly quadratic at the start, so one matrix serves all iterations of "
+                               "all steps: an iteration leaves {:.1g} of the error there",
+                               contraction)
+                 : "V is far from quadratic at the start, so each iteration has a matrix of its own");
+    }
+
+    // h^2 |A| |M^-1 (V'' - its constant part)| at the start, norms of largest row sums.
+    double rest_of_stiffness(const std::vector<ex>& entries) const {
+        Formulas formulas;
+        for (const Parameter& parameter : scene_.parameters)
+            formulas.set(parameter.symbol,
+                         float_of(scene_.evaluate(parameter.value, "the parameter " + parameter.name)));
+        for (std::size_t k = 0; k < scene_.coordinates.size(); ++k)
+            formulas.set(system_.q[k], float_of(scene_.evaluate(scene_.initial_position[k], "the initial position")));
+        formulas.set(system_.t, cln::cl_float(0, cln::float_format(number_digits)));
+        const std::vector<cln::cl_R> values = formulas(entries);
+        std::map<int, double> rows;
+        std::size_t e = 0;
+        for (const auto& [place, value] : system_.hessian.entries())
+            rows[place.first] += std::fabs(cln::double_approx(values[e++]));
+        double largest = 0, stage = 0;
+        for (const auto& [row, sum] : rows) largest = std::max(largest, sum);
+        for (unsigned i = 0; i < quadrature_.A.rows(); ++i) {
+            double sum = 0;
+            for (unsigned j = 0; j < quadrature_.A.cols(); ++j)
+                sum += std::fabs(GiNaC::ex_to<GiNaC::numeric>(quadrature_.A(i, j).evalf()).to_double());
+            stage = std::max(stage, sum);
+        }
+        const double h = scene_.evaluate(scene_.run.step, "the step").to_double();
+        return h * h * stage * largest;
     }
 
     void linearity() {
@@ -339,11 +432,33 @@ private:
 
     const Scene& scene_;
     const System& system_;
+    const Quadrature& quadrature_;
     const int n_, interior_;
     Structure result_;
 };
 
 }  // namespace
+
+ex constant_part(const ex& value, const std::vector<GiNaC::symbol>& variables) {
+    if (!has_any(value, variables)) return value;
+    if (!GiNaC::is_a<GiNaC::add>(value)) {
+        // A factor before a sum: m (1 + q^2).
+        if (!GiNaC::is_a<GiNaC::mul>(value)) return 0;
+        ex factor = 1, sum = 0;
+        for (const ex& part : value) {
+            if (!has_any(part, variables))
+                factor *= part;
+            else if (GiNaC::is_a<GiNaC::add>(part) && sum.is_zero())
+                sum = part;
+            else
+                return 0;
+        }
+        return factor * constant_part(sum, variables);
+    }
+    ex constant = 0;
+    for (const ex& term : value) constant += constant_part(term, variables);
+    return constant;
+}
 
 Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general) {
     return Finder(scene, system, quadrature, general).run();

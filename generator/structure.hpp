@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "generator/elements.hpp"
 #include "generator/quadrature.hpp"
 #include "generator/system.hpp"
 
@@ -56,6 +57,10 @@ struct Structure {
     bool linear = false;         // constant second derivatives: one correction, its Jacobian factored once a step size
     bool diagonal_mass = false;  // of a separable system
     bool unrolled = true;        // separable: every node and coordinate written out; else loops over both
+    bool looped = false;         // terms of L that repeat are written once, in loops over tables
+    Elements elements;           // looped: of V in q, or of L in z
+    bool absorbed = false;       // separable, in loops: iterated with the Jacobian of V's quadratic part (D31)
+    SparseMatrix constant_hessian;             // absorbed: the part of V'' that does not depend on q
     std::vector<std::pair<int, int>> entries;  // separable: where M^-1 V'' is not identically zero, row by row
     Routhian routhian;                         // general
     std::vector<Group> groups;
@@ -65,6 +70,10 @@ struct Structure {
 
 // Largest sizes of what is written out: coordinates of a linear map, unknowns of a separable step.
 constexpr int linear_map_limit = 16, unrolled_limit = 24;
+// Terms of L from which on loops are looked for.
+constexpr int looped_from = 48;
+// The additive part of a second derivative that does not depend on the variables.
+GiNaC::ex constant_part(const GiNaC::ex& value, const std::vector<GiNaC::symbol>& variables);
 
 // `general`: find nothing, for comparison.
 Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general = false);

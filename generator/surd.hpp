@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Exact arithmetic in the quadratic field Q(sqrt d): the numbers a + b sqrt(d) of Lobatto rules with up to 5 points.
+// Exact arithmetic in the quadratic field Q(sqrt d): the numbers a + b sqrt(d) of rules with few points.
 #pragma once
 
 #include <ginac/ginac.h>
 
-#include <stdexcept>
 #include <utility>
-#include <vector>
 
 namespace lobatto {
 
-// a + b sqrt(d), a and b rational. Operands of one operation share d, or have b = 0.
+// a + b sqrt(d), a and b rational, d without square factors. Operands of one operation share d, or have b = 0.
 struct Surd {
     GiNaC::numeric a = 0;
     GiNaC::numeric b = 0;
@@ -22,7 +20,9 @@ struct Surd {
     Surd(GiNaC::numeric rational, GiNaC::numeric irrational, int radicand)
         : a(std::move(rational)), b(std::move(irrational)), d(radicand) {}
 
+    static constexpr bool exact = true;
     bool is_zero() const { return a.is_zero() && b.is_zero(); }
+    int radicand() const { return b.is_zero() ? 1 : d; }
     GiNaC::ex expression() const { return b.is_zero() ? GiNaC::ex(a) : a + b * GiNaC::sqrt(GiNaC::ex(d)); }
 
     friend Surd operator+(const Surd& x, const Surd& y) { return {x.a + y.a, x.b + y.b, common(x, y)}; }
@@ -41,34 +41,14 @@ private:
     static int common(const Surd& x, const Surd& y) { return x.b.is_zero() ? y.d : x.d; }
 };
 
-using SurdMatrix = std::vector<std::vector<Surd>>;
-
-// The inverse of a square matrix by Gauss-Jordan elimination.
-inline SurdMatrix inverse(SurdMatrix matrix) {
-    const std::size_t n = matrix.size();
-    SurdMatrix result(n, std::vector<Surd>(n));
-    for (std::size_t i = 0; i < n; ++i) result[i][i] = Surd(1);
-    for (std::size_t k = 0; k < n; ++k) {
-        std::size_t pivot = k;
-        while (pivot < n && matrix[pivot][k].is_zero()) ++pivot;
-        if (pivot == n) throw std::logic_error("inverse of a singular matrix");
-        std::swap(matrix[k], matrix[pivot]);
-        std::swap(result[k], result[pivot]);
-        const Surd divisor = matrix[k][k];
-        for (std::size_t j = 0; j < n; ++j) {
-            matrix[k][j] = matrix[k][j] / divisor;
-            result[k][j] = result[k][j] / divisor;
-        }
-        for (std::size_t i = 0; i < n; ++i) {
-            if (i == k || matrix[i][k].is_zero()) continue;
-            const Surd factor = matrix[i][k];
-            for (std::size_t j = 0; j < n; ++j) {
-                matrix[i][j] = matrix[i][j] - factor * matrix[k][j];
-                result[i][j] = result[i][j] - factor * result[k][j];
-            }
-        }
-    }
-    return result;
+// The root of a positive rational: sqrt(n/m) = sqrt(n m)/m, square factors of n m taken out.
+inline Surd root(const Surd& square) {
+    const GiNaC::numeric denominator = square.a.denom();
+    int radicand = (square.a.numer() * denominator).to_int(), outside = 1;
+    for (int factor = 2; factor * factor <= radicand; ++factor)
+        for (; radicand % (factor * factor) == 0; radicand /= factor * factor) outside *= factor;
+    const GiNaC::numeric scale = GiNaC::numeric(outside) / denominator;
+    return radicand == 1 ? Surd(scale) : Surd(0, scale, radicand);
 }
 
 }  // namespace lobatto

@@ -187,7 +187,7 @@ TEST_CASE("emit that cannot write says where and why, with exit code 4, and leav
 TEST_CASE("emit and derive refuse what they cannot do with exit code 2") {
     const std::string scene = tree + "/scenes/pendulum.toml";
     CHECK(lobatto_program({"derive", scene, "--latex", "--json"}).exit_code == 2);
-    CHECK(lobatto_program({"derive", scene, "--points", "6"}).exit_code == 2);
+    CHECK(lobatto_program({"derive", scene, "--points", "13"}).exit_code == 2);
     CHECK(lobatto_program({"derive", "no/such/scene.toml"}).exit_code == 2);
     CHECK(lobatto_program({"emit", scene}).exit_code == 2);
     CHECK(lobatto_program({"emit", scene, "-o", "x", "--precision", "half"}).exit_code == 2);

@@ -12,7 +12,10 @@ using GiNaC::Pi;
 
 namespace {
 
-const GiNaC::symbol m("m"), omega("omega"), q("q"), velocity("q'");
+const GiNaC::symbol m("m"), omega("omega"), q("q"), velocity("q'"), t("t");
+const GiNaC::symbol x[] = {GiNaC::symbol("x_1"), GiNaC::symbol("x_2"), GiNaC::symbol("x_3")};
+const GiNaC::symbol x_velocity[] = {GiNaC::symbol("x_1'"), GiNaC::symbol("x_2'"), GiNaC::symbol("x_3'")};
+const GiNaC::symbol mass[] = {GiNaC::symbol("mass_1"), GiNaC::symbol("mass_2"), GiNaC::symbol("mass_3")};
 
 // A Lagrangian with a parameter m and a coordinate q, ...
 struct Language {
@@ -25,6 +28,15 @@ struct Language {
         names.add_coordinate("q", {q}, {velocity});
     }
     Language(const Language&) = delete;
+
+    // ... arrays of three, x and mass, constants n = 3 and half = 1/2, and the time.
+    void add_arrays() {
+        names.add_coordinate("x", {x[0], x[1], x[2]}, {x_velocity[0], x_velocity[1], x_velocity[2]}, true);
+        names.add_parameter("mass", {mass[0], mass[1], mass[2]}, true);
+        names.add_parameter("n", {3});
+        names.add_parameter("half", {numeric(1, 2)});
+        names.add_time("t", t);
+    }
 };
 
 // A formula that is a whole file of one line.
@@ -68,6 +80,18 @@ std::string layout(const std::string& formula, int column, const std::string& me
 
 void check_error(const std::string& formula, int column, const std::string& message) {
     CHECK(error_of(formula) == layout(formula, column, message));
+}
+
+ex parse_with_arrays(const std::string& formula) {
+    Language language;
+    language.add_arrays();
+    return parse(formula, language.scope);
+}
+
+void check_error_with_arrays(const std::string& formula, int column, const std::string& message) {
+    Language language;
+    language.add_arrays();
+    CHECK(error_of(formula, language.scope) == layout(formula, column, message));
 }
 
 std::string repeated(const std::string& piece, int times) {
@@ -269,4 +293,112 @@ TEST_CASE("a long line is shown as a window around the caret") {
     CHECK(error_of(text) == "formula:1:601: unexpected character '?' in the Lagrangian\n  1 | ..." +
                                 repeated("q+", 50) + "?" + repeated("+q", 49) + "+...\n    | " + repeated(" ", 103) +
                                 "^");
+}
+
+TEST_CASE("sums are written out") {
+    CHECK(parse_with_arrays("sum(i = 1 .. 3, mass[i]*x[i]'^2)/2")
+              .is_equal((mass[0] * pow(x_velocity[0], 2) + mass[1] * pow(x_velocity[1], 2) +
+                         mass[2] * pow(x_velocity[2], 2)) /
+                        2));
+    CHECK(parse_with_arrays("sum(i=1..n-1, (x[i+1] - x[i])^i)").is_equal(x[1] - x[0] + pow(x[2] - x[1], 2)));
+    CHECK(parse_with_arrays("sum(i = 1 .. n, sum(j = i + 1 .. n, x[i]*x[j]))")
+              .is_equal(x[0] * x[1] + x[0] * x[2] + x[1] * x[2]));
+    CHECK(parse_with_arrays("sum(i = 1 .. n, x[mod(i, n) + 1]*i)").is_equal(x[1] + 2 * x[2] + 3 * x[0]));
+    CHECK(parse_with_arrays("sum(i = -2 .. 2, i^2)").is_equal(10));
+    CHECK(parse_with_arrays("sum(i = 1 .. 20, 1/i)").is_equal(numeric(55835135, 15519504)));
+    CHECK(parse_with_arrays("x[n] + x[4/2]*t").is_equal(x[2] + x[1] * t));
+    CHECK(parse_with_arrays("mod(-1, 3) + mod(7, 3)").is_equal(3));
+}
+
+TEST_CASE("an empty sum is 0, and its formula is read all the same") {
+    CHECK(parse_with_arrays("q + sum(i = 5 .. 3, x[i])").is_equal(q));
+    check_error_with_arrays(
+        "sum(i = 5 .. 3, y[i])", 17,
+        "unknown name 'y' in the Lagrangian; declared: half, m, mass[i], n, omega, q, q', t, x[i], x[i]', i.");
+}
+
+TEST_CASE("a comment ends with its line") {
+    CHECK(parse("m # the mass, in kg\n + q # the [rest").is_equal(m + q));
+    check_error("# nothing", 10, "the Lagrangian is empty");
+}
+
+TEST_CASE("errors in a sum say for which indices") {
+    check_error_with_arrays("sum(i = 1 .. n, (x[i+1] - x[i])^2)", 18,
+                            "there is no x[4]: the array has the elements x[1] to x[3] (i = 3)");
+    check_error_with_arrays("sum(i = 1 .. n, sum(j = 1 .. n, 1/(x[i] - x[j])))", 34,
+                            "division by zero in the Lagrangian (i = 1, j = 1)");
+    check_error_with_arrays("x[0]", 1, "there is no x[0]: the array has the elements x[1] to x[3]");
+    check_error_with_arrays("sum(i = 1 .. n, sqrt(1 - i))", 17,
+                            "the Lagrangian has no finite real value here: sqrt of -1 is not a real number (i = 2)");
+}
+
+TEST_CASE("indices and bounds are whole numbers known when the kernel is written") {
+    check_error_with_arrays("sum(i = 1 .. m, x[i])", 14,
+                            "the last index of a sum must be known when the kernel is written: numbers, indices and "
+                            "parameters declared constant");
+    check_error_with_arrays("sum(i = half .. n, x[i])", 9, "the first index of a sum must be a whole number, not 0.5");
+    check_error_with_arrays("x[n/2]", 3, "the index of x must be a whole number, not 1.5");
+    check_error_with_arrays("x[q]", 3,
+                            "the index of x must be known when the kernel is written: numbers, indices and parameters "
+                            "declared constant");
+    check_error_with_arrays("x[10^9 + 1]", 3, "the index of x is beyond 1000000000");
+    check_error_with_arrays("mod(3, 0)", 8, "mod divides by 0; it must be positive");
+    check_error_with_arrays("mod(3/2, 2)", 5, "what mod divides must be a whole number, not 1.5");
+}
+
+TEST_CASE("an index has a name of its own") {
+    check_error_with_arrays("sum(m = 1 .. 3, x[m])", 5, "'m' is a parameter; give the index another name");
+    check_error_with_arrays("sum(x = 1 .. 3, x)", 5, "'x' is a coordinate; give the index another name");
+    check_error_with_arrays("sum(t = 1 .. 3, t)", 5, "'t' is the time; give the index another name");
+    check_error_with_arrays("sum(i = 1 .. 3, sum(i = 1 .. 2, x[i]))", 21,
+                            "'i' is an index already; give the index another name");
+    check_error_with_arrays("sum(pi = 1 .. 3, x[pi])", 5, "'pi' is the number 3.14159...; give the index another name");
+    check_error_with_arrays("sum(exp = 1 .. 3, 1)", 5, "'exp' is the name of a function; give the index another name");
+    check_error_with_arrays("sum(i = 1 .. 3, i')", 17, "i is an index and has no velocity; only coordinates have one");
+    check_error_with_arrays(
+        "sum(i = 1 .. 3, x[i]) + x[i]", 27,
+        "unknown name 'i' in the Lagrangian; declared: half, m, mass[i], n, omega, q, q', t, x[i], x[i]'.");
+}
+
+TEST_CASE("sums and brackets that are not written as such come with their form") {
+    const std::string form = "a sum is written sum(i = 1 .. n, formula)";
+    check_error_with_arrays("sum(x[1])", 5, form);
+    check_error_with_arrays("sum(i, 1, n, x[i])", 5, form);
+    check_error_with_arrays("sum(i = 1, n, x[i])", 10, form);
+    check_error_with_arrays("sum(i = 1 .. n)", 15, form);
+    check_error_with_arrays("sum i", 1, "sum needs parentheses: write sum(i = 1 .. n, formula)");
+    check_error_with_arrays("mod", 1, "mod needs parentheses: write mod(a, b)");
+    check_error_with_arrays("mod(3)", 6, "a remainder is written mod(a, b)");
+    check_error_with_arrays("sum(i = 1 .. n, x[i]", 4, "this ( is not closed: add a )");
+    check_error_with_arrays("x[1", 2, "this [ is not closed: add a ]");
+    check_error_with_arrays("(x[1)", 5, "this ) closes nothing: a ] is missing before it");
+    check_error_with_arrays("x", 1, "x is an array: write x[1], or x[i] in a sum over i");
+    check_error_with_arrays("x'[1]", 1, "the prime stands after the brackets: write x[...]'");
+    check_error_with_arrays("x[1]''", 6, "x[...]'' is an acceleration; formulas have positions and velocities only");
+    check_error_with_arrays("x[1] '", 6, "a prime ' belongs directly after the name of a coordinate");
+    check_error_with_arrays("x[1, 2]", 2, "an array has one index: write x[i]");
+    check_error_with_arrays("q[1]", 2, "q is a coordinate, not an array: write q without brackets");
+    check_error_with_arrays("mass[1]'", 1, "mass is a parameter and has no velocity; only coordinates have one");
+    check_error_with_arrays("t'", 1, "t is the time and has no velocity; only coordinates have one");
+    check_error_with_arrays("x[1]q", 5, "missing operator: write ]*q");
+    check_error("[q + 1]", 1, "unexpected character '[' in the Lagrangian: write ( instead");
+    check_error("(q + 1]", 7, "unexpected character ']' in the Lagrangian: write ) instead");
+    check_error("m = q", 3, "unexpected character '=' in the Lagrangian: a formula is one side only");
+    check_error("1..q", 2,
+                "unexpected character '..' in the Lagrangian: two points stand only in a sum, as in "
+                "sum(i = 1 .. n, formula)");
+    check_error("sin(q, 1)", 6,
+                "unexpected character ',' in the Lagrangian: decimals have a point, and every function one argument");
+}
+
+TEST_CASE("the time needs a declaration") {
+    check_error("q*cos(t)", 7, "the scene declares no time: add the line time = \"t\" before its first [table]");
+    CHECK(parse_with_arrays("x[1]*cos(t)").is_equal(x[0] * cos(t)));
+}
+
+TEST_CASE("what sums write out is bounded") {
+    const std::string message = "the formulas of the scene, their sums written out, have more than 2000000 operations";
+    CHECK(error_of("sum(i = 1 .. 10^9, q)").find(message + " (i = ") != std::string::npos);
+    CHECK(error_of("sum(i = 1 .. 9999, sum(j = 1 .. 9999, 0))").find(message) != std::string::npos);
+    CHECK(parse("sum(i = 1 .. 100000, q)").is_equal(100000 * q));
 }

@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 #include <sys/stat.h>
 
+#include <chrono>
 #include <string>
 
 #include "tests/support.hpp"
@@ -31,15 +32,19 @@ const std::string oscillator =
     "step = 0.1\n"
     "until = 10\n";
 
-std::string with_line(int number, const std::string& replacement) {
+std::string with_line_of(const std::string& scene, int number, const std::string& replacement) {
     std::string text;
     std::size_t begin = 0;
-    for (int line = 1; begin < oscillator.size(); ++line) {
-        const std::size_t end = oscillator.find('\n', begin) + 1;
-        text += line == number ? replacement + "\n" : oscillator.substr(begin, end - begin);
+    for (int line = 1; begin < scene.size(); ++line) {
+        const std::size_t end = scene.find('\n', begin) + 1;
+        text += line == number ? replacement + "\n" : scene.substr(begin, end - begin);
         begin = end;
     }
     return text;
+}
+
+std::string with_line(int number, const std::string& replacement) {
+    return with_line_of(oscillator, number, replacement);
 }
 
 Scene read(const std::string& text) {
@@ -61,13 +66,17 @@ std::string line_of(const std::string& text, int line) {
     return text.substr(begin, text.find('\n', begin) - begin);
 }
 
-// The error of the oscillator with one line replaced: its place, its text, the line and the caret.
-void check_error(int changed, const std::string& replacement, lobatto::Position at, const std::string& message) {
-    const std::string text = with_line(changed, replacement);
+// An error is its place, its text, the line and the caret.
+void check_error_in(const std::string& text, lobatto::Position at, const std::string& message) {
     const std::string line = std::to_string(at.line);
     CHECK(error_of(text) == "some/oscillator.toml:" + line + ":" + std::to_string(at.column) + ": " + message + "\n" +
                                 std::string(3 - line.size(), ' ') + line + " | " + line_of(text, at.line) + "\n    | " +
                                 std::string(static_cast<std::size_t>(at.column - 1), ' ') + "^");
+}
+
+// The oscillator with one line replaced.
+void check_error(int changed, const std::string& replacement, lobatto::Position at, const std::string& message) {
+    check_error_in(with_line(changed, replacement), at, message);
 }
 
 std::string scene_path(const std::string& name) {
@@ -110,26 +119,41 @@ TEST_CASE("the oscillator scene starts with a momentum and steps by a fraction o
     CHECK(abs(scene.evaluate(scene.run.step - Pi / 10, "the step", {1, 1})) < pow(numeric(10), -58));
 }
 
-TEST_CASE("the example and the error of docs/scene_format.md are true") {
+TEST_CASE("the examples and the error of docs/scene_format.md are true") {
     const std::string page = Source::read(std::string(LOBATTO_SOURCE_DIR) + "/docs/scene_format.md").content();
-    const auto block = [&](const std::string& kind) {
-        const std::size_t begin = page.find("```" + kind + "\n") + kind.size() + 4;
+    const auto block = [&](const std::string& kind, int number) {
+        std::size_t begin = 0;
+        for (int k = 0; k < number; ++k) begin = page.find("```" + kind + "\n", begin) + kind.size() + 4;
         return page.substr(begin, page.find("```", begin) - begin);
     };
-    const Scene scene = read(block("toml"));
+    const Scene scene = read(block("toml", 1));
     CHECK(scene.title == "Two masses on springs");
     CHECK(scene.coordinates.size() == 2);
     CHECK(scene.parameters.size() == 3);
     CHECK(scene.constants.size() == 1);
     // ten periods of twenty steps
     CHECK(abs(scene.evaluate(scene.run.until / scene.run.step, "the number of steps") - 200) < pow(numeric(10), -50));
+
+    const Scene chain = read(block("toml", 2));
+    CHECK(chain.coordinates.size() == 32);
+    CHECK(chain.parameters.size() == 6);
+    CHECK(chain.coordinates[0].force.has(chain.time));
+    CHECK_FALSE(chain.coordinates[1].force.has(chain.time));
+    CHECK(chain.method.order() == 4);
+    CHECK(chain.outputs.events.size() == 2);
+    const Scene pendulum = read(block("text", 1) +
+                                "[coordinates]\ntheta1 = { position = 1, velocity = 0 }\n"
+                                "theta2 = { position = 1, velocity = 0 }\n[parameters]\nm = [1, 2]\n"
+                                "l = [1, 2]\ng = 9.81\n[run]\nstep = 1\nuntil = 1\n");
+    const ex v1 = pendulum.coordinates[0].velocity, v2 = pendulum.coordinates[1].velocity;
+    CHECK(pendulum.lagrangian.diff(ex_to<GiNaC::symbol>(v1)).has(v2));
     try {
         lobatto::read_scene(Source("pendulum.toml",
                                    "\n\n\nlagrangian = \"m*q'^2/2 - m*omgea^2*(1 - cos(q))\"\n[coordinates]\n"
                                    "q = { position = 1, velocity = 0 }\n[parameters]\nm = 1\nomega = 1\n"));
         FAIL("read");
     } catch (const InputError& error) {
-        CHECK(error.what() + std::string("\n") == block("text"));
+        CHECK(error.what() + std::string("\n") == block("text", 2));
     }
 }
 
@@ -339,6 +363,273 @@ TEST_CASE("the output of another program can be a scene") {
         CHECK(done.exit_code == 0);
         CHECK(done.err == "");
     }
+}
+
+namespace {
+
+// Two arrays, definitions, forces, the time and all outputs; each mistake changes one line.
+const std::string chain =
+    "lagrangian = \"sum(i = 1 .. n, m[i]*x[i]'^2)/2 - sum(i = 2 .. n, V[i]) - V_ends\"\n"
+    "time = \"t\"\n"
+    "[coordinates]\n"
+    "x = { count = \"n\", position = \"a*sin(pi*i/4)\", velocity = [0, 1, \"2*a\"] }\n"
+    "[parameters]\n"
+    "n = { value = 3, constant = true }\n"
+    "m = { value = [1, 2, \"6/2\"], unit = \"kg\" }\n"
+    "a = 0.5\n"
+    "[definitions]\n"
+    "\"V[i]\" = \"(x[i] - x[i-1])^2/2\"\n"
+    "V_ends = \"x[1]^2/2 + x[n]^2/2\"\n"
+    "[forces]\n"
+    "\"x[i]\" = \"-a*i*x[i]'\"\n"
+    "\"x[n]\" = \"cos(t)\"\n"
+    "[method]\n"
+    "family = \"gauss\"\n"
+    "stages = 2\n"
+    "[run]\n"
+    "step = 0.1\n"
+    "until = 1\n"
+    "[output]\n"
+    "momenta = false\n"
+    "tangent = false\n"
+    "dense = 4\n"
+    "events = [\"x[1] = 0 rising\", \"x[1] = x[2]   falling\", \"t = 1/2\"]\n";
+
+void check_error_of_chain(int changed, const std::string& replacement, lobatto::Position at,
+                          const std::string& message) {
+    check_error_in(with_line_of(chain, changed, replacement), at, message);
+}
+
+}  // namespace
+
+TEST_CASE("a scene with arrays is the scene with its elements written out") {
+    const Scene scene = read(chain);
+    REQUIRE(scene.coordinates.size() == 3);
+    REQUIRE(scene.parameters.size() == 4);
+    const auto x = [&](int i) -> ex { return scene.coordinates.at(static_cast<std::size_t>(i - 1)).position; };
+    const auto v = [&](int i) -> ex { return scene.coordinates.at(static_cast<std::size_t>(i - 1)).velocity; };
+    const ex a = scene.parameters[3].symbol;
+    ex lagrangian = -pow(x(2) - x(1), 2) / 2 - pow(x(3) - x(2), 2) / 2 - pow(x(1), 2) / 2 - pow(x(3), 2) / 2;
+    for (int i = 1; i <= 3; ++i) {
+        const auto& mass = scene.parameters[static_cast<std::size_t>(i - 1)];
+        CHECK(mass.name == "m_" + std::to_string(i));
+        CHECK(mass.written == "m[" + std::to_string(i) + "]");
+        CHECK(mass.unit == "kg");
+        CHECK(mass.value.is_equal(i));
+        const auto& coordinate = scene.coordinates[static_cast<std::size_t>(i - 1)];
+        CHECK(coordinate.name == "x_" + std::to_string(i));
+        CHECK(coordinate.written == "x[" + std::to_string(i) + "]");
+        CHECK(coordinate.velocity.get_name() == "x_" + std::to_string(i) + "'");
+        CHECK(coordinate.force.is_equal(-a * i * v(i) + (i == 3 ? cos(ex(scene.time)) : ex(0))));
+        CHECK(scene.initial_position[static_cast<std::size_t>(i - 1)].is_equal(a * sin(Pi * i / 4)));
+        lagrangian += mass.symbol * pow(v(i), 2) / 2;
+    }
+    CHECK((scene.lagrangian - lagrangian).expand().is_zero());
+    CHECK(scene.initial_rate[2].is_equal(2 * a));
+    CHECK(scene.has_time);
+    CHECK(scene.coordinates[0].force_at.line == 13);
+    CHECK(scene.method.name() == "Gauss, 2 stages");
+    CHECK(scene.method.order() == 4);
+    CHECK_FALSE(scene.outputs.momenta);
+    CHECK_FALSE(scene.outputs.tangent);
+    CHECK(scene.outputs.dense == 4);
+    REQUIRE(scene.outputs.events.size() == 3);
+    CHECK(scene.outputs.events[0].text == "x[1] = 0 rising");
+    CHECK(scene.outputs.events[0].value.is_equal(x(1)));
+    CHECK(scene.outputs.events[0].direction == 1);
+    CHECK(scene.outputs.events[1].text == "x[1] = x[2] falling");
+    CHECK(scene.outputs.events[1].value.is_equal(x(1) - x(2)));
+    CHECK(scene.outputs.events[1].direction == -1);
+    CHECK(scene.outputs.events[2].value.is_equal(scene.time - numeric(1, 2)));
+    CHECK(scene.outputs.events[2].direction == 0);
+}
+
+TEST_CASE("lists, counts and elements that do not fit are refused") {
+    check_error_of_chain(4, "x = { count = 2.5, position = 0, velocity = 0 }", {4, 15},
+                         "count must be a whole number, not 2.5");
+    check_error_of_chain(4, "x = { count = \"a\", position = 0, velocity = 0 }", {4, 16},
+                         "count must be known when the kernel is written: numbers, indices and parameters declared "
+                         "constant");
+    check_error_of_chain(4, "x = { count = 0, position = 0, velocity = 0 }", {4, 15},
+                         "count is 0; at least 1 and at most 4096");
+    check_error_of_chain(4, "x = { count = 4097, position = 0, velocity = 0 }", {4, 15},
+                         "count is 4097; at least 1 and at most 4096");
+    check_error_of_chain(4, "x = { count = 3, position = [1, 2], velocity = 0 }", {4, 29},
+                         "position has 2 values, but x has 3 elements");
+    check_error_of_chain(4, "x = { position = [1, 2], velocity = [0, 0, 0] }", {4, 37},
+                         "velocity has 3 values, but x has 2 elements");
+    check_error_of_chain(4, "x = { position = [], velocity = 0 }", {4, 18}, "the list of position is empty");
+    check_error_of_chain(4, "x = { position = [1, true, 3], velocity = 0 }", {4, 22},
+                         "a list in a scene holds numbers, and formulas in quotes");
+    check_error_of_chain(4, "x = { position = [1, [2], 3], velocity = 0 }", {4, 22},
+                         "a list in a scene holds numbers, and formulas in quotes");
+    check_error_of_chain(4, "x = { position = [1 2, 3], velocity = 0 }", {4, 21}, "a comma is missing before this");
+    check_error_of_chain(7, "m = [1, 2", {8, 1}, "a comma is missing before this");
+    check_error_of_chain(25, "events = [\"t = 1\", ", {25, 10}, "this list is not closed: add a ]");
+    check_error_of_chain(7, "m = [1, 2, 1979-05-27]", {7, 12}, "a date or time: no value of a scene is one");
+    check_error_of_chain(7, "m = [1, 2, \"1/0\"]", {7, 14}, "division by zero in the value of m[3]");
+    check_error_of_chain(7, "m = []", {7, 5}, "the list of m is empty");
+    check_error_of_chain(7, "m = 2", {1, 32}, "m is a parameter, not an array: write m without brackets");
+    check_error_of_chain(4, "x = { count = 2, position = 0, velocity = 0 }", {1, 36},
+                         "there is no x[3]: the array has the elements x[1] to x[2] (i = 3)");
+    check_error_of_chain(4, "x = { count = 3, position = \"1/(i - 2)\", velocity = 0 }", {4, 31},
+                         "division by zero in the initial position of x[i] (i = 2)");
+    check_error_of_chain(4, "x = { count = 3, position = \"1e-200^i\", velocity = 0 }", {4, 29},
+                         "the initial position of x[2] must be 0, or of a size between 1e-300 and 1e300");
+    const std::string array = with_line_of(with_line(1, "lagrangian = \"sum(k = 1 .. 2, m*q[k]'^2)*i\""), 3,
+                                           "q = { count = 2, position = 0.5, velocity = \"i*m\" }");
+    check_error_in(with_line_of(array, 6, "i = 4"), {3, 45},
+                   "in the initial velocity of an array, i is the number of the element; rename what else is called i");
+    check_error(1, "lagrangian = [1]", {1, 14}, "the Lagrangian must be a formula in quotes, not a list");
+    check_error(8, "step = [1]", {8, 8}, "step must be a number or a formula in quotes, not a list");
+}
+
+TEST_CASE("names of elements are taken") {
+    check_error_of_chain(8, "a = 0.5\nx_3 = 1", {4, 1},
+                         "element 3 of x would be called x_3 in the trajectory, and that is a parameter; rename one");
+    check_error_of_chain(4, line_of(chain, 4) + "\nx_3 = { position = 0, velocity = 0 }", {5, 1},
+                         "'x_3' is element 3 of x in the trajectory; rename one");
+    check_error_of_chain(4, line_of(chain, 4) + "\np_x = { position = [0, 0, 0], velocity = 0 }", {5, 1},
+                         "'p_x_1' is the momentum of coordinate x[1] in the trajectory; give the coordinate another "
+                         "name");
+    check_error_of_chain(11, "a = \"x[1]^2\"", {11, 1}, "'a' is both a parameter and a definition; rename one");
+    check_error_of_chain(11, "V = \"x[1]^2\"", {11, 1}, "'V' is declared twice");
+    check_error_of_chain(2, "time = \"a\"", {8, 1}, "'a' is both a time and a parameter; rename one");
+    check_error(5, "sum = 1", {5, 1}, "'sum' is the name of a function; give the parameter another name");
+}
+
+TEST_CASE("the time is declared under the name that formulas give it") {
+    const std::string driven = "lagrangian = \"m*q'^2/2 + k*q*cos(tau)\"\ntime = \"tau\"";
+    CHECK(read(with_line(1, driven)).time.get_name() == "tau");
+    CHECK(read(with_line(1, "time = \"t\"\n" + line_of(oscillator, 1))).has_time);
+    CHECK_FALSE(read(oscillator).has_time);
+    check_error(1, "lagrangian = \"m*q'^2/2 - k*q*cos(t)\"", {1, 34},
+                "the scene declares no time: add the line time = \"t\" before its first [table]");
+    check_error(1, "lagrangian = \"m*q'^2/2 - k*q*cos(t)\"\ntime = \"tau\"", {1, 34},
+                "the time of this scene is called tau");
+    check_error(1, line_of(oscillator, 1) + "\ntime = 3", {2, 8},
+                "time must be a name in quotes, as in time = \"t\", not a whole number");
+    check_error(1, line_of(oscillator, 1) + "\ntime = \"h\"", {2, 8},
+                "'h' is the time step; give the time another name");
+    check_error_of_chain(4, "x = { count = 3, position = \"t\", velocity = 0 }", {4, 30},
+                         "the time t cannot occur in the initial position of x[i]: write it with numbers and "
+                         "parameters");
+}
+
+TEST_CASE("a definition is its formula wherever its name stands, and its prime is the time derivative") {
+    const std::string head = "time = \"t\"\nlagrangian = \"";
+    const std::string rest =
+        "\"\n[coordinates]\nq = { position = \"b\", velocity = 0 }\n[parameters]\na = 2\n[run]\n"
+        "step = \"b/10\"\nuntil = 1\n[definitions]\nb = \"sqrt(a)\"\n";
+    const Scene scene = read(head + "y'^2 + s[3] + q'" + rest +
+                             "y = \"t*sin(q) + b\"\n\"s[i]\" = \"i*q + sum(k = 1 .. i - 1, s[k])\"\n");
+    const ex q = scene.coordinates[0].position, v = scene.coordinates[0].velocity, t = scene.time;
+    const ex a = scene.parameters[0].symbol;
+    CHECK((scene.lagrangian - (pow(sin(q) + t * cos(q) * v, 2) + 7 * q + v)).expand().is_zero());
+    CHECK(scene.initial_position[0].is_equal(sqrt(a)));
+    CHECK(scene.run.step.is_equal(sqrt(a) / 10));
+    const auto error = [&](const std::string& lagrangian, const std::string& definitions) {
+        const std::string text = error_of(head + lagrangian + rest + definitions);
+        return text.substr(0, text.find('\n'));
+    };
+    const std::string at = "some/oscillator.toml:";
+    CHECK(error("y'", "y = \"q'^2\"\n") ==
+          at + "2:15: the definition y holds a velocity, so its time derivative would hold an acceleration");
+    CHECK(error("y + q'", "y = \"z\"\nz = \"2*y\"\n") ==
+          at + "13:8: the definition y needs its own value: definitions must not refer to one another in a circle");
+    CHECK(error("y[1]", "\"y[i]\" = \"y[i+1]\"\n").find("definitions need one another without end here") !=
+          std::string::npos);
+    CHECK(error("q'", "y = 3\n") == at + "12:1: definition y occurs in no formula; use it or remove it");
+    CHECK(error("y*q'", "y = \"1/(a - a)\"\n") == at + "12:7: division by zero in the definition y");
+    CHECK(error("y[2]*q'", "\"y[i]\" = \"1/(i - 2)\"\n") == at + "12:12: division by zero in the definition y (i = 2)");
+    CHECK(error("y[1,2]*q'", "\"y[i]\" = \"i\"\n") == at + "2:16: the definition y is written y[i]");
+    CHECK(error("y*q'", "\"y[i]\" = \"i\"\n") == at + "2:15: the definition y has indices: write y[i]");
+    CHECK(error("y[1]*q'", "y = 2\n") == at + "2:16: y is a definition, not an array: write y without brackets");
+    CHECK(error("y*q'", "\"y[1]\" = 2\n") ==
+          at + "12:4: the indices of a definition are names without another meaning, as in \"r[i,j]\"");
+    CHECK(error("y*q'", "\"y[a]\" = 2\n") ==
+          at + "12:4: the indices of a definition are names without another meaning, as in \"r[i,j]\"");
+    CHECK(error("y*q'", "\"y + 1\" = 2\n") ==
+          at + "12:4: '+' is too much here: a line of [definitions] begins with x = or \"x[i]\" =");
+    CHECK(error("q'", "y[i] = 2\n") ==
+          at + "12:2: not valid TOML: a key with brackets must stand in quotes, as in \"x[i]\" = ...");
+    check_error_of_chain(4, "x = { count = 3, position = \"V_ends\", velocity = 0 }", {4, 30},
+                         "the definition V_ends holds coordinates or the time, which cannot occur in the initial "
+                         "position of x[i]: write it with numbers and parameters (i = 1)");
+}
+
+TEST_CASE("forces act on coordinates") {
+    check_error_of_chain(13, "\"y[i]\" = 1", {13, 2}, "unknown coordinate 'y' in [forces]; coordinates: x.");
+    check_error_of_chain(13, "a = 1", {13, 1}, "unknown coordinate 'a' in [forces]; coordinates: x.");
+    check_error_of_chain(13, "x = 1", {13, 1},
+                         "x is an array: write \"x[i]\" for the force on each of its elements, \"x[1]\" for that on "
+                         "the first");
+    check_error_of_chain(13, "\"x[4]\" = 1", {13, 4}, "there is no x[4]: the array has the elements x[1] to x[3]");
+    check_error_of_chain(13, "\"x[i,j]\" = 1", {13, 6}, "an array has one index: write x[i]");
+    check_error_of_chain(13, "\"x[i]\" = \"x[i-1]\"", {13, 11},
+                         "there is no x[0]: the array has the elements x[1] to x[3] (i = 1)");
+    check_error(9, "until = 1\n[forces]\n\"q[1]\" = 2", {11, 2},
+                "q is a coordinate, not an array: write q without brackets");
+    check_error(9, "until = 1\n[forces]\nqq = 2", {11, 1}, "unknown coordinate 'qq' in [forces]; coordinates: q.");
+    check_error(9, "until = 1\n[forces]\nq = \"-velocity\"", {11, 7},
+                "unknown name 'velocity' in the force on q; declared: k, m, q, q'.");
+    CHECK(read(oscillator).coordinates[0].force.is_zero());
+}
+
+TEST_CASE("the method is Lobatto's or Gauss's") {
+    const auto name = [](const std::string& lines) { return read(oscillator + "[method]\n" + lines).method.name(); };
+    CHECK(name("") == "Lobatto, 4 points");
+    CHECK(name("points = 12") == "Lobatto, 12 points");
+    CHECK(name("family = \"gauss\"") == "Gauss, 3 stages");
+    CHECK(name("family = \"gauss\"\nstages = 1") == "Gauss, 1 stage");
+    check_error(9, "until = 1\n[method]\npoints = 1", {11, 10}, "points is 1; there is Lobatto with 2 to 12 points");
+    check_error(9, "until = 1\n[method]\nstages = 3", {11, 1},
+                "Lobatto has points, not stages: write points = 4, or add family = \"gauss\"");
+    check_error(9, "until = 1\n[method]\nfamily = \"gauss\"\npoints = 3", {12, 1},
+                "Gauss has stages, not points: write stages = 3");
+    check_error(9, "until = 1\n[method]\nfamily = \"gauss\"\nstages = 11", {12, 10},
+                "stages is 11; there is Gauss with 1 to 10 stages");
+}
+
+TEST_CASE("events have two sides and may have a direction") {
+    const auto check = [](const std::string& events, int column, const std::string& message) {
+        check_error(9, "until = 1\n[output]\nevents = " + events, {11, column}, message);
+    };
+    check("\"q = 0\"", 10, "events must be a list such as [\"x = 0 rising\"], not a text");
+    check("[1]", 11, "an event must be a text such as \"x = 0 rising\", not a whole number");
+    check("[\"q\"]", 13, "an event is written x = 0, x = 0 rising or x = y falling");
+    check("[\"q = 0 rise\"]", 18, "missing operator: write 0*rise");
+    check("[\"q = 0 = m\"]", 18, "an event has one =");
+    check("[\"q = 0 rising falling\"]", 25, "missing operator: write rising*falling");
+    check("[\"m = 1\"]", 11, "this event never happens: it holds neither a coordinate nor the time");
+    check("[\"\"]", 12, "the event is empty");
+    check("[\"q = \"]", 16, "the event ends after '=': a number, a name or ( is missing");
+    check_error(9, "until = 1\n[output]\ndense = 101", {11, 9},
+                "dense is 101; 0 to 100 states between two steps are computed");
+    check_error(9, "until = 1\n[output]\ndense = 1\nevery = 2", {11, 1},
+                "dense fills the time between two steps, so all steps are kept: remove every");
+    CHECK(read(oscillator + "[output]\nevents = [\"q' = m falling\", ]").outputs.events[0].direction == -1);
+}
+
+TEST_CASE("a Lagrangian may hold comments, which its text leaves out") {
+    const std::string lagrangian =
+        "lagrangian = '''\nm*q'^2/2   # kinetic\n  # only a comment\n - k*q^2/2 # [potential'''";
+    CHECK(read(with_line(1, lagrangian)).lagrangian_text == "m*q'^2/2 - k*q^2/2");
+}
+
+TEST_CASE("256 masses are read in a few hundredths of a second, 4096 within a second") {
+    const auto seconds = [](const std::string& n) {
+        const std::string text =
+            "lagrangian = \"sum(i = 1 .. n, x[i]'^2)/2 - sum(i = 1 .. n - 1, (x[i+1] - x[i])^2/2 + (x[i+1] - "
+            "x[i])^4/4)\"\n[coordinates]\nx = { count = \"n\", position = \"sin(pi*i/(n+1))\", velocity = 0 }\n"
+            "[parameters]\nn = { value = " +
+            n + ", constant = true }\n[run]\nstep = 1\nuntil = 1\n";
+        const auto begin = std::chrono::steady_clock::now();
+        CHECK(read(text).coordinates.size() == std::stoul(n));
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
+    CHECK(seconds("256") < 0.25);
+    CHECK(seconds("4096") < 4);
 }
 
 TEST_CASE("4096 coordinates and 10000 parameters are read, one more is refused") {

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Repeated terms of a sum: one formula, written once, and the table of what it is applied to.
+//
+// Two terms are the same formula when their graphs, in canonical order, differ only in inputs and constants.
+#include "generator/elements.hpp"
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "generator/graph.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+// What stands at the leaves of one term, in the order of its graph.
+struct Leaves {
+    std::string shape;             // the graph with # for coefficients and the number of the slot for variables
+    std::vector<int> variables;    // by slot
+    std::vector<Id> coefficients;  // constants and parameters, in order
+};
+
+class Shapes {
+public:
+    Shapes(const System& system, const std::vector<GiNaC::symbol>& variables) {
+        for (std::size_t i = 0; i < variables.size(); ++i) input(variables[i], static_cast<int>(i));
+        for (const auto& parameter : system.parameters) input(parameter, coefficient);
+        input(system.t, time);
+    }
+
+    Id convert(const ex& term) { return graph_.from(term, inputs_); }
+
+    Leaves leaves(Id root) const {
+        Leaves result;
+        visit(root, result);
+        return result;
+    }
+
+    // The graph as a formula again, its leaves replaced: slots by x, coefficients one after the other.
+    ex formula(Id root, const std::vector<GiNaC::symbol>& x, const std::vector<ex>& coefficients) const {
+        std::map<int, std::size_t> slots;
+        std::size_t next = 0;
+        return rebuild(root, x, coefficients, slots, next);
+    }
+    ex leaf(Id id) const {
+        return graph_.is_constant(id) ? ex(GiNaC::numeric(graph_.constant_of(id).value))
+                                      : ex(symbols_[static_cast<std::size_t>(graph_[id].index)]);
+    }
+
+private:
+    static constexpr int coefficient = -1, time = -2;
+
+    void input(const GiNaC::symbol& symbol, int meaning) {
+        const std::string name = "x" + std::to_string(symbols_.size());
+        inputs_[symbol] = graph_.input({name, name, Stage::iterate});
+        symbols_.push_back(symbol);
+        meanings_.push_back(meaning);
+    }
+    int meaning(Id id) const {
+        return graph_.is_constant(id) ? coefficient : meanings_[static_cast<std::size_t>(graph_[id].index)];
+    }
+
+    void visit(Id id, Leaves& leaves) const {
+        const Node& node = graph_[id];
+        if (node.op == Op::constant || node.op == Op::input) {
+            const int variable = meaning(id);
+            if (variable == coefficient) {
+                leaves.shape += '#';
+                leaves.coefficients.push_back(id);
+            } else if (variable == time) {
+                leaves.shape += 't';
+            } else {
+                std::size_t slot = 0;
+                while (slot < leaves.variables.size() && leaves.variables[slot] != variable) ++slot;
+                if (slot == leaves.variables.size()) leaves.variables.push_back(variable);
+                leaves.shape += 'x' + std::to_string(slot);
+            }
+            return;
+        }
+        leaves.shape += std::to_string(static_cast<int>(node.op)) + '^' + std::to_string(node.index) + '(';
+        for (const Id operand : node.operands) {
+            visit(operand, leaves);
+            leaves.shape += ',';
+        }
+        leaves.shape += ')';
+    }
+
+    ex rebuild(Id id, const std::vector<GiNaC::symbol>& x, const std::vector<ex>& coefficients,
+               std::map<int, std::size_t>& slots, std::size_t& next) const {
+        const Node& node = graph_[id];
+        if (node.op == Op::constant || node.op == Op::input) {
+            const int variable = meaning(id);
+            if (variable == coefficient) return coefficients[next++];
+            if (variable == time) return symbols_.back();
+            return x[slots.emplace(variable, slots.size()).first->second];
+        }
+        GiNaC::exvector operands;
+        for (const Id operand : node.operands) operands.push_back(rebuild(operand, x, coefficients, slots, next));
+        switch (node.op) {
+            case Op::add:
+                return GiNaC::add(operands);
+            case Op::multiply:
+                return GiNaC::mul(operands);
+            case Op::power:
+                return GiNaC::pow(operands[0], node.index);
+            case Op::raise:
+                return GiNaC::pow(operands[0], operands[1]);
+            case Op::sqrt:
+                return GiNaC::sqrt(operands[0]);
+            case Op::sin:
+                return GiNaC::sin(operands[0]);
+            case Op::cos:
+                return GiNaC::cos(operands[0]);
+            case Op::tan:
+                return GiNaC::tan(operands[0]);
+            case Op::exp:
+                return GiNaC::exp(operands[0]);
+            case Op::log:
+                return GiNaC::log(operands[0]);
+            case Op::sinh:
+                return GiNaC::sinh(operands[0]);
+            case Op::cosh:
+                return GiNaC::cosh(operands[0]);
+            case Op::tanh:
+                return GiNaC::tanh(operands[0]);
+            case Op::asin:
+                return GiNaC::asin(operands[0]);
+            case Op::acos:
+                return GiNaC::acos(operands[0]);
+            case Op::atan:
+                return GiNaC::atan(operands[0]);
+            default:
+                throw std::logic_error("an operation that no formula has");
+        }
+    }
+
+    Graph graph_;
+    GiNaC::exmap inputs_;
+    std::vector<GiNaC::symbol> symbols_;
+    std::vector<int> meanings_;  // variable number, coefficient or time, by input
+};
+
+}  // namespace
+
+Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables, const std::vector<ex>& terms,
+                       const std::vector<std::pair<int, ex>>& forces) {
+    struct Row {
+        Id root;
+        Leaves leaves;
+        std::size_t source;  // in terms, then forces
+    };
+    Shapes shapes(system, variables);
+    std::map<std::string, std::size_t> known;
+    std::vector<std::pair<int, std::vector<Row>>> families;  // target slot, rows; in order of first appearance
+    const auto sort_in = [&](const ex& term, int acted_on, std::size_t source) {
+        const Id root = shapes.convert(term);
+        Leaves leaves = shapes.leaves(root);
+        int target = -1;
+        if (acted_on >= 0) {
+            target = 0;
+            const auto count = static_cast<int>(leaves.variables.size());
+            while (target < count && leaves.variables[static_cast<std::size_t>(target)] != acted_on) ++target;
+            if (target == count) leaves.variables.push_back(acted_on);
+        }
+        const std::string key = std::to_string(target) + ":" + leaves.shape;
+        const auto [place, is_new] = known.emplace(key, families.size());
+        if (is_new) families.push_back({target, {}});
+        families[place->second].second.push_back({root, std::move(leaves), source});
+    };
+    for (std::size_t i = 0; i < terms.size(); ++i) sort_in(terms[i], -1, i);
+    for (std::size_t i = 0; i < forces.size(); ++i) sort_in(forces[i].second, forces[i].first, terms.size() + i);
+
+    Elements result;
+    for (const auto& [target, rows] : families) {
+        if (rows.size() < fewest_rows) {
+            for (const Row& row : rows) {
+                if (row.source < terms.size())
+                    result.others.push_back(terms[row.source]);
+                else
+                    result.other_forces.push_back(forces[row.source - terms.size()]);
+            }
+            continue;
+        }
+        Element element;
+        element.target = target;
+        const Leaves& first = rows.front().leaves;
+        for (std::size_t j = 0; j < first.variables.size(); ++j) element.x.emplace_back("x" + std::to_string(j));
+        std::vector<ex> coefficients;
+        std::vector<std::size_t> varying;
+        for (std::size_t j = 0; j < first.coefficients.size(); ++j) {
+            bool same = true;
+            for (const Row& row : rows) same = same && row.leaves.coefficients[j] == first.coefficients[j];
+            if (same) {
+                coefficients.push_back(shapes.leaf(first.coefficients[j]));
+            } else {
+                element.a.emplace_back("a" + std::to_string(element.a.size()));
+                coefficients.push_back(element.a.back());
+                varying.push_back(j);
+            }
+        }
+        element.term = shapes.formula(rows.front().root, element.x, coefficients);
+        for (const Row& row : rows) {
+            element.rows.push_back(row.leaves.variables);
+            element.coefficients.emplace_back();
+            for (const std::size_t j : varying)
+                element.coefficients.back().push_back(shapes.leaf(row.leaves.coefficients[j]));
+        }
+        // Two formulas of the same variables, row by row, are one.
+        const auto twin = std::find_if(result.repeated.begin(), result.repeated.end(), [&](const Element& other) {
+            return target < 0 && other.target < 0 && other.rows == element.rows;
+        });
+        if (twin == result.repeated.end()) {
+            result.repeated.push_back(std::move(element));
+            continue;
+        }
+        GiNaC::exmap renamed;
+        for (std::size_t j = 0; j < element.x.size(); ++j) renamed[element.x[j]] = twin->x[j];
+        for (const auto& symbol : element.a) {
+            twin->a.emplace_back("a" + std::to_string(twin->a.size()));
+            renamed[symbol] = twin->a.back();
+        }
+        twin->term += element.term.subs(renamed, GiNaC::subs_options::no_pattern);
+        for (std::size_t r = 0; r < element.rows.size(); ++r)
+            twin->coefficients[r].insert(twin->coefficients[r].end(), element.coefficients[r].begin(),
+                                         element.coefficients[r].end());
+    }
+    return result;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Repeated terms of a sum: one formula, written once, and the table of what it is applied to.
+#pragma once
+
+#include <ginac/ginac.h>
+
+#include <vector>
+
+#include "generator/system.hpp"
+
+namespace lobatto {
+
+// T(x; a), the same for every row; x_j stands for variable rows[r][j], a_j for coefficients[r][j].
+struct Element {
+    std::vector<GiNaC::symbol> x, a;
+    GiNaC::ex term;                      // in x, a, time and run-time parameters that are the same in all rows
+    std::vector<std::vector<int>> rows;  // rows x |x|: which variable
+    std::vector<std::vector<GiNaC::ex>> coefficients;  // rows x |a|: a number or a parameter
+    int target = -1;  // -1: the rows are terms of a potential; else: of the force on the variable x[target]
+};
+
+struct Elements {
+    std::vector<Element> repeated;                        // of at least `fewest_rows` rows
+    std::vector<GiNaC::ex> others;                        // terms that repeat too seldom
+    std::vector<std::pair<int, GiNaC::ex>> other_forces;  // likewise: variable acted on, term
+};
+
+constexpr std::size_t fewest_rows = 8;
+
+// The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
+Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,
+                       const std::vector<GiNaC::ex>& terms, const std::vector<std::pair<int, GiNaC::ex>>& forces);
+
+}  // namespace lobatto

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The functions of a kernel: how each is declared and what its comment says.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "generator/structure.hpp"
+
+namespace lobatto {
+
+// The parameters are named as the programs' inputs are; `time` is added where a kernel depends on it.
+struct Declaration {
+    const char* program;
+    const char* comment;
+    const char* result;
+    std::vector<std::pair<const char*, const char*>> parameters;  // type, name
+    bool takes_time = false;
+};
+
+const std::vector<Declaration>& declarations(Form form);
+
+// A struct cannot have the name of one of its members.
+bool is_member_name(const std::string& name);
+
+}  // namespace lobatto

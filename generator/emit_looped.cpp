@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Kernels with loops over repeated terms: their tables and the bodies of their functions.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/emit_tables.hpp"
+#include "generator/looped.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::string element_name(std::size_t number) {
+    return fmt::format("element_{}", number + 1);
+}
+
+std::string indented(const std::string& lines) {
+    std::string text;
+    std::size_t begin = 0;
+    while (begin < lines.size()) {
+        const std::size_t end = lines.find('\n', begin) + 1;
+        text += "    " + lines.substr(begin, end - begin);
+        begin = end;
+    }
+    return text;
+}
+
+const char* const over_coordinates = "        for (int i = 0; i < coordinates; ++i) ";
+
+}  // namespace
+
+LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, Precision precision, Naming names)
+    : d_(derivation),
+      p_(programs),
+      precision_(precision),
+      names_(std::move(names)),
+      general_(derivation.structure.form == Form::general) {}
+
+const Program& LoopedText::program(const std::string& name) const {
+    return *std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
+}
+
+std::string LoopedText::tables() const {
+    std::string text;
+    const auto& entries = d_.structure.entries;
+    std::map<std::pair<int, int>, int> place;
+    if (general_) {
+        for (const auto& [entry, value] : d_.structure.routhian.second.entries())
+            place.emplace(entry, static_cast<int>(place.size()));
+    } else {
+        for (const auto& entry : entries) place.emplace(entry, static_cast<int>(place.size()));
+    }
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        const std::string name = element_name(number);
+        std::vector<int> variables, positions;
+        const auto pairs = pairs_of(element);
+        for (const auto& row : element.rows) {
+            variables.insert(variables.end(), row.begin(), row.end());
+            for (const auto& [i, j] : pairs) positions.push_back(place.at({row[i], row[j]}));
+        }
+        text += wrapped(fmt::format("    // {} = {} for {} rows of x (numbers in {}): which ones, and which entries of "
+                                    "the second derivatives they add to.",
+                                    name, canonical_text(element.term), element.rows.size(), general_ ? "z" : "q"),
+                        "    //     ");
+        text += integer_table(name + "_x", variables) + integer_table(name + "_entry", positions);
+        if (!element.a.empty() && !has_parameters(element)) {
+            std::vector<GiNaC::ex> values;
+            for (const auto& row : element.coefficients) values.insert(values.end(), row.begin(), row.end());
+            text += number_table(name + "_a", values, precision_);
+        }
+    }
+    if (general_) {
+        std::vector<int> from;
+        for (const auto& [entry, value] : d_.system.momentum_v.entries()) from.push_back(place.at(entry));
+        text += "    // Where in H the entries of M stand.\n" + integer_table("mass_from", from);
+    }
+    return text;
+}
+
+std::string LoopedText::fields() const {
+    std::string text;
+    if (!general_) text += "        real mass[coordinates], inverse_mass[coordinates];\n";
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        if (!element.a.empty() && has_parameters(element))
+            text +=
+                fmt::format("        real {}_a[{}];\n", element_name(number), element.rows.size() * element.a.size());
+    }
+    return text;
+}
+
+std::vector<Statement> LoopedText::prepared() const {
+    std::vector<Statement> result;
+    const auto append = [&](const std::string& name) {
+        const std::vector<Output>& outputs = program(name).outputs;
+        const bool one = outputs.size() == 1 && d_.system.n > 1;
+        for (std::size_t i = 0; i < outputs.size(); ++i)
+            result.push_back({one ? "const real every_" + name : fmt::format("k.{}[{}]", name, i), outputs[i].value});
+    };
+    if (!general_) {
+        append("mass");
+        append("inverse_mass");
+    }
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number)
+        append(element_name(number) + "_a");
+    return result;
+}
+
+std::string LoopedText::after_prepare() const {
+    std::string text;
+    if (general_) return text;
+    for (const char* name : {"mass", "inverse_mass"})
+        if (program(name).outputs.size() == 1 && d_.system.n > 1)
+            text += fmt::format("{}k.{}[i] = every_{};\n", over_coordinates, name, name);
+    return text +
+           "        for (const real& inverse : k.inverse_mass)\n"
+           "            if (!lobatto::is_finite(inverse)) return Status::singular_mass;\n";
+}
+
+std::string LoopedText::statements(const std::string& name, const std::string& indent) const {
+    std::vector<Statement> list;
+    for (const Output& output : program(name).outputs) list.push_back({output.target, output.value});
+    const std::string lines = FunctionText(p_, list, names_, precision_, Stage::step_size).lines();
+    return indent.empty() ? lines : indented(lines);
+}
+
+// The rows of all elements, for the programs of one part: "node", "slope", "energy".
+std::string LoopedText::loops(const std::string& part, const char* variables) const {
+    std::string text;
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        const std::string name = element_name(number);
+        const bool exists = std::any_of(p_.programs.begin(), p_.programs.end(),
+                                        [&](const Program& p) { return p.name == name + "_" + part; });
+        if (!exists || program(name + "_" + part).outputs.empty()) continue;
+        const std::string inside = statements(name + "_" + part, "    ");
+        std::string begin;
+        for (std::size_t j = 0; j < element.x.size(); ++j) {
+            const std::string index = fmt::format("i{}", j), value = fmt::format("x{}", j);
+            const std::string place = fmt::format("{}_x[r * {} + {}]", name, element.x.size(), j);
+            if (mentions(inside, index)) begin += fmt::format("            const int {} = {};\n", index, place);
+            if (mentions(inside, value))
+                begin += fmt::format("            const real {} = {}[{}];\n", value, variables,
+                                     mentions(inside, index) ? index : place);
+        }
+        for (std::size_t j = 0; j < element.a.size(); ++j) {
+            const std::string value = fmt::format("a{}", j);
+            if (mentions(inside, value))
+                begin += fmt::format("            const real {} = {}{}_a[r * {} + {}];\n", value,
+                                     has_parameters(element) ? "k." : "", name, element.a.size(), j);
+        }
+        text += fmt::format("        for (int r = 0; r < {}; ++r) {{  // {}\n{}{}        }}\n", element.rows.size(),
+                            name, begin, inside);
+    }
+    return text;
+}
+
+std::string LoopedText::body(const std::string& function) const {
+    const std::string coordinates = over_coordinates;
+    const std::string clear_entries = "        for (int e = 0; e < entries; ++e) ";
+    const std::string time = d_.system.autonomous ? "" : "time, ";
+    if (!general_) {
+        const std::string clear = coordinates + "W[i] = real(0);\n",
+                          scale = coordinates + "W[i] *= k.inverse_mass[i];\n";
+        if (function == "node")
+            return clear + clear_entries + "S[e] = real(0);\n" + statements("rest_node", "") + loops("node", "q") +
+                   scale + clear_entries + "S[e] *= k.inverse_mass[entry_row[e]];\n";
+        if (function == "acceleration") return clear + statements("rest_slope", "") + loops("slope", "q") + scale;
+        if (function == "quadratic_part")
+            return !d_.structure.absorbed
+                       ? ""
+                       : clear_entries + "S0[e] = real(0);\n" + statements("rest_quadratic", "") +
+                             loops("quadratic", "q") + clear_entries + "S0[e] *= k.inverse_mass[entry_row[e]];\n";
+        if (function == "energy" && d_.scene.outputs.energy)
+            return "        real sum = real(0);\n" + coordinates +
+                   "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + statements("rest_energy", "") +
+                   loops("energy", "q") + "        return sum;\n";
+        if (function == "momentum") return coordinates + "p[i] = k.mass[i] * velocity[i];\n";
+        if (function == "velocity") return coordinates + "velocity[i] = k.inverse_mass[i] * p[i];\n";
+        return "";
+    }
+    const std::string clear = "        for (int i = 0; i < 2 * coordinates; ++i) g[i] = real(0);\n";
+    const std::string join = "        real z[2 * coordinates];\n" + coordinates + "z[i] = velocity[i];\n" +
+                             coordinates + "z[coordinates + i] = q[i];\n";
+    const std::string slope = join + "        real g[2 * coordinates];\n        slope(k, " + time + "z, g);\n";
+    if (function == "node")
+        return clear + clear_entries + "H[e] = real(0);\n" + statements("rest_node", "") + loops("node", "z");
+    if (function == "slope") return clear + statements("rest_slope", "") + loops("slope", "z");
+    if (function == "slopes")
+        return slope + coordinates + "Lv[i] = g[i];\n" + coordinates + "Lq[i] = g[coordinates + i];\n";
+    if (function == "momentum") return slope + coordinates + "p[i] = g[i];\n";
+    if (function == "legendre")
+        return join + "        real g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
+               coordinates + "p[i] = g[i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
+    if (function == "energy" && d_.scene.outputs.energy)
+        return join + "        real sum = real(0);\n" + statements("rest_energy", "") + loops("energy", "z") +
+               "        return sum;\n";
+    return "";
+}
+
+}  // namespace lobatto
