@@ -1,15 +1,25 @@
 # Writes the texts of the kernel support headers into one C++ file, so that the program needs no source tree to compile kernels.
-set(text "// Written by embed_support.cmake. The texts of runtime/kernel.hpp, kernel_abi.h and kernel_export.hpp.\n")
-string(APPEND text "#include \"cli/support_text.hpp\"\n\nnamespace lobatto {\n\n")
-foreach(name kernel.hpp kernel_abi.h kernel_export.hpp)
+# The parts of kernel.hpp are joined in this order, each without its includes of the others.
+set(parts kernel_numbers.hpp kernel_contract.hpp kernel_solve.hpp kernel_linear.hpp kernel_separable.hpp kernel_general.hpp
+    kernel_events.hpp)
+set(kernel_hpp)
+foreach(name ${parts})
     file(READ ${SOURCE_DIR}/runtime/${name} content)
-    string(REPLACE "." "_" identifier ${name})
+    string(REGEX REPLACE "#include \"kernel_[a-z]+.hpp\"\n" "" content "${content}")
+    string(APPEND kernel_hpp "${content}")
+endforeach()
+file(READ ${SOURCE_DIR}/runtime/kernel_abi.h kernel_abi_h)
+file(READ ${SOURCE_DIR}/runtime/kernel_export.hpp kernel_export_hpp)
+
+set(text "// Written by embed_support.cmake. The texts of runtime/kernel.hpp with its parts, kernel_abi.h and kernel_export.hpp.\n")
+string(APPEND text "#include \"cli/support_text.hpp\"\n\nnamespace lobatto {\n\n")
+foreach(identifier kernel_hpp kernel_abi_h kernel_export_hpp)
     # A string literal may hold 65,536 characters at least; pieces of 8,000 stay below every compiler's limit.
-    string(LENGTH "${content}" length)
+    string(LENGTH "${${identifier}}" length)
     string(APPEND text "const std::string ${identifier}_text = std::string()")
     set(begin 0)
     while(begin LESS length)
-        string(SUBSTRING "${content}" ${begin} 8000 piece)
+        string(SUBSTRING "${${identifier}}" ${begin} 8000 piece)
         string(APPEND text " + R\"~~~(${piece})~~~\"")
         math(EXPR begin "${begin} + 8000")
     endwhile()

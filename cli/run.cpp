@@ -110,7 +110,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     TrajectoryResult none;
     none.status = stepper.prepare(request.parameters, request.step);
     if (none.status == LOBATTO_OK) {
-        if (from_velocity) request.p = stepper.momentum(request.q, request.p);
+        if (from_velocity) request.p = stepper.momentum(request.time, request.q, request.p);
         none.status = stepper.start(request.time, request.q, request.p);
     }
     none.q = request.q;
@@ -161,11 +161,11 @@ void print_table(const LoadedStepper<double>& stepper, const TrajectoryRequest& 
     const double steps = static_cast<double>(result.steps_done);
     const lobatto_kernel& kernel = stepper.kernel().table();
     print_row("time per step", duration(result.seconds / steps));
-    print_row("Newton iterations", kernel.linear          ? "none: the step is a linear map"
-                                   : kernel.unknowns == 0 ? "none: the step is explicit"
-                                                          : fmt::format("{:.2f} per step, at most {}",
-                                                                        static_cast<double>(result.iterations) / steps,
-                                                                        result.iterations_most));
+    print_row("Newton iterations", kernel.form == LOBATTO_LINEAR_MAP ? "none: the step is a linear map"
+                                   : kernel.unknowns == 0            ? "none: the step is explicit"
+                                                                     : fmt::format("{:.2f} per step, at most {}",
+                                                                                   static_cast<double>(result.iterations) / steps,
+                                                                                   result.iterations_most));
     const double H0 = std::fabs(result.energy_start);
     print_row("energy error",
               fmt::format("{:.2g} at most{}", result.energy_error_largest,
@@ -212,7 +212,9 @@ void run(const RunOptions& options) {
     }
 
     TrajectoryFile file(path, header_of(scene, source, request));
-    Watch watch(scene, derivation.structure, stepper, stepper.velocity(request.q, request.p));
+    std::vector<double> velocity;
+    stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
+    Watch watch(scene, derivation.structure, stepper, velocity);
     std::int64_t states = 0;
     request.sink = [&](const Records& records) {
         file.write(records);

@@ -6,7 +6,7 @@
 
 namespace lobatto {
 
-extern const std::string kernel_hpp_text;         // runtime/kernel.hpp
+extern const std::string kernel_hpp_text;         // runtime/kernel.hpp with the parts that it includes, as one file
 extern const std::string kernel_abi_h_text;       // runtime/kernel_abi.h
 extern const std::string kernel_export_hpp_text;  // runtime/kernel_export.hpp
 

@@ -96,7 +96,7 @@ Start<real> start_in(const Start60& start, const Kernel& kernel, const Convert& 
         throw ComputationError(status == LOBATTO_SINGULAR_MASS
                                    ? "the mass matrix has no inverse for the scene's parameters"
                                    : "the kernel's coefficients are not finite for the scene's parameters and step");
-    if (start.from_velocity) result.p = stepper.momentum(result.q, result.p);
+    if (start.from_velocity) result.p = stepper.momentum(real(0), result.q, result.p);
     return result;
 }
 

@@ -21,12 +21,18 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "c3f5675c0b37c51a";
+    static constexpr const char* digest = "27ad36bb45a2a696";
+    static constexpr const char* method = "Lobatto, 4 points";
     static constexpr int coordinates = 1;       // n
     static constexpr int points = 4;            // s, nodes of a step, both ends included
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 0;          // N = n (s - 2) of the stage equations; 0: none to solve
-    static constexpr bool linear = true;        // the step is an affine map
+    static constexpr Form form = Form::linear_map;  // the step is an affine map
+    static constexpr bool autonomous = true;    // no formula depends on time
+    static constexpr bool linear = true;        // the second derivatives are constant
+    static constexpr bool has_energy = true;    // energy() is compiled
+    static constexpr bool has_tangent = true;   // tangent maps are compiled
+    static constexpr int events = 0;            // event functions
     static constexpr int parameter_count = 2;   // in the order of the scene
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};

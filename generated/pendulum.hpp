@@ -20,12 +20,19 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "3bb6564a92d1a2ca";
+    static constexpr const char* digest = "cbaa555633da7d9d";
+    static constexpr const char* method = "Lobatto, 4 points";
     static constexpr int coordinates = 1;       // n
     static constexpr int points = 4;            // s, nodes of a step, both ends included
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 2;          // N = n (s - 2) of the stage equations; 0: none to solve
-    static constexpr bool linear = false;       // the step is an affine map
+    static constexpr Form form = Form::separable;  // only interior nodes are implicit
+    static constexpr bool autonomous = true;    // no formula depends on time
+    static constexpr bool linear = false;       // the second derivatives are constant
+    static constexpr bool has_energy = true;    // energy() is compiled
+    static constexpr bool has_tangent = true;   // tangent maps are compiled
+    static constexpr bool unrolled = true;      // the stage functions are written out below
+    static constexpr int events = 0;            // event functions
     static constexpr int parameter_count = 2;   // in the order of the scene
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};

@@ -13,7 +13,7 @@ template <class real>
 real symplectic_defect(const LoadedStepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p) {
     const std::size_t n = q.size(), rows = 2 * n;
     std::vector<real> q1, p1, T;
-    if (stepper.tangent(q, p, q1, p1, T) != LOBATTO_OK)
+    if (stepper.tangent(0, q, p, q1, p1, T) != LOBATTO_OK)
         throw ComputationError("the symplectic defect cannot be measured: the step from this state fails");
     const auto size = [](real x) { return x < real(0) ? -x : x; };
     real defect = 0, squares = 0;
@@ -46,11 +46,11 @@ double DiscreteEnergy::operator()(const double* q, const double* p) const {
 }
 
 std::optional<DiscreteEnergy> discrete_energy(const LoadedStepper<double>& stepper) {
-    if (!stepper.kernel()->linear) return std::nullopt;
+    if (stepper.kernel()->form != LOBATTO_LINEAR_MAP) return std::nullopt;
     const int n = stepper.kernel()->coordinates;
     const std::vector<double> zero(static_cast<std::size_t>(n), 0.0);
     std::vector<double> q1, p1, T;
-    if (stepper.tangent(zero, zero, q1, p1, T) != LOBATTO_OK) return std::nullopt;
+    if (stepper.tangent(0, zero, zero, q1, p1, T) != LOBATTO_OK) return std::nullopt;
     using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Matrix Phi = Eigen::Map<const Matrix>(T.data(), 2 * n, 2 * n);
     Eigen::VectorXd shift(2 * n);  // the image of zero

@@ -3,13 +3,15 @@
  *
  * Conventions
  *   real      the kernel's number type, named by real_kind; every `void*` to numbers points to arrays of it.
- *   n         coordinates; s points of the quadrature; N = n (s - 2) interior unknowns (0 for a linear system).
- *   q, p      position and momentum, n each, in the units of the scene.
- *   u         momentum in velocity units, u = M^-1 p; the kernel's own state is (q, u).
+ *   n         coordinates; N unknowns of the equations that one step solves (0: none).
+ *   q, p      position and momentum, n each, in the units of the scene. Every function of a state takes its time too.
  *   matrices  row-major.
- *   nodes     node-major: Q[i * n + k] is coordinate k at interior node i + 2, i = 0 ... s - 3 (the paper's q_xi,
- * q_{1-xi} for s = 4). Every function that can fail returns a lobatto_status and leaves the state of the last good step
- * untouched. No function allocates, locks, prints or keeps a pointer it was given.
+ *   X         unknowns, node-major, N. Form separable: X[i * n + k] is coordinate k at interior node i + 2 (the paper's
+ *             q_xi, q_{1-xi} for four points). Form general: X[j * n_a + a] is the active coordinate a at control point
+ *             j + 1, the last of which is the end of the step; then kappa of every cyclic coordinate.
+ * Every function that can fail returns a lobatto_status and leaves the state of the last good step untouched. No
+ * function allocates, locks, prints or keeps a pointer it was given. A stepper may keep its work arrays in its memory:
+ * do not use one from two threads, not even through `const void*`.
  */
 #ifndef LOBATTO_KERNEL_ABI_H
 #define LOBATTO_KERNEL_ABI_H
@@ -20,15 +22,16 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 1u
+#define LOBATTO_ABI_VERSION 2u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
-    LOBATTO_NOT_CONVERGED = 1,     /* the stage equations were not solved within the iteration limit */
+    LOBATTO_NOT_CONVERGED = 1,     /* the equations of the step, or of a velocity, were not solved */
     LOBATTO_NOT_FINITE = 2,        /* a value overflowed or became not-a-number */
-    LOBATTO_SINGULAR_JACOBIAN = 3, /* the Jacobian of the stage equations has no inverse */
-    LOBATTO_SINGULAR_MASS = 4,     /* the mass matrix has no inverse for these parameters */
-    LOBATTO_TIME_STANDS_STILL = 5  /* t + h equals t in this precision */
+    LOBATTO_SINGULAR_JACOBIAN = 3, /* the Jacobian of the step's equations has no inverse */
+    LOBATTO_SINGULAR_MASS = 4,     /* the mass matrix has no inverse for these parameters or at this state */
+    LOBATTO_TIME_STANDS_STILL = 5, /* t + h equals t in this precision */
+    LOBATTO_UNSUPPORTED = 6        /* the kernel was compiled without this */
 } lobatto_status;
 
 typedef enum lobatto_real {
@@ -38,20 +41,30 @@ typedef enum lobatto_real {
     LOBATTO_FLOAT128 = 3
 } lobatto_real;
 
+typedef enum lobatto_form {
+    LOBATTO_LINEAR_MAP = 0, /* the step is an affine map */
+    LOBATTO_SEPARABLE = 1,  /* constant mass, forces without velocities: only interior nodes are implicit */
+    LOBATTO_GENERAL = 2
+} lobatto_form;
+
 /* One call of `advance`: the step loop runs inside the kernel. */
 typedef struct lobatto_advance {
     /* in */
     int64_t steps;        /* steps to take, >= 0 */
     int64_t record_every; /* write a record after each step whose index is a multiple of this; 0: no records */
     void* records;        /* room for the records: rows of 1 + 2n reals, t, q[n], p[n] */
-    int64_t capacity;     /* rows that fit; when full, `advance` returns early with LOBATTO_OK */
+    int64_t capacity;     /* rows that fit, at least dense + 1; when full, `advance` returns early with LOBATTO_OK */
+    void* events; /* room for events: rows of 2 + 2n reals, event number, t, q[n], p[n]; null: none are sought */
+    int64_t event_capacity; /* rows that fit, at least events_of_step; when fewer are left, `advance` returns early */
+    int32_t dense;          /* rows between two steps before each record, equally spaced; needs record_every = 1 */
     /* out */
+    int32_t status;           /* the same value that `advance` returns */
     int64_t steps_done;       /* good steps of this call */
     int64_t records_written;  /* rows of this call */
-    int64_t iterations;       /* Newton iterations of this call, in all */
+    int64_t events_written;   /* rows of this call */
+    int64_t iterations;       /* iterations of this call, in all */
     int32_t iterations_most;  /* and the most of one step */
-    int32_t status;           /* the same value that `advance` returns */
-    double increment_largest; /* largest last Newton increment of a good step, relative to the unknowns */
+    double increment_largest; /* largest last increment of a good step, relative to the unknowns */
     double increment_failed;  /* the relative increment at which a failed step stopped */
 } lobatto_advance;
 
@@ -60,14 +73,22 @@ typedef struct lobatto_kernel {
     uint32_t bytes;       /* sizeof(lobatto_kernel) */
     const char* name;     /* of the scene: a C identifier */
     const char* digest;   /* of the emitted text: 16 hexadecimal digits */
+    const char* method;   /* "Lobatto, 4 points" */
     int32_t real_kind;    /* lobatto_real */
     int32_t real_bytes;
-    int32_t coordinates; /* n */
-    int32_t parameters;  /* run-time parameters, in the order of the scene */
-    int32_t points;      /* s */
-    int32_t order;       /* of accuracy, in h */
-    int32_t unknowns;    /* N; 0: no equations to solve (linear system, or s = 2) */
-    int32_t linear;      /* 1: the step is an affine map, propagated without iteration */
+    int32_t form;           /* lobatto_form */
+    int32_t coordinates;    /* n */
+    int32_t parameters;     /* run-time parameters, in the order of the scene */
+    int32_t nodes;          /* of the quadrature, both ends included where they are nodes */
+    int32_t order;          /* of accuracy, in h */
+    int32_t unknowns;       /* N; 0: no equations to solve */
+    int32_t autonomous;     /* 1: no formula depends on time */
+    int32_t linear;         /* 1: the equations of motion are linear */
+    int32_t has_energy;     /* 0: `energy` is unsupported */
+    int32_t has_tangent;    /* 0: `tangent` is unsupported */
+    int32_t has_dense;      /* 0: `dense` is unsupported, in `advance` too */
+    int32_t events;         /* event functions */
+    int32_t events_of_step; /* the most event rows of one step */
     int32_t stepper_bytes;
     int32_t stepper_alignment;
 
@@ -78,17 +99,23 @@ typedef struct lobatto_kernel {
                      const void* p); /* forgets what earlier steps left */
     int32_t (*advance)(void* stepper, lobatto_advance* call);
     void (*state)(const void* stepper, void* time, void* q, void* p);
+    /* Position and velocity at t + theta h inside the last step, on its polynomial. */
+    int32_t (*dense)(const void* stepper, const void* theta, void* q, void* velocity);
 
     /* Pieces, for tests and diagnostics. All after `prepare`; none changes the state. */
-    void (*energy)(const void* stepper, const void* q, const void* p, void* energy);     /* H(q, p), 1 */
-    void (*momentum)(const void* stepper, const void* q, const void* velocity, void* p); /* p = dL/dq', n */
-    void (*velocity)(const void* stepper, const void* q, const void* p, void* velocity); /* its inverse, n */
-    void (*acceleration)(const void* stepper, const void* q, void* W,
-                         void* S); /* W = M^-1 grad V, n; S = M^-1 V'', n x n */
-    void (*residual)(const void* stepper, const void* q, const void* p, const void* Q,
-                     void* F);                                     /* stage equations at Q, N */
-    void (*jacobian)(const void* stepper, const void* Q, void* J); /* dF/dQ, N x N */
-    int32_t (*tangent)(const void* stepper, const void* q, const void* p, void* q1, void* p1,
+    int32_t (*energy)(const void* stepper, const void* time, const void* q, const void* p,
+                      void* energy); /* H(t, q, p), 1 */
+    void (*momentum)(const void* stepper, const void* time, const void* q, const void* velocity,
+                     void* p); /* p = dL/dq', n */
+    int32_t (*velocity)(const void* stepper, const void* time, const void* q, const void* p,
+                        void* velocity); /* its inverse, n */
+    void (*slopes)(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv,
+                   void* Lq); /* dL/dq' and dL/dq + forces, n each */
+    int32_t (*residual)(const void* stepper, const void* time, const void* q, const void* p, const void* X,
+                        void* F); /* the step's equations at X, N */
+    int32_t (*jacobian)(const void* stepper, const void* time, const void* q, const void* p, const void* X,
+                        void* J); /* dF/dX, N x N */
+    int32_t (*tangent)(const void* stepper, const void* time, const void* q, const void* p, void* q1, void* p1,
                        void* T); /* one step from (q, p)
 and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
 } lobatto_kernel;

@@ -14,6 +14,7 @@ struct Export {
     using real = typename K::real;
     using S = Stepper<K>;
     static constexpr int n = K::coordinates;
+    static constexpr bool has_dense = K::form != Form::linear_map;
 
     static const S& of(const void* stepper) { return *static_cast<const S*>(stepper); }
     static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
@@ -31,38 +32,60 @@ struct Export {
     }
 
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
-        S local = of(stepper);  // a local copy: the optimiser may keep it in registers
-        call->steps_done = call->records_written = call->iterations = 0;
+        call->steps_done = call->records_written = call->events_written = call->iterations = 0;
         call->iterations_most = 0;
         call->increment_largest = call->increment_failed = 0.0;
-        Status status = Status::ok;
-        std::int64_t until_record = call->record_every > 0 ? call->record_every - local.steps % call->record_every : -1;
-        for (std::int64_t i = 0; i < call->steps; ++i) {
-            if (until_record == 1 && call->records_written == call->capacity) break;
-            status = local.step();
-            if (status != Status::ok) {
-                call->increment_failed = static_cast<double>(local.increment);
-                break;
+        if ((call->dense > 0 && (!has_dense || call->record_every != 1)) || (call->events != nullptr && K::events == 0))
+            return call->status = LOBATTO_UNSUPPORTED;
+        if constexpr (sizeof(S) <= 4096) {
+            S local = of(stepper);  // a local copy: the optimiser may keep it in registers
+            const Status status = advance_in(local, *call);
+            *static_cast<S*>(stepper) = local;
+            return call->status = code(status);
+        } else {
+            return call->status = code(advance_in(*static_cast<S*>(stepper), *call));
+        }
+    }
+
+    static Status advance_in(S& stepper, lobatto_advance& call) {
+        std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
+        for (std::int64_t i = 0; i < call.steps; ++i) {
+            if (until_record == 1 && call.records_written + call.dense >= call.capacity) break;
+            if constexpr (K::events > 0) {
+                if (call.events != nullptr && call.events_written + Events<K>::most > call.event_capacity) break;
             }
-            ++call->steps_done;
-            if constexpr (K::unknowns > 0 && !K::linear) {
-                call->iterations += local.iterations;
-                if (local.iterations > call->iterations_most) call->iterations_most = local.iterations;
-                if (static_cast<double>(local.increment) > call->increment_largest)
-                    call->increment_largest = static_cast<double>(local.increment);
+            const Status status = stepper.step();
+            if (status != Status::ok) {
+                call.increment_failed = static_cast<double>(stepper.increment);
+                return status;
+            }
+            ++call.steps_done;
+            if constexpr (S::N > 0) {
+                call.iterations += stepper.iterations;
+                if (stepper.iterations > call.iterations_most) call.iterations_most = stepper.iterations;
+                if (static_cast<double>(stepper.increment) > call.increment_largest)
+                    call.increment_largest = static_cast<double>(stepper.increment);
+            }
+            if constexpr (K::events > 0) {
+                if (call.events != nullptr)
+                    call.events_written +=
+                        Events<K>::look(stepper, out(call.events) + call.events_written * Events<K>::columns);
             }
             if (--until_record == 0) {
-                real* row = out(call->records) + call->records_written * (1 + 2 * n);
-                row[0] = local.time();
-                for (int k = 0; k < n; ++k) row[1 + k] = local.q[k];
-                local.momentum(row + 1 + n);
-                ++call->records_written;
-                until_record = call->record_every;
+                if constexpr (has_dense) {
+                    for (std::int32_t d = 1; d <= call.dense; ++d)
+                        Between<K>::row(stepper, real(d) / real(call.dense + 1), next_row(call));
+                }
+                real* const row = next_row(call);
+                row[0] = stepper.time();
+                for (int k = 0; k < n; ++k) row[1 + k] = stepper.q[k];
+                stepper.momentum(row + 1 + n);
+                until_record = call.record_every;
             }
         }
-        *static_cast<S*>(stepper) = local;
-        return call->status = code(status);
+        return Status::ok;
     }
+    static real* next_row(lobatto_advance& call) { return out(call.records) + call.records_written++ * (1 + 2 * n); }
 
     static void state(const void* stepper, void* time, void* q, void* p) {
         *out(time) = of(stepper).time();
@@ -70,68 +93,39 @@ struct Export {
         of(stepper).momentum(out(p));
     }
 
-    static void energy(const void* stepper, const void* q, const void* p, void* energy) {
-        *out(energy) = K::energy(of(stepper).coefficients, in(q), in(p));
-    }
-    static void momentum(const void* stepper, const void*, const void* velocity, void* p) {
-        K::momentum(of(stepper).coefficients, in(velocity), out(p));
-    }
-    static void velocity(const void* stepper, const void*, const void* p, void* velocity) {
-        K::velocity(of(stepper).coefficients, in(p), out(velocity));
-    }
-    static void acceleration(const void* stepper, const void* q, void* W, void* full) {
-        real entries[K::entries > 0 ? K::entries : 1];
-        K::node(of(stepper).coefficients, in(q), out(W), entries);
-        expand_entries<K>(entries, out(full));
-    }
-
-    static void residual(const void* stepper, const void* q, const void* p, const void* Q, void* F) {
-        if constexpr (K::unknowns > 0 && !K::linear) {
-            const auto& k = of(stepper).coefficients;
-            real u[n], v[n], W0[n], base[(K::points - 1) * n], W[K::unknowns];
-            K::velocity(k, in(p), u);
-            K::acceleration(k, in(q), W0);
-            K::drift(k, in(q), u, W0, v, base);
-            for (int i = 0; i < K::points - 2; ++i) K::acceleration(k, in(Q) + i * n, W + i * n);
-            K::residual(k, base, in(Q), W, out(F));
-        }
-    }
-
-    static void jacobian(const void* stepper, const void* Q, void* J) {
-        if constexpr (K::unknowns > 0 && !K::linear) {
-            const auto& k = of(stepper).coefficients;
-            constexpr int e = K::entries;
-            real W[n], entries[(K::points - 2) * (e > 0 ? e : 1)];
-            for (int i = 0; i < K::points - 2; ++i) K::node(k, in(Q) + i * n, W, entries + i * e);
-            K::jacobian(k, entries, out(J));
-        }
-    }
-
-    static std::int32_t tangent(const void* stepper, const void* q, const void* p, void* q1, void* p1, void* T) {
-        S local = of(stepper);
-        Status status = local.start(real(0), in(q), in(p));
-        if (status != Status::ok) return code(status);
-        status = local.step();
-        if (status != Status::ok) return code(status);
-        for (int k = 0; k < n; ++k) out(q1)[k] = local.q[k];
-        local.momentum(out(p1));
-        constexpr int s = K::points, columns = 2 * n + 1;
-        real full[2 * n * columns];
-        if constexpr (K::linear) {
-            for (int i = 0; i < 2 * n * columns; ++i) full[i] = local.coefficients.Phi_minus_I[i];
-        } else {
-            real second[s * n * n], W[n], entries[K::entries > 0 ? K::entries : 1], none[n] = {};
-            for (int i = 0; i < s; ++i) {
-                K::node(local.coefficients, i == 0 ? in(q) : i == s - 1 ? local.q : local.Q + (i - 1) * n, W, entries);
-                expand_entries<K>(entries, second + i * n * n);
+    static std::int32_t dense(const void* stepper, const void* theta, void* q, void* velocity) {
+        if constexpr (has_dense) {
+            if (of(stepper).has_history) {
+                of(stepper).polynomial(*in(theta), out(q), out(velocity));
+                return LOBATTO_OK;
             }
-            if (!increment_of_step<K>(local.step_size, second, none, full)) return code(Status::singular_jacobian);
-            to_momentum<K>(local.coefficients, full);
         }
-        for (int r = 0; r < 2 * n; ++r)
-            for (int c = 0; c < 2 * n; ++c)
-                out(T)[r * 2 * n + c] = (r == c ? real(1) : real(0)) + full[r * columns + c];
-        return code(Status::ok);
+        return LOBATTO_UNSUPPORTED;
+    }
+
+    static std::int32_t energy(const void* stepper, const void* time, const void* q, const void* p, void* energy) {
+        return code(of(stepper).energy(*in(time), in(q), in(p), out(energy)));
+    }
+    static void momentum(const void* stepper, const void* time, const void* q, const void* velocity, void* p) {
+        of(stepper).momentum(*in(time), in(q), in(velocity), out(p));
+    }
+    static std::int32_t velocity(const void* stepper, const void* time, const void* q, const void* p, void* velocity) {
+        return code(of(stepper).velocity(*in(time), in(q), in(p), out(velocity)));
+    }
+    static void slopes(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv, void* Lq) {
+        of(stepper).slopes(*in(time), in(q), in(velocity), out(Lv), out(Lq));
+    }
+    static std::int32_t residual(const void* stepper, const void* time, const void* q, const void* p, const void* X,
+                                 void* F) {
+        return code(of(stepper).residual(*in(time), in(q), in(p), in(X), out(F)));
+    }
+    static std::int32_t jacobian(const void* stepper, const void* time, const void* q, const void* p, const void* X,
+                                 void* J) {
+        return code(of(stepper).jacobian(*in(time), in(q), in(p), in(X), out(J)));
+    }
+    static std::int32_t tangent(const void* stepper, const void* time, const void* q, const void* p, void* q1, void* p1,
+                                void* T) {
+        return code(of(stepper).tangent(*in(time), in(q), in(p), out(q1), out(p1), out(T)));
     }
 
     static constexpr lobatto_real kind() {
@@ -140,29 +134,44 @@ struct Export {
                : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE
                                                       : LOBATTO_FLOAT128;
     }
+    static constexpr std::int32_t events_of_step() {
+        if constexpr (K::events > 0)
+            return Events<K>::most;
+        else
+            return 0;
+    }
 
     static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
                                              sizeof(lobatto_kernel),
                                              K::name,
                                              K::digest,
+                                             K::method,
                                              kind(),
                                              sizeof(real),
+                                             static_cast<std::int32_t>(K::form),
                                              n,
                                              K::parameter_count,
-                                             K::points,
+                                             S::nodes,
                                              K::order,
-                                             K::linear ? 0 : K::unknowns,
+                                             S::N,
+                                             K::autonomous ? 1 : 0,
                                              K::linear ? 1 : 0,
+                                             K::has_energy ? 1 : 0,
+                                             K::has_tangent ? 1 : 0,
+                                             has_dense ? 1 : 0,
+                                             K::events,
+                                             events_of_step(),
                                              sizeof(S),
                                              alignof(S),
                                              prepare,
                                              start,
                                              advance,
                                              state,
+                                             dense,
                                              energy,
                                              momentum,
                                              velocity,
-                                             acceleration,
+                                             slopes,
                                              residual,
                                              jacobian,
                                              tangent};

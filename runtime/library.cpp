@@ -116,64 +116,73 @@ void LoadedStepper<real>::state(real& time, std::vector<real>& q, std::vector<re
 }
 
 template <class real>
-real LoadedStepper<real>::energy(const std::vector<real>& q, const std::vector<real>& p) const {
-    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
-    real energy{};
-    kernel_->energy(stepper_, q.data(), p.data(), &energy);
-    return energy;
+lobatto_status LoadedStepper<real>::dense(real theta, std::vector<real>& q, std::vector<real>& velocity) const {
+    q.resize(kernel_->coordinates);
+    velocity.resize(kernel_->coordinates);
+    return static_cast<lobatto_status>(kernel_->dense(stepper_, &theta, q.data(), velocity.data()));
 }
 
 template <class real>
-std::vector<real> LoadedStepper<real>::momentum(const std::vector<real>& q, const std::vector<real>& velocity) const {
+lobatto_status LoadedStepper<real>::energy(real time, const std::vector<real>& q, const std::vector<real>& p,
+                                           real& energy) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    return static_cast<lobatto_status>(kernel_->energy(stepper_, &time, q.data(), p.data(), &energy));
+}
+
+template <class real>
+std::vector<real> LoadedStepper<real>::momentum(real time, const std::vector<real>& q,
+                                                const std::vector<real>& velocity) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);
     std::vector<real> p(kernel_->coordinates);
-    kernel_->momentum(stepper_, q.data(), velocity.data(), p.data());
+    kernel_->momentum(stepper_, &time, q.data(), velocity.data(), p.data());
     return p;
 }
 
 template <class real>
-std::vector<real> LoadedStepper<real>::velocity(const std::vector<real>& q, const std::vector<real>& p) const {
+lobatto_status LoadedStepper<real>::velocity(real time, const std::vector<real>& q, const std::vector<real>& p,
+                                             std::vector<real>& velocity) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
-    std::vector<real> velocity(kernel_->coordinates);
-    kernel_->velocity(stepper_, q.data(), p.data(), velocity.data());
-    return velocity;
+    velocity.resize(kernel_->coordinates);
+    return static_cast<lobatto_status>(kernel_->velocity(stepper_, &time, q.data(), p.data(), velocity.data()));
 }
 
 template <class real>
-void LoadedStepper<real>::acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const {
-    assert(std::ssize(q) == kernel_->coordinates);
-    W.resize(kernel_->coordinates);
-    S.resize(kernel_->coordinates * kernel_->coordinates);
-    kernel_->acceleration(stepper_, q.data(), W.data(), S.data());
+void LoadedStepper<real>::slopes(real time, const std::vector<real>& q, const std::vector<real>& velocity,
+                                 std::vector<real>& Lv, std::vector<real>& Lq) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);
+    Lv.resize(kernel_->coordinates);
+    Lq.resize(kernel_->coordinates);
+    kernel_->slopes(stepper_, &time, q.data(), velocity.data(), Lv.data(), Lq.data());
 }
 
 template <class real>
-std::vector<real> LoadedStepper<real>::residual(const std::vector<real>& q, const std::vector<real>& p,
-                                                const std::vector<real>& Q) const {
+lobatto_status LoadedStepper<real>::residual(real time, const std::vector<real>& q, const std::vector<real>& p,
+                                             const std::vector<real>& X, std::vector<real>& F) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
-    assert(std::ssize(Q) == kernel_->unknowns);
-    std::vector<real> F(kernel_->unknowns);
-    kernel_->residual(stepper_, q.data(), p.data(), Q.data(), F.data());
-    return F;
+    assert(std::ssize(X) == kernel_->unknowns);
+    F.resize(kernel_->unknowns);
+    return static_cast<lobatto_status>(kernel_->residual(stepper_, &time, q.data(), p.data(), X.data(), F.data()));
 }
 
 template <class real>
-std::vector<real> LoadedStepper<real>::jacobian(const std::vector<real>& Q) const {
-    assert(std::ssize(Q) == kernel_->unknowns);
-    std::vector<real> J(kernel_->unknowns * kernel_->unknowns);
-    kernel_->jacobian(stepper_, Q.data(), J.data());
-    return J;
+lobatto_status LoadedStepper<real>::jacobian(real time, const std::vector<real>& q, const std::vector<real>& p,
+                                             const std::vector<real>& X, std::vector<real>& J) const {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    assert(std::ssize(X) == kernel_->unknowns);
+    J.resize(kernel_->unknowns * kernel_->unknowns);
+    return static_cast<lobatto_status>(kernel_->jacobian(stepper_, &time, q.data(), p.data(), X.data(), J.data()));
 }
 
 template <class real>
-lobatto_status LoadedStepper<real>::tangent(const std::vector<real>& q, const std::vector<real>& p,
+lobatto_status LoadedStepper<real>::tangent(real time, const std::vector<real>& q, const std::vector<real>& p,
                                             std::vector<real>& q1, std::vector<real>& p1, std::vector<real>& T) const {
     const std::int32_t n = kernel_->coordinates;
     assert(std::ssize(q) == n && std::ssize(p) == n);
     q1.resize(n);
     p1.resize(n);
     T.resize(4 * n * n);
-    return static_cast<lobatto_status>(kernel_->tangent(stepper_, q.data(), p.data(), q1.data(), p1.data(), T.data()));
+    return static_cast<lobatto_status>(
+        kernel_->tangent(stepper_, &time, q.data(), p.data(), q1.data(), p1.data(), T.data()));
 }
 
 template class LoadedStepper<float>;

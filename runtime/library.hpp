@@ -62,16 +62,22 @@ public:
     lobatto_status advance(lobatto_advance& call);
     void state(real& time, std::vector<real>& q, std::vector<real>& p) const;
 
-    real energy(const std::vector<real>& q, const std::vector<real>& p) const;
-    std::vector<real> momentum(const std::vector<real>& q, const std::vector<real>& velocity) const;
-    std::vector<real> velocity(const std::vector<real>& q, const std::vector<real>& p) const;
-    // W = M^-1 grad V, n; S = M^-1 V'', n x n.
-    void acceleration(const std::vector<real>& q, std::vector<real>& W, std::vector<real>& S) const;
-    std::vector<real> residual(const std::vector<real>& q, const std::vector<real>& p,
-                               const std::vector<real>& Q) const;  // N
-    std::vector<real> jacobian(const std::vector<real>& Q) const;  // N x N
-    // One step from (q, p) with its tangent map T, 2n x 2n; does not touch the trajectory.
-    lobatto_status tangent(const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1,
+    // Position and velocity at t + theta h inside the last step, on its polynomial.
+    lobatto_status dense(real theta, std::vector<real>& q, std::vector<real>& velocity) const;
+
+    lobatto_status energy(real time, const std::vector<real>& q, const std::vector<real>& p, real& energy) const;
+    std::vector<real> momentum(real time, const std::vector<real>& q, const std::vector<real>& velocity) const;
+    lobatto_status velocity(real time, const std::vector<real>& q, const std::vector<real>& p,
+                            std::vector<real>& velocity) const;
+    // Lv = dL/dq' and Lq = dL/dq + forces, n each.
+    void slopes(real time, const std::vector<real>& q, const std::vector<real>& velocity, std::vector<real>& Lv,
+                std::vector<real>& Lq) const;
+    lobatto_status residual(real time, const std::vector<real>& q, const std::vector<real>& p,
+                            const std::vector<real>& X, std::vector<real>& F) const;  // N
+    lobatto_status jacobian(real time, const std::vector<real>& q, const std::vector<real>& p,
+                            const std::vector<real>& X, std::vector<real>& J) const;  // N x N
+    // One step from (q, p) at `time` with its tangent map T, 2n x 2n; does not touch the trajectory.
+    lobatto_status tangent(real time, const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1,
                            std::vector<real>& p1, std::vector<real>& T) const;
 
     const Kernel& kernel() const { return kernel_; }

@@ -46,7 +46,7 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
     std::vector<real> flow(rows * rows, real(0));
     for (std::size_t i = 0; i < rows; ++i) flow[i * rows + i] = 1;
     for (; result.steps < steps; ++result.steps) {
-        if (stepper.tangent(position, momentum, q1, p1, T) != LOBATTO_OK) break;
+        if (stepper.tangent(step * real(result.steps), position, momentum, q1, p1, T) != LOBATTO_OK) break;
         position = q1;
         momentum = p1;
         std::vector<real> product(rows * rows, real(0));
@@ -115,18 +115,18 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
     std::vector<real> q1, p1, T, ignored;
     const char* const failure = "the tangent map cannot be measured: the step from the start fails";
     if (stepper.prepare(start.parameters, step) != LOBATTO_OK ||
-        stepper.tangent(start.q, start.p, q1, p1, T) != LOBATTO_OK)
+        stepper.tangent(0, start.q, start.p, q1, p1, T) != LOBATTO_OK)
         throw ComputationError(failure);
     // Each component's own size, and its shift: a part of what velocity and force move it in the step, or of itself
     // where they hardly do.
     const std::vector<real> before = joined(start.q, start.p), after = joined(q1, p1);
-    std::vector<real> W, S;
-    stepper.acceleration(start.q, W, S);
-    const std::vector<real> velocity = stepper.velocity(start.q, start.p), force = stepper.momentum(start.q, W);
+    std::vector<real> velocity, p_of_v, force;
+    if (stepper.velocity(0, start.q, start.p, velocity) != LOBATTO_OK) throw ComputationError(failure);
+    stepper.slopes(0, start.q, velocity, p_of_v, force);
     const real h = step;
     std::vector<real> sizes(rows), shifts(rows);
     for (std::size_t i = 0; i < rows; ++i) {
-        const real moved = i < n ? size(h * velocity[i]) + size(h * h * W[i]) / 2 : size(h * force[i - n]);
+        const real moved = i < n ? std::max(size(h * velocity[i]), size(after[i] - before[i])) : size(h * force[i - n]);
         sizes[i] = std::max(size(before[i]), size(after[i]));
         shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * size(before[i]));
     }
@@ -146,7 +146,7 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
         const auto image = [&](real shift) {
             std::vector<real> q = start.q, p = start.p;
             (j < n ? q[j] : p[j - n]) += shift;
-            if (stepper.tangent(q, p, q1, p1, ignored) != LOBATTO_OK) throw ComputationError(failure);
+            if (stepper.tangent(0, q, p, q1, p1, ignored) != LOBATTO_OK) throw ComputationError(failure);
             return joined(q1, p1);
         };
         // The better of two shifts: truncation spoils the first where the motion is violent, rounding the second.
@@ -177,11 +177,15 @@ double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std
     real difference = 0, largest = 0;
     for (const auto& [position, momentum] : states) {
         const std::vector<real> q(position.begin(), position.end()), p(momentum.begin(), momentum.end());
-        const real H = exact.energy(q, p);
-        const std::vector<real> velocity = exact.velocity(q, p);
+        real H = 0;
+        double H_double = 0;
+        std::vector<real> velocity;
+        if (exact.energy(0, q, p, H) != LOBATTO_OK || exact.velocity(0, q, p, velocity) != LOBATTO_OK ||
+            stepper.energy(0, position, momentum, H_double) != LOBATTO_OK)
+            throw ComputationError("the energy cannot be compared: a kernel refuses a state");
         real kinetic = 0;
         for (std::size_t k = 0; k < q.size(); ++k) kinetic += p[k] * velocity[k] / 2;
-        difference = std::max(difference, size(real(stepper.energy(position, momentum)) - H));
+        difference = std::max(difference, size(real(H_double) - H));
         largest = std::max(largest, size(kinetic) + size(H - kinetic));
     }
     return difference > 0 ? static_cast<double>(difference / largest) : 0.0;
@@ -192,7 +196,7 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     const std::size_t n = q.size();
     std::vector<double> energies;
     std::vector<std::vector<double>> motion;
-    std::vector<double> W, S;
+    std::vector<double> velocity, ignored, slope;
     double energy_size = 0;
     LoadedStepper<double> stepper(kernel);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
@@ -209,13 +213,13 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
             energies.push_back(records.energy[i]);
             motion.emplace_back(row, row + n);
             const std::vector<double> momentum(row + n, row + 2 * n);
-            const std::vector<double> velocity = stepper.velocity(motion.back(), momentum);
+            if (stepper.velocity(row[-1], motion.back(), momentum, velocity) != LOBATTO_OK)
+                throw ComputationError("the energy cannot be followed: a momentum has no velocity");
             double kinetic = 0;
             for (std::size_t k = 0; k < n; ++k) kinetic += std::fabs(momentum[k] * velocity[k]) / 2;
             double sizes = kinetic + std::fabs(records.energy[i] - kinetic);
             // Rounding of q_k costs V its slope times that: sum |q_k dV/dq_k|.
-            stepper.acceleration(motion.back(), W, S);
-            const std::vector<double> slope = stepper.momentum(motion.back(), W);
+            stepper.slopes(row[-1], motion.back(), velocity, ignored, slope);
             for (std::size_t k = 0; k < n; ++k) sizes += std::fabs(row[k] * slope[k]);
             energy_size = std::max(energy_size, sizes);
         }

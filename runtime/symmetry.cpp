@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Linear symmetries of a kernel's system, found by sampling its forces, and the momenta that Noether's theorem
+// Linear symmetries of a kernel's system, found by sampling its slopes, and the momenta that Noether's theorem
 // conserves.
 //
-// With B = M^-1 A the condition on the kinetic energy says that A is antisymmetric, and the one on V becomes linear in
-// the entries of A and d: sum_{i<j} A_ij (q_j W_i - q_i W_j) + d . M W = 0 for W = M^-1 grad V at every sampled q.
+// The condition is linear in the entries of B and d: with p = dL/dv and f = dL/dq + F at a sampled (t, q, v)
+//     sum_kl B_kl (f_k q_l + p_k v_l) + sum_k d_k f_k = 0.
 #include "runtime/symmetry.hpp"
 
 #include <fmt/format.h>
@@ -87,42 +87,61 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
     LoadedStepper<double> stepper(kernel);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
         throw ComputationError("symmetries cannot be looked for: the kernel refuses the scene's values");
-    const Eigen::Index n = static_cast<Eigen::Index>(q.size()), pairs = n * (n - 1) / 2, unknowns = pairs + n;
-    MatrixXd M(n, n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-        std::vector<double> unit(q.size(), 0.0);
-        unit[static_cast<std::size_t>(k)] = 1;
-        const std::vector<double> column = stepper.momentum(q, unit);
-        M.col(k) = Eigen::Map<const VectorXd>(column.data(), n);
-    }
-    M /= M.cwiseAbs().maxCoeff();  // its unit does not matter, and may lie near underflow
+    const Eigen::Index n = static_cast<Eigen::Index>(q.size()), entries = n <= 12 ? n * n : 0, unknowns = entries + n;
+    if (n > 64) return {};
 
-    // One row a sample, half of them to find and half to confirm, and the sum of its terms' sizes for each entry;
-    // samples where the forces are not finite are left out, and the next ones are nearer.
-    const Eigen::Index wanted = 3 * unknowns;
+    // Two rows a sample: the condition at rest, and what it adds there in motion, so that strong forces do not drown
+    // the kinetic energy. Half of them are to find and half to confirm; beside them the sum of the terms' sizes for
+    // each entry. Samples where the slopes are not finite are left out, and the next ones are nearer; where they are
+    // not so at rest (a Lagrangian like -sqrt(v^2)), another motion takes its place.
+    const Eigen::Index wanted = 4 * unknowns;
     MatrixXd conditions(2 * wanted, unknowns), sizes(2 * wanted, unknowns);
     std::mt19937_64 generator(1);
+    const auto random = [&] { return static_cast<double>(generator() >> 11) * 0x1p-52 - 1; };
     double spread = 1;
     Eigen::Index row = 0;
     for (int attempt = 0; row < 2 * wanted && attempt < 200 * wanted; ++attempt) {
-        std::vector<double> sample = q, W, S;
-        for (double& x : sample)
-            x += spread * (1 + std::fabs(x)) * (static_cast<double>(generator() >> 11) * 0x1p-52 - 1);
-        stepper.acceleration(sample, W, S);
-        const Eigen::Map<const VectorXd> force(W.data(), n), x(sample.data(), n);
-        if (!force.allFinite()) {
+        std::vector<double> sample = q, Lv, Lq;
+        for (double& x : sample) x += spread * (1 + std::fabs(x)) * random();
+        const double time = kernel->autonomous ? 0 : spread * random();
+        const auto slopes_at = [&](const VectorXd& v, VectorXd& momentum, VectorXd& force) {
+            stepper.slopes(time, sample, {v.data(), v.data() + n}, Lv, Lq);
+            momentum = Eigen::Map<const VectorXd>(Lv.data(), n);
+            force = Eigen::Map<const VectorXd>(Lq.data(), n);
+            return momentum.allFinite() && force.allFinite();
+        };
+        const Eigen::Map<const VectorXd> x(sample.data(), n);
+        const auto some_velocity = [&] { return VectorXd(VectorXd::NullaryExpr(n, random) * spread); };
+        VectorXd v0 = VectorXd::Zero(n), v1 = some_velocity(), p0, p1, f0, f1;
+        if (!slopes_at(v0, p0, f0)) v0 = some_velocity();
+        if (!slopes_at(v0, p0, f0) || !slopes_at(v1, p1, f1)) {
             spread *= 0.9;
             continue;
         }
-        Eigen::Index unknown = 0;
-        for (Eigen::Index i = 0; i < n; ++i)
-            for (Eigen::Index j = i + 1; j < n; ++j, ++unknown) {
-                conditions(row, unknown) = x(j) * force(i) - x(i) * force(j);
-                sizes(row, unknown) = std::fabs(x(j) * force(i)) + std::fabs(x(i) * force(j));
-            }
-        conditions.row(row).tail(n) = M * force;
-        sizes.row(row).tail(n) = M.cwiseAbs() * force.cwiseAbs();
-        ++row;
+        // What is left of equal forces is rounding. The unit of L does not matter, and may lie near underflow.
+        VectorXd added = f1 - f0;
+        for (Eigen::Index k = 0; k < n; ++k)
+            if (std::fabs(added(k)) <= 0x1p-50 * std::fabs(f0(k))) added(k) = 0;
+        const auto unit = [](double a, double b) { return std::fmax(a, b) > 0 ? std::fmax(a, b) : 1.0; };
+        const double unit_rest = unit(f0.cwiseAbs().maxCoeff(), p0.cwiseAbs().maxCoeff()),
+                     unit_added = unit(added.cwiseAbs().maxCoeff(), p1.cwiseAbs().maxCoeff());
+        f0 /= unit_rest;
+        added /= unit_added;
+        p1 /= unit_added;
+        const VectorXd p0_rest = p0 / unit_rest, p0_added = p0 / unit_added;
+        for (Eigen::Index unknown = 0; unknown < entries; ++unknown) {
+            const Eigen::Index k = unknown / n, l = unknown % n;
+            conditions(row, unknown) = f0(k) * x(l) + p0_rest(k) * v0(l);
+            sizes(row, unknown) = std::fabs(f0(k) * x(l)) + std::fabs(p0_rest(k) * v0(l));
+            conditions(row + 1, unknown) = added(k) * x(l) + p1(k) * v1(l) - p0_added(k) * v0(l);
+            sizes(row + 1, unknown) =
+                std::fabs(added(k) * x(l)) + std::fabs(p1(k) * v1(l)) + std::fabs(p0_added(k) * v0(l));
+        }
+        conditions.row(row).tail(n) = f0;
+        conditions.row(row + 1).tail(n) = added;
+        sizes.row(row).tail(n) = f0.cwiseAbs();
+        sizes.row(row + 1).tail(n) = added.cwiseAbs();
+        row += 2;
     }
     if (row < 2 * wanted)
         throw ComputationError("symmetries cannot be looked for: the forces are not finite around the start");
@@ -143,7 +162,7 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
 
     std::vector<Symmetry> symmetries;
     if (rank == unknowns) return symmetries;
-    // The entries of A lead, so that translations are reduced to directions of their own, and rotations by them.
+    // The entries of B lead, so that translations are reduced to directions of their own, and rotations by them.
     MatrixXd space = reduced(decomposition.matrixV().rightCols(unknowns - rank).transpose());
     for (Eigen::Index s = 0; s < space.rows(); ++s) {
         space.row(s).array() /= units.transpose().array();
@@ -154,15 +173,9 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
         const double missed = (conditions.bottomRows(wanted) * direction).cwiseAbs().maxCoeff();
         const double terms = (sizes.bottomRows(wanted) * direction.cwiseAbs()).maxCoeff();
         if (!(missed <= 1e-9 * terms)) continue;
-        MatrixXd A = MatrixXd::Zero(n, n);
-        Eigen::Index unknown = 0;
-        for (Eigen::Index i = 0; i < n; ++i)
-            for (Eigen::Index j = i + 1; j < n; ++j, ++unknown) {
-                A(i, j) = space(s, unknown);
-                A(j, i) = -space(s, unknown);
-            }
+        MatrixXd B = MatrixXd::Zero(n, n);
+        for (Eigen::Index unknown = 0; unknown < entries; ++unknown) B(unknown / n, unknown % n) = space(s, unknown);
         // The sign that makes a rotation x*p_y - y*p_x, and a largest entry of 1.
-        MatrixXd B = M.inverse() * A;
         const double largest = B.cwiseAbs().maxCoeff();
         const double scale = largest > 0 ? -1 / largest : 1;
         symmetries.push_back(symmetry_of(scale * B, scale * space.row(s).tail(n).transpose(), names));

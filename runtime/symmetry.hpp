@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Linear symmetries of a kernel's system, found by sampling its forces, and the momenta that Noether's theorem
+// Linear symmetries of a kernel's system, found by sampling its slopes, and the momenta that Noether's theorem
 // conserves.
 #pragma once
 
@@ -11,8 +11,8 @@
 
 namespace lobatto {
 
-// The direction B q + d in which moving changes neither V nor the kinetic energy: (B q + d) . grad V(q) = 0 for all q
-// and B^T M + M B = 0. Conserved: p . (B q + d).
+// The direction B q + d in which moving does not change L, and forces do no work:
+// (B q + d) . (dL/dq + F) + (B v) . dL/dv = 0 for all q, v and t. Conserved: p . (B q + d).
 struct Symmetry {
     std::vector<double> B;  // n x n, row-major
     std::vector<double> d;  // n
@@ -20,7 +20,8 @@ struct Symmetry {
     std::string momentum;   // "p_x + p_y", "x*p_y - y*p_x"
 };
 
-// All of them, as far as forces sampled around q tell; `names` are those of the coordinates.
+// All of them, as far as slopes sampled around q tell; `names` are those of the coordinates. Their number of entries
+// grows with n^2: among more than 12 coordinates only translations are looked for, among more than 64 nothing.
 std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
                                       const std::vector<double>& q, double step, const std::vector<std::string>& names);
 

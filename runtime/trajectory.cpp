@@ -35,34 +35,45 @@ class Keeper {
 public:
     Keeper(const LoadedStepper<double>& stepper, const TrajectoryRequest& request, TrajectoryResult& result)
         : stepper_(stepper), request_(request), result_(result), n_(request.q.size()), q_(n_), p_(n_) {
-        result_.energy_start = energy(request.q.data(), request.p.data());
+        result_.energy_start = energy(request.time, request.q.data(), request.p.data());
     }
 
-    void keep(const double* rows, std::int64_t count) {
-        energies_.resize(static_cast<std::size_t>(count));
+    // `between`: that many of every between + 1 rows lie between two steps.
+    void keep(const double* rows, std::int64_t count, int between) {
         const std::size_t columns = 1 + 2 * n_;
-        for (std::size_t i = 0; i < energies_.size(); ++i) {
-            const double* q = rows + i * columns + 1;
-            energies_[i] = energy(q, q + n_);
-            result_.energy_error_final = energies_[i] - result_.energy_start;
-            const double error = std::fabs(result_.energy_error_final);
-            if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
+        const double* energies = nullptr;
+        if (has_energy()) {
+            energies_.resize(static_cast<std::size_t>(count));
+            for (std::size_t i = 0; i < energies_.size(); ++i) {
+                const double* const row = rows + i * columns;
+                energies_[i] = energy(row[0], row + 1, row + 1 + n_);
+                if ((i + 1) % static_cast<std::size_t>(between + 1) != 0) continue;
+                result_.energy_error_final = energies_[i] - result_.energy_start;
+                const double error = std::fabs(result_.energy_error_final);
+                if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
+            }
+            energies = energies_.data();
+        } else {
+            result_.energy_error_final = result_.energy_error_largest = std::nan("");
         }
-        if (request_.sink && count > 0) request_.sink({rows, energies_.data(), count, static_cast<int>(columns)});
+        if (request_.sink && count > 0) request_.sink({rows, energies, count, static_cast<int>(columns)});
     }
 
     void keep_last() {
         std::vector<double> row{result_.time};
         row.insert(row.end(), result_.q.begin(), result_.q.end());
         row.insert(row.end(), result_.p.begin(), result_.p.end());
-        keep(row.data(), 1);
+        keep(row.data(), 1, 0);
     }
 
 private:
-    double energy(const double* q, const double* p) {
+    bool has_energy() const { return stepper_.kernel()->has_energy != 0; }
+
+    double energy(double time, const double* q, const double* p) {
+        double energy = 0;
         std::copy_n(q, n_, q_.begin());
         std::copy_n(p, n_, p_.begin());
-        return stepper_.energy(q_, p_);
+        return stepper_.energy(time, q_, p_, energy) == LOBATTO_OK ? energy : std::nan("");
     }
 
     const LoadedStepper<double>& stepper_;
@@ -91,8 +102,15 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     Keeper keeper(stepper, request, result);
     keeper.keep_last();
 
-    const std::int64_t rows = std::clamp<std::int64_t>(request.steps / request.every, 1, rows_at_once);
-    std::vector<double> records(static_cast<std::size_t>(rows) * (1 + 2 * request.q.size()));
+    const std::int64_t rows_of_step = 1 + request.dense;
+    const std::int64_t rows = std::clamp<std::int64_t>(request.steps / request.every, 1,
+                                                       std::max<std::int64_t>(rows_at_once / rows_of_step, 1)) *
+                              rows_of_step;
+    const std::size_t columns = 1 + 2 * request.q.size();
+    std::vector<double> records(static_cast<std::size_t>(rows) * columns), events;
+    const bool seeks_events = request.events && kernel->events > 0;
+    const std::int64_t event_rows = seeks_events ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
+    events.resize(static_cast<std::size_t>(event_rows) * (1 + columns));
     std::int64_t block = 256;
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
@@ -104,6 +122,9 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         call.record_every = request.every;
         call.records = records.data();
         call.capacity = rows;
+        call.dense = request.dense;
+        call.events = seeks_events ? events.data() : nullptr;
+        call.event_capacity = event_rows;
         const Clock::time_point start = Clock::now();
         const double processor_start = processor_seconds();
         result.status = stepper.advance(call);
@@ -116,7 +137,10 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         result.increment_largest = std::max(result.increment_largest, call.increment_largest);
         result.increment_failed = call.increment_failed;
         stepper.state(result.time, result.q, result.p);
-        keeper.keep(records.data(), call.records_written);
+        result.events += call.events_written;
+        if (call.events_written > 0)
+            request.events({events.data(), call.events_written, static_cast<int>(1 + columns)});
+        keeper.keep(records.data(), call.records_written, request.dense);
 
         // The clock ticks coarsely against a short block: grow at most eightfold at a time.
         const double pace = block_seconds / std::max(seconds, block_seconds / 8);
@@ -138,7 +162,7 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
             return {};
         case LOBATTO_NOT_CONVERGED:
             why = fmt::format(
-                "Newton's iteration for the positions inside the step did not converge: its last increment was {:.2g} "
+                "the iteration for the positions inside the step did not converge: its last increment was {:.2g} "
                 "of the displacement "
                 "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
                 "of the potential",
@@ -159,10 +183,20 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
             advice = smaller + ", or a slightly different one";
             break;
         case LOBATTO_SINGULAR_MASS:
-            why = "the mass matrix has no inverse for these parameters, so that momenta do not determine velocities";
+            why =
+                "the mass matrix has no inverse for these parameters or at this state, so that momenta do not "
+                "determine velocities";
             advice =
-                "other values of the parameters that stand before the squared velocities; none of the masses may "
-                "vanish";
+                "other values of the parameters that stand before the squared velocities, or start elsewhere; none of "
+                "the "
+                "masses may vanish";
+            break;
+        case LOBATTO_UNSUPPORTED:
+            why =
+                "the kernel was compiled without what is asked of it: states between steps, events, energies or "
+                "tangent "
+                "maps";
+            advice = "to compile it from a scene whose [output] asks for it";
             break;
         case LOBATTO_TIME_STANDS_STILL:
             why =

@@ -23,7 +23,10 @@ struct HandwrittenPendulum {
     static constexpr int unknowns = 2;  // q_xi, q_{1-xi}
     static constexpr int parameter_count = 2;
     static constexpr int entries = 1;  // S = V''/m has one entry
-    static constexpr bool linear = false;
+    static constexpr Form form = Form::separable;
+    static constexpr bool autonomous = true, linear = false, has_energy = true, has_tangent = true, unrolled = true;
+    static constexpr int events = 0;
+    static constexpr const char* method = "Lobatto, 4 points";
     static constexpr const char* name = "handwritten_pendulum";
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr int entry_row[1] = {0};

@@ -64,10 +64,15 @@ TEST_CASE("a loaded kernel says what it is") {
     CHECK(kernel->real_bytes == 8);
     CHECK(kernel->coordinates == 1);
     CHECK(kernel->parameters == 2);
-    CHECK(kernel->points == 4);
+    CHECK(kernel->nodes == 4);
     CHECK(kernel->order == 6);
     CHECK(kernel->unknowns == 2);
     CHECK(kernel->linear == 0);
+    CHECK(std::string(kernel->method) == "Lobatto, 4 points");
+    CHECK(kernel->form == LOBATTO_SEPARABLE);
+    CHECK(kernel->autonomous == 1);
+    CHECK(kernel->has_dense == 1);
+    CHECK(kernel->events == 0);
 }
 
 TEST_CASE("a file that is not a kernel, or not the expected one, is refused with the reason") {
@@ -80,8 +85,8 @@ TEST_CASE("a file that is not a kernel, or not the expected one, is refused with
     CHECK(refusal(text) == text + ": invalid ELF header");
     CHECK(refusal(workshop.build("library", "int nothing;\n")) ==
           "it has no function lobatto_kernel_table, so it is not a kernel");
-    CHECK(refusal(workshop.build_stub("2", "sizeof(lobatto_kernel)")) ==
-          "it speaks version 2 of the kernel interface, this program version 1");
+    CHECK(refusal(workshop.build_stub("3", "sizeof(lobatto_kernel)")) ==
+          "it speaks version 3 of the kernel interface, this program version 2");
     CHECK(refusal(workshop.build_stub("LOBATTO_ABI_VERSION", "8")) ==
           "its function table has 8 bytes instead of " + std::to_string(sizeof(lobatto_kernel)));
     CHECK(refusal(workshop.build_pendulum(), "fedcba9876543210") ==
@@ -105,19 +110,22 @@ TEST_CASE("the wrapper passes every function of the kernel through") {
     const Workshop workshop;
     const double m = 2, omega2 = 9, h = 0.1, q = 0.7, p = 0.4, xi = 0.5 - std::sqrt(0.05);
     LoadedStepper<double> stepper = pendulum_stepper(workshop, h);
-    CHECK(stepper.energy({q}, {p}) == doctest::Approx(p * p / (2 * m) + m * omega2 * (1 - std::cos(q))).epsilon(1e-15));
-    CHECK(stepper.momentum({q}, {0.25}) == std::vector<double>{0.5});
-    CHECK(stepper.velocity({q}, {0.5}) == std::vector<double>{0.25});
-    std::vector<double> W, S;
-    stepper.acceleration({q}, W, S);
-    CHECK(W.at(0) == doctest::Approx(omega2 * std::sin(q)).epsilon(1e-15));
-    CHECK(S.at(0) == doctest::Approx(omega2 * std::cos(q)).epsilon(1e-15));
+    double energy = 0;
+    REQUIRE(stepper.energy(0, {q}, {p}, energy) == LOBATTO_OK);
+    CHECK(energy == doctest::Approx(p * p / (2 * m) + m * omega2 * (1 - std::cos(q))).epsilon(1e-15));
+    CHECK(stepper.momentum(0, {q}, {0.25}) == std::vector<double>{0.5});
+    std::vector<double> velocity, Lv, Lq, F, J;
+    REQUIRE(stepper.velocity(0, {q}, {0.5}, velocity) == LOBATTO_OK);
+    CHECK(velocity == std::vector<double>{0.25});
+    stepper.slopes(0, {q}, {0.25}, Lv, Lq);
+    CHECK(Lv == std::vector<double>{0.5});
+    CHECK(Lq.at(0) == doctest::Approx(-m * omega2 * std::sin(q)).epsilon(1e-15));
     // With both nodes at 0 the accelerations vanish: F = -base = -(q + h c_i v), J = 1 + h^2 omega^2 A.
     const double v = p / m - h / 12 * omega2 * std::sin(q);
-    const std::vector<double> F = stepper.residual({q}, {p}, {0, 0});
+    REQUIRE(stepper.residual(0, {q}, {p}, {0, 0}, F) == LOBATTO_OK);
     CHECK(F.at(0) == doctest::Approx(-(q + h * xi * v)).epsilon(1e-15));
     CHECK(F.at(1) == doctest::Approx(-(q + h * (1 - xi) * v)).epsilon(1e-15));
-    const std::vector<double> J = stepper.jacobian({0, 0});
+    REQUIRE(stepper.jacobian(0, {q}, {p}, {0, 0}, J) == LOBATTO_OK);
     REQUIRE(J.size() == 4);
     const double z = h * h * omega2;
     CHECK(J[0] == doctest::Approx(1 + z / 60).epsilon(1e-15));
@@ -190,15 +198,15 @@ TEST_CASE("the tangent map of the pendulum's step agrees with differences, and i
     const LoadedStepper<double> stepper = pendulum_stepper(workshop, 0.2);
     const double q = 1.3, p = -0.8, d = 1e-5;
     std::vector<double> q1, p1, T, q_plus, p_plus, q_minus, p_minus, unused;
-    REQUIRE(stepper.tangent({q}, {p}, q1, p1, T) == LOBATTO_OK);
+    REQUIRE(stepper.tangent(0, {q}, {p}, q1, p1, T) == LOBATTO_OK);
     CHECK(T[0] * T[3] - T[1] * T[2] == doctest::Approx(1.0).epsilon(1e-14));
     // Central differences err by d^2/6 of the third derivative: 6e-10 measured at most.
-    stepper.tangent({q + d}, {p}, q_plus, p_plus, unused);
-    stepper.tangent({q - d}, {p}, q_minus, p_minus, unused);
+    stepper.tangent(0, {q + d}, {p}, q_plus, p_plus, unused);
+    stepper.tangent(0, {q - d}, {p}, q_minus, p_minus, unused);
     CHECK(T[0] == doctest::Approx((q_plus[0] - q_minus[0]) / (2 * d)).epsilon(1e-8));
     CHECK(T[2] == doctest::Approx((p_plus[0] - p_minus[0]) / (2 * d)).epsilon(1e-8));
-    stepper.tangent({q}, {p + d}, q_plus, p_plus, unused);
-    stepper.tangent({q}, {p - d}, q_minus, p_minus, unused);
+    stepper.tangent(0, {q}, {p + d}, q_plus, p_plus, unused);
+    stepper.tangent(0, {q}, {p - d}, q_minus, p_minus, unused);
     CHECK(T[1] == doctest::Approx((q_plus[0] - q_minus[0]) / (2 * d)).epsilon(1e-8));
     CHECK(T[3] == doctest::Approx((p_plus[0] - p_minus[0]) / (2 * d)).epsilon(1e-8));
 }

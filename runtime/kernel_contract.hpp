@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// What an emitted kernel K provides: a struct of static functions, the formulas of one scene, and of constants.
+//
+// Every kernel: real; name, digest, method; coordinates (n), order, parameter_count, Parameters, parameter();
+// Coefficients, prepare(); form; and these claims, all constexpr:
+//   autonomous   no formula depends on time; otherwise `real time` follows `k` in every function that takes `k` and q
+//   linear       the second derivatives are constant, so that one correction solves a step
+//   has_energy, has_tangent   whether energies and tangent maps are compiled
+//   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
+//                for falling, 0 for both
+// Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), acceleration(k, q, W),
+//   node(k, q, W, S), propagate(k, q, p, q1, p1).
+// Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
+//   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of kernel_separable.hpp are the
+//   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of kernel_solve.hpp order the
+//   unknowns, and `absorbed` says that quadratic_part(k, S0) gives a constant part of S to iterate with.
+//   Gauss's nodes stand between two ends of weight zero.
+// Form::general: see kernel_general.hpp.
+#ifndef LOBATTO_KERNEL_CONTRACT_HPP
+#define LOBATTO_KERNEL_CONTRACT_HPP
+
+#include <cstdint>
+#include <type_traits>
+
+#include "kernel_numbers.hpp"
+
+namespace lobatto {
+
+// The outcome of preparing or stepping; the same values as lobatto_status in kernel_abi.h.
+enum class Status : std::int32_t {
+    ok = 0,
+    not_converged = 1,
+    not_finite = 2,
+    singular_jacobian = 3,
+    singular_mass = 4,
+    time_stands_still = 5,
+    unsupported = 6
+};
+
+// The same values as lobatto_form in kernel_abi.h.
+enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
+
+// K's functions with a time for all of them: it is passed on where the kernel depends on it.
+template <class K>
+struct Formulas {
+    using real = typename K::real;
+    using Coefficients = typename K::Coefficients;
+
+    template <class... Rest>
+    static void node(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::node(k, rest...);
+        else
+            K::node(k, time, rest...);
+    }
+    template <class... Rest>
+    static void acceleration(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::acceleration(k, rest...);
+        else
+            K::acceleration(k, time, rest...);
+    }
+    template <class... Rest>
+    static void slope(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::slope(k, rest...);
+        else
+            K::slope(k, time, rest...);
+    }
+    template <class... Rest>
+    static void slopes(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::slopes(k, rest...);
+        else
+            K::slopes(k, time, rest...);
+    }
+    template <class... Rest>
+    static void legendre(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::legendre(k, rest...);
+        else
+            K::legendre(k, time, rest...);
+    }
+    template <class... Rest>
+    static void momentum(const Coefficients& k, real time, Rest... rest) {  // of Form::general
+        if constexpr (K::autonomous)
+            K::momentum(k, rest...);
+        else
+            K::momentum(k, time, rest...);
+    }
+    template <class... Rest>
+    static void event(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::event(k, rest...);
+        else
+            K::event(k, time, rest...);
+    }
+    template <class... Rest>
+    static real energy(const Coefficients& k, real time, Rest... rest) {
+        if constexpr (K::autonomous)
+            return K::energy(k, rest...);
+        else
+            return K::energy(k, time, rest...);
+    }
+};
+
+// What the steppers of all forms carry.
+template <class K>
+struct Motion {
+    using real = typename K::real;
+    static constexpr int n = K::coordinates;
+    static constexpr int event_room = K::events > 0 ? K::events : 1;
+
+    typename K::Coefficients coefficients{};  // values of stage parameter and step size
+    real step_size{};                         // h
+    real start_time{};
+    std::int64_t steps{};             // since start: the time is start_time + steps * h
+    real q[n]{};                      // position
+    std::int32_t iterations{};        // of the last step
+    real increment{};                 // last increment of the last step, relative to its displacement
+    real event_values[event_room]{};  // at the last state looked at (kernel_events.hpp)
+
+    real time() const { return start_time + real(steps) * step_size; }
+    real next_time() const { return start_time + real(steps + 1) * step_size; }
+    bool time_stands_still() const { return next_time() == time(); }
+};
+
+// One trajectory of kernel K. Usage: prepare, start, then step as often as wanted. Not thread-safe; copy freely. A step
+// that fails leaves the state of the last good one.
+template <class K, Form form = K::form>
+struct Stepper;
+
+// Room for a step's arrays: on the stack while they are few, else in the stepper.
+template <class Arrays>
+struct Workspace {
+    struct Nothing {};
+    static constexpr bool is_large = sizeof(Arrays) > 16384;
+    mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
+
+    template <class Use>
+    auto with(const Use& use) const {
+        if constexpr (is_large) {
+            return use(kept);
+        } else {
+            Arrays local;
+            return use(local);
+        }
+    }
+};
+
+// Lagrange's polynomials over the points, l_j(theta) and l_j'(theta).
+template <int count, class real>
+inline void lagrange(const real* points, real theta, real* value, real* slope) {
+    for (int j = 0; j < count; ++j) {
+        value[j] = real(1);
+        slope[j] = real(0);
+        for (int l = 0; l < count; ++l) {
+            if (l == j) continue;
+            const real scale = real(1) / (points[j] - points[l]);
+            slope[j] = (slope[j] * (theta - points[l]) + value[j]) * scale;
+            value[j] *= (theta - points[l]) * scale;
+        }
+    }
+}
+
+// Zero when all are finite, not a number otherwise.
+template <class real>
+inline real not_finite_part(const real* x, int count) {
+    real sum = real(0);
+    for (int i = 0; i < count; ++i) sum += x[i] - x[i];
+    return sum;
+}
+
+}  // namespace lobatto
+
+#endif
