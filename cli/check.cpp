@@ -142,7 +142,7 @@ nlohmann::ordered_json json_of(const Checked& checked) {
     Json findings = Json::array(), groups = Json::array(), outputs = Json::array();
     for (const Finding& finding : derivation.structure.findings)
         findings.push_back({{"name", finding.name}, {"holds", finding.holds}, {"reason", finding.reason}});
-    for (const Solve& solve : solves_of(derivation)) {
+    for (const GroupSolve& solve : solves_of(derivation)) {
         Json names = Json::array();
         for (const int k : solve.coordinates) names.push_back(scene.coordinates[static_cast<std::size_t>(k)].written);
         groups.push_back(

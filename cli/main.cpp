@@ -72,6 +72,7 @@ void describe(CLI::App& program) {
     add_emit(program);
     add_run(program);
     add_verify(program);
+    add_gallery(program);
     add_paper(program);
     // Last, because a command takes over the footer that its parent has at that moment.
     program.footer(

@@ -6,13 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <numbers>
 
+#include "cli/drawing.hpp"
 #include "cli/paper_tables.hpp"
-#include "runtime/error.hpp"
-#include "runtime/process.hpp"
 
 namespace lobatto {
 
@@ -21,46 +18,9 @@ namespace {
 constexpr double omega = 2 * std::numbers::pi;
 constexpr double steps_of_growth[3] = {0.1, 0.05, 0.025};
 
-void write_file(const std::string& path, const std::string& text) {
-    std::ofstream stream(path, std::ios::binary);
-    if (!(stream << text).flush())
-        throw MachineError(fmt::format("cannot write {}. Is the folder writable, is the disk full?", path));
-}
-
-// Colours that stay apart for every eye and in grey (Okabe and Ito).
-const char* const style = R"(
-set terminal svg size 900,SIZE dynamic font "DejaVu Sans,15" background rgb "white"
-set datafile separator ","
-set border 3 lc rgb "#444444" lw 1.2
-set tics nomirror out scale 0.6 tc rgb "#222222"
-set grid lc rgb "#e4e4e4" lw 1 lt 1
-set style line 1 lc rgb "#999999" lw 2
-set style line 2 lc rgb "#0072b2" lw 2 pt 7 ps 0.75
-set style line 3 lc rgb "#d55e00" lw 2 pt 8 ps 1.3
-set style line 4 lc rgb "#009e73" lw 2 pt 4 ps 0.9
-set style line 12 lc rgb "#0072b2" lw 2 dt 3
-set style line 13 lc rgb "#d55e00" lw 2 dt 3
-set style line 14 lc rgb "#009e73" lw 2 dt 3
-set key outside top center horizontal maxrows 1 reverse Left samplen 2 width -1
-)";
-
 void draw(const std::string& folder, const std::string& name, const std::string& script, int height) {
-    std::string text = style;
-    text.replace(text.find("SIZE"), 4, std::to_string(height));
-    const std::string path = folder + "/" + name + ".gnuplot";
-    write_file(path, text + "set output \"" + name + ".svg\"\n" + script);
-    ProcessRequest request;
-    request.arguments = {"/usr/bin/env", "gnuplot", name + ".gnuplot"};
-    request.folder = folder;
-    request.environment = {{"LC_ALL", "C"}};
-    const ProcessResult result = run_process(request);
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-    if (!result.succeeded())
-        throw MachineError(
-            fmt::format("gnuplot could not draw {}: {}Install it (apt install gnuplot-nox) or leave the figures out "
-                        "with --no-figures.",
-                        name, result.output.empty() ? "no message\n" : result.output));
+    draw(folder, name, script, 900, height,
+         "Install it (apt install gnuplot-nox) or leave the figures out with --no-figures.");
 }
 
 // Figures 1 and 3: exact curve at `fine` points a step, states of the three schemes at the steps; p divided by m omega.

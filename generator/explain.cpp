@@ -94,11 +94,11 @@ std::string form_of(const Derivation& derivation) {
 
 int unknowns_of(const Derivation& derivation) {
     int unknowns = 0;
-    for (const Solve& solve : solves_of(derivation)) unknowns += solve.unknowns;
+    for (const GroupSolve& solve : solves_of(derivation)) unknowns += solve.unknowns;
     return unknowns;
 }
 
-std::vector<Solve> solves_of(const Derivation& derivation) {
+std::vector<GroupSolve> solves_of(const Derivation& derivation) {
     const Structure& structure = derivation.structure;
     if (structure.form == Form::linear_map) return {};
     const bool general = structure.form == Form::general;
@@ -107,9 +107,9 @@ std::vector<Solve> solves_of(const Derivation& derivation) {
     const int multipliers = general && derivation.scene.method.family == Family::lobatto
                                 ? static_cast<int>(structure.routhian.cyclic.size())
                                 : 0;
-    std::vector<Solve> solves;
+    std::vector<GroupSolve> solves;
     for (const Group& group : structure.groups) {
-        Solve solve;
+        GroupSolve solve;
         for (const int k : group.coordinates)
             solve.coordinates.push_back(general ? structure.routhian.active[static_cast<std::size_t>(k)] : k);
         solve.unknowns = points * static_cast<int>(group.coordinates.size()) + multipliers;
@@ -127,9 +127,9 @@ std::vector<Solve> solves_of(const Derivation& derivation) {
 }
 
 std::string solver_text(const Derivation& derivation) {
-    const std::vector<Solve> solves = solves_of(derivation);
+    const std::vector<GroupSolve> solves = solves_of(derivation);
     if (solves.empty()) return "";
-    const auto words = [](const Solve& solve) {
+    const auto words = [](const GroupSolve& solve) {
         const std::string equations =
             solve.unknowns == 1 ? "one equation" : fmt::format("{} equations", solve.unknowns);
         if (solve.method == "nothing to solve") return std::string("nothing to solve: the motion is uniform");
@@ -138,7 +138,7 @@ std::string solver_text(const Derivation& derivation) {
         return fmt::format("{}, as a band of {} diagonals", equations, 2 * solve.band + 1);
     };
     std::vector<std::pair<std::string, std::vector<int>>> kinds;  // groups solved alike, together
-    for (const Solve& solve : solves) {
+    for (const GroupSolve& solve : solves) {
         const std::string text = words(solve);
         const auto known =
             std::find_if(kinds.begin(), kinds.end(), [&](const auto& kind) { return kind.first == text; });

@@ -10,7 +10,7 @@
 namespace lobatto {
 
 // Equations that are solved together.
-struct Solve {
+struct GroupSolve {
     std::vector<int> coordinates;  // indices in the scene
     int unknowns = 0;
     int band = 0;        // of the matrix, on either side of its diagonal; unknowns - 1 when it is full
@@ -23,7 +23,7 @@ std::string kind_of(const Derivation& derivation);
 std::string form_of(const Derivation& derivation);
 // Unknowns of the equations of one step.
 int unknowns_of(const Derivation& derivation);
-std::vector<Solve> solves_of(const Derivation& derivation);
+std::vector<GroupSolve> solves_of(const Derivation& derivation);
 // "Newton's iteration; {x, y}: 4 equations as a full matrix; ..."
 std::string solver_text(const Derivation& derivation);
 

@@ -83,6 +83,7 @@ public:
         read_definitions();
         read_lagrangian();
         read_forces();
+        read_places();
         read_initial_values();
         read_method();
         read_run();
@@ -386,15 +387,26 @@ private:
         return *found;
     }
 
+    // The values that the Lagrangian and the forces asked for.
+    void read_places() {
+        const auto x = names_.all.find("x"), y = names_.all.find("y");
+        if (x == names_.all.end() || y == names_.all.end() || !x->second.definition || !y->second.definition) return;
+        if (x->second.definition->indices.size() > 1) return;
+        for (const auto& [subscript, value] : x->second.definition->values)
+            if (const auto other = y->second.definition->values.find(subscript);
+                other != y->second.definition->values.end() && value.complete && other->second.complete &&
+                !value.value.velocities && !other->second.value.velocities)
+                scene_.places.emplace_back(value.value.expression, other->second.value.expression);
+    }
+
     void read_initial_values() {
         const std::string rate = scene_.start == Start::velocity ? "velocity" : "momentum";
         for (const Group& group : groups_) {
             read_values(group, *group.position, "position", scene_.initial_position);
             read_values(group, *group.rate, rate, scene_.initial_rate);
             for (std::size_t k = 0; k < group.count; ++k)
-                scene_.coordinates[group.first + k].rate_at = group.rate->value.kind == Value::Kind::list
-                                                                  ? group.rate->value.items[k].at
-                                                                  : group.rate->value.at;
+                scene_.coordinates[group.first + k].rate_at =
+                    group.rate->value.kind == Value::Kind::list ? group.rate->value.items[k].at : group.rate->value.at;
         }
     }
 
