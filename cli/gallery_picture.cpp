@@ -296,20 +296,21 @@ Picture strobe(const Scene& scene, const States& states) {
             points.push_back({cln::double_approx(numbers[i]), cln::double_approx(numbers[i + 1])});
         return points;
     };
-    constexpr std::size_t rods = 28, most_states = 600;
+    constexpr std::size_t rods = 28, most_states = 2000;
+    const std::size_t stride = std::max<std::size_t>(1, states.count() / most_states);
     Curve trail{{}, colour(1), 1.6, true};
     double reach = 0, length = 0;
-    std::size_t last = 0;
-    for (; last < states.count() && last < most_states; ++last) {
-        const Point end = bodies(last).back();
+    std::size_t last = 0;  // row
+    for (std::size_t row = 0; row < states.count() && length <= 6 * reach; row += stride) {
+        const Point end = bodies(row).back();
         reach = std::max(reach, std::hypot(end.x, end.y));
-        if (last > 0) length += std::hypot(end.x - trail.points.back().x, end.y - trail.points.back().y);
-        if (length > 6 * reach) break;
+        if (row > 0) length += std::hypot(end.x - trail.points.back().x, end.y - trail.points.back().y);
         trail.points.push_back(end);
+        last = row;
     }
     std::vector<Curve> curves;
     for (std::size_t i = 0; i < rods; ++i) {
-        const std::size_t row = i * (last - 1) / (rods - 1);
+        const std::size_t row = i * last / (rods - 1);
         const double pale = 0.85 * (1 - static_cast<double>(i) / (rods - 1));
         const auto mix = [&](int full) { return full + static_cast<int>(pale * (255 - full)); };
         Curve curve{
@@ -319,8 +320,8 @@ Picture strobe(const Scene& scene, const States& states) {
     }
     curves.push_back(trail);
     return drawn(scene, curves, {"x", "y", true},
-                 fmt::format("{} pictures, to t = {:.3g}, and the path of the {} (orange).", rods,
-                             states.time(last - 1), scene.places.size() == 1 ? "bob" : "last bob"));
+                 fmt::format("{} pictures, to t = {:.3g}, and the path of the {} (orange).", rods, states.time(last),
+                             scene.places.size() == 1 ? "bob" : "last bob"));
 }
 
 Picture polar(const Scene& scene, const States& states) {

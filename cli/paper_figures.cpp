@@ -18,7 +18,7 @@ namespace {
 constexpr double omega = 2 * std::numbers::pi;
 constexpr double steps_of_growth[3] = {0.1, 0.05, 0.025};
 
-void draw(const std::string& folder, const std::string& name, const std::string& script, int height) {
+void draw_figure(const std::string& folder, const std::string& name, const std::string& script, int height) {
     draw(folder, name, script, 900, height,
          "Install it (apt install gnuplot-nox) or leave the figures out with --no-figures.");
 }
@@ -174,7 +174,8 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        {},
                        ""});
     write_file(folder + "/figure1.csv", motion_data(PaperSystem::oscillator, 1.0 / 3, 3, 60));
-    draw(folder, "figure1", motion_script("figure1", "time t (one period T = 1)", "1.02", "-2.1:2.1", "-2.1:2.1"), 640);
+    draw_figure(folder, "figure1",
+                motion_script("figure1", "time t (one period T = 1)", "1.02", "-2.1:2.1", "-2.1:2.1"), 640);
 
     Evolution oscillator = evolution(PaperSystem::oscillator, 1e5, 1, {2.50e-11, 5.45e-14, 1.35e-13});
     figures.push_back(
@@ -192,15 +193,16 @@ std::vector<Figure> draw_figures(const std::string& folder) {
          "caption's rates for these "
          "steps, like ours in double arithmetic, are rounding and depend on the order of the operations."});
     write_file(folder + "/figure2.csv", oscillator.data);
-    draw(folder, "figure2",
-         std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:1e5]\n") +
-             logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|\"\nset yrange [1e-9:1e-3]\n" + "plot " +
-             curves_of("figure2", 2, 2, true) + "\n" +
-             "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H_d/H_d(0) − 1|\"\nset "
-             "yrange [1e-17:1e-8]\n" +
-             "plot " + curves_of("figure2", 5, 2, false) + ", " + curves_of("figure2", 8, 12, false) +
-             "\nunset multiplot\n",
-         700);
+    draw_figure(
+        folder, "figure2",
+        std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:1e5]\n") +
+            logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|\"\nset yrange [1e-9:1e-3]\n" + "plot " +
+            curves_of("figure2", 2, 2, true) + "\n" +
+            "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H_d/H_d(0) − 1|\"\nset "
+            "yrange [1e-17:1e-8]\n" +
+            "plot " + curves_of("figure2", 5, 2, false) + ", " + curves_of("figure2", 8, 12, false) +
+            "\nunset multiplot\n",
+        700);
 
     const double period = exact_period(PaperSystem::pendulum);
     figures.push_back({"figure3",
@@ -211,10 +213,10 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        {},
                        ""});
     write_file(folder + "/figure3.csv", motion_data(PaperSystem::pendulum, period / 5, 25, 20));
-    draw(folder, "figure3",
-         motion_script("figure3", "time t (one period 1.180)", fmt::format("{:.3f}", 5.05 * period), "-2.1:2.1",
-                       "-1.9:1.9"),
-         640);
+    draw_figure(folder, "figure3",
+                motion_script("figure3", "time t (one period 1.180)", fmt::format("{:.3f}", 5.05 * period), "-2.1:2.1",
+                              "-1.9:1.9"),
+                640);
 
     Evolution pendulum =
         evolution(PaperSystem::pendulum, 5e3, 4 * std::numbers::pi_v<long double> * std::numbers::pi_v<long double>,
@@ -227,12 +229,13 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        "are of another kind or unit, which the text does not give: they do not fall with h, though "
                        "they would if the first two were exchanged."});
     write_file(folder + "/figure4.csv", pendulum.data);
-    draw(folder, "figure4",
-         std::string("set lmargin 11\nset rmargin 3\nset xrange [1:5000]\n") + logarithmic +
-             "set format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H − H(0)|/(mω^2)\"\nset yrange "
-             "[1e-10:1e-4]\n" +
-             "plot " + curves_of("figure4", 2, 2, true) + "\n",
-         480);
+    draw_figure(
+        folder, "figure4",
+        std::string("set lmargin 11\nset rmargin 3\nset xrange [1:5000]\n") + logarithmic +
+            "set format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H − H(0)|/(mω^2)\"\nset yrange "
+            "[1e-10:1e-4]\n" +
+            "plot " + curves_of("figure4", 2, 2, true) + "\n",
+        480);
     return figures;
 }
 
