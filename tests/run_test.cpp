@@ -200,7 +200,8 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
           pendulum + ": 2e+31 steps are too many to count; make the step larger or the end time smaller\n");
     CHECK(refusal({"--every", "0"}) ==
           "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
-    CHECK(contains(refusal({"--points", "6"}), "lobatto: --points: Value 6 not in range"));
+    CHECK(contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
+    CHECK(contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
 }
 
 TEST_CASE("a run that stops keeps what was computed, explains itself and returns 3") {
