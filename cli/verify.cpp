@@ -150,9 +150,10 @@ double worst_defect(const Kernel& kernel, const Start<real>& start,
 template <class real>
 Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& precision, bool symplectic) {
     Return result;
-    // Each step costs a product of 2n x 2n matrices.
-    const double products = sizeof(real) == sizeof(double) ? 2e9 : 4e7, rows = 2 * static_cast<double>(start.q.size());
-    const auto most = static_cast<std::int64_t>(products / (rows * rows * rows));
+    // Each step costs a product of 2n x 2n matrices and the solution of N equations with 2n right sides.
+    const double products = sizeof(real) == sizeof(double) ? 2e9 : 4e7, rows = 2 * static_cast<double>(start.q.size()),
+                 N = kernel->unknowns;
+    const auto most = static_cast<std::int64_t>(products / (rows * rows * rows + N * N * (rows + N / 3)));
     for (std::int64_t steps = std::clamp<std::int64_t>(most, 10, short_run); steps > 0; steps /= 2) {
         result = there_and_back(kernel, start.parameters, start.q, start.p, start.step, steps, symplectic);
         if (result.rounding < 1e-6) break;
