@@ -57,6 +57,7 @@ void SystemReader::read() {
     read_definitions();
     read_lagrangian();
     read_forces();
+    read_places();
     read_initial_values();
 }
 
@@ -325,11 +326,29 @@ const SystemReader::Group& SystemReader::group_of(const Subject& subject) const 
     return *found;
 }
 
+// Those values that the Lagrangian and the forces asked for.
+void SystemReader::read_places() {
+    const auto x = names_.all.find("x"), y = names_.all.find("y");
+    if (x == names_.all.end() || y == names_.all.end() || !x->second.definition || !y->second.definition) return;
+    if (x->second.definition->indices.size() > 1) return;
+    const auto& others = y->second.definition->values;
+    for (const auto& [subscript, value] : x->second.definition->values)
+        if (const auto other = others.find(subscript); other != others.end() && value.complete &&
+                                                       other->second.complete && !value.value.velocities &&
+                                                       !other->second.value.velocities)
+            scene_.places.emplace_back(value.value.expression, other->second.value.expression);
+}
+
 void SystemReader::read_initial_values() {
     const std::string rate = scene_.start == Start::velocity ? "velocity" : "momentum";
     for (const Group& group : groups_) {
         read_values(group, *group.position, "position", scene_.initial_position);
         read_values(group, *group.rate, rate, scene_.initial_rate);
+        for (std::size_t k = 0; k < group.count; ++k) {
+            const Value& given = group.rate->value;
+            scene_.coordinates[group.first + k].rate_at =
+                given.kind == Value::Kind::list ? given.items[k].at : given.at;
+        }
     }
 }
 

@@ -56,6 +56,7 @@ private:
     void read_lagrangian();
     void read_forces();
     const Group& group_of(const Subject& subject) const;
+    void read_places();
     void read_initial_values();
     void read_values(const Group& group, const Entry& entry, const std::string& what, std::vector<GiNaC::ex>& values);
 
