@@ -12,8 +12,10 @@
 
 namespace lobatto {
 
+void add_check(CLI::App& program);
 void add_derive(CLI::App& program);
 void add_emit(CLI::App& program);
+void add_gallery(CLI::App& program);
 void add_run(CLI::App& program);
 void add_paper(CLI::App& program);
 void add_verify(CLI::App& program);

@@ -30,6 +30,7 @@ struct EmitCommand {
     std::string scene;
     std::string folder;
     MethodOption method;
+    bool general = false;
     Precision precision = Precision::double_;
     bool standalone = false;
     bool no_support = false;
@@ -95,7 +96,7 @@ void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
     const KernelSource source =
-        emit(derive(scene), {options.precision, options.standalone ? kernel_hpp_text : std::string()});
+        emit(derive(scene, options.general), {options.precision, options.standalone ? kernel_hpp_text : std::string()});
 
     std::error_code error;
     fs::create_directories(options.folder, error);
@@ -128,6 +129,8 @@ void add_emit(CLI::App& program) {
         ->required()
         ->type_name("FOLDER");
     options->method.add_to(*command);
+    command->add_flag("--general", options->general,
+                      "use nothing of what the scene's structure allows, for comparison");
     const std::map<std::string, Precision> precisions = {{"float", Precision::single},
                                                          {"double", Precision::double_},
                                                          {"long-double", Precision::extended},

@@ -67,10 +67,12 @@ void flush_output() {
 void describe(CLI::App& program) {
     program.set_version_flag("--version", "lobatto " LOBATTO_VERSION);
     program.require_subcommand(0, 1);
+    add_check(program);
     add_derive(program);
     add_emit(program);
     add_run(program);
     add_verify(program);
+    add_gallery(program);
     add_paper(program);
     // Last, because a command takes over the footer that its parent has at that moment.
     program.footer(

@@ -6,13 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <numbers>
 
+#include "cli/drawing.hpp"
 #include "cli/paper_tables.hpp"
-#include "runtime/error.hpp"
-#include "runtime/process.hpp"
 
 namespace lobatto {
 
@@ -21,46 +18,9 @@ namespace {
 constexpr double omega = 2 * std::numbers::pi;
 constexpr double steps_of_growth[3] = {0.1, 0.05, 0.025};
 
-void write_file(const std::string& path, const std::string& text) {
-    std::ofstream stream(path, std::ios::binary);
-    if (!(stream << text).flush())
-        throw MachineError(fmt::format("cannot write {}. Is the folder writable, is the disk full?", path));
-}
-
-// Colours that stay apart for every eye and in grey (Okabe and Ito).
-const char* const style = R"(
-set terminal svg size 900,SIZE dynamic font "DejaVu Sans,15" background rgb "white"
-set datafile separator ","
-set border 3 lc rgb "#444444" lw 1.2
-set tics nomirror out scale 0.6 tc rgb "#222222"
-set grid lc rgb "#e4e4e4" lw 1 lt 1
-set style line 1 lc rgb "#999999" lw 2
-set style line 2 lc rgb "#0072b2" lw 2 pt 7 ps 0.75
-set style line 3 lc rgb "#d55e00" lw 2 pt 8 ps 1.3
-set style line 4 lc rgb "#009e73" lw 2 pt 4 ps 0.9
-set style line 12 lc rgb "#0072b2" lw 2 dt 3
-set style line 13 lc rgb "#d55e00" lw 2 dt 3
-set style line 14 lc rgb "#009e73" lw 2 dt 3
-set key outside top center horizontal maxrows 1 reverse Left samplen 2 width -1
-)";
-
-void draw(const std::string& folder, const std::string& name, const std::string& script, int height) {
-    std::string text = style;
-    text.replace(text.find("SIZE"), 4, std::to_string(height));
-    const std::string path = folder + "/" + name + ".gnuplot";
-    write_file(path, text + "set output \"" + name + ".svg\"\n" + script);
-    ProcessRequest request;
-    request.arguments = {"/usr/bin/env", "gnuplot", name + ".gnuplot"};
-    request.folder = folder;
-    request.environment = {{"LC_ALL", "C"}};
-    const ProcessResult result = run_process(request);
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-    if (!result.succeeded())
-        throw MachineError(
-            fmt::format("gnuplot could not draw {}: {}Install it (apt install gnuplot-nox) or leave the figures out "
-                        "with --no-figures.",
-                        name, result.output.empty() ? "no message\n" : result.output));
+void draw_figure(const std::string& folder, const std::string& name, const std::string& script, int height) {
+    draw(folder, name, script, 900, height,
+         "Install it (apt install gnuplot-nox) or leave the figures out with --no-figures.");
 }
 
 // Figures 1 and 3: exact curve at `fine` points a step, states of the three schemes at the steps; p divided by m omega.
@@ -214,7 +174,8 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        {},
                        ""});
     write_file(folder + "/figure1.csv", motion_data(PaperSystem::oscillator, 1.0 / 3, 3, 60));
-    draw(folder, "figure1", motion_script("figure1", "time t (one period T = 1)", "1.02", "-2.1:2.1", "-2.1:2.1"), 640);
+    draw_figure(folder, "figure1",
+                motion_script("figure1", "time t (one period T = 1)", "1.02", "-2.1:2.1", "-2.1:2.1"), 640);
 
     Evolution oscillator = evolution(PaperSystem::oscillator, 1e5, 1, {2.50e-11, 5.45e-14, 1.35e-13});
     figures.push_back(
@@ -232,15 +193,16 @@ std::vector<Figure> draw_figures(const std::string& folder) {
          "caption's rates for these "
          "steps, like ours in double arithmetic, are rounding and depend on the order of the operations."});
     write_file(folder + "/figure2.csv", oscillator.data);
-    draw(folder, "figure2",
-         std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:1e5]\n") +
-             logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|\"\nset yrange [1e-9:1e-3]\n" + "plot " +
-             curves_of("figure2", 2, 2, true) + "\n" +
-             "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H_d/H_d(0) − 1|\"\nset "
-             "yrange [1e-17:1e-8]\n" +
-             "plot " + curves_of("figure2", 5, 2, false) + ", " + curves_of("figure2", 8, 12, false) +
-             "\nunset multiplot\n",
-         700);
+    draw_figure(
+        folder, "figure2",
+        std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:1e5]\n") +
+            logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|\"\nset yrange [1e-9:1e-3]\n" + "plot " +
+            curves_of("figure2", 2, 2, true) + "\n" +
+            "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H_d/H_d(0) − 1|\"\nset "
+            "yrange [1e-17:1e-8]\n" +
+            "plot " + curves_of("figure2", 5, 2, false) + ", " + curves_of("figure2", 8, 12, false) +
+            "\nunset multiplot\n",
+        700);
 
     const double period = exact_period(PaperSystem::pendulum);
     figures.push_back({"figure3",
@@ -251,10 +213,10 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        {},
                        ""});
     write_file(folder + "/figure3.csv", motion_data(PaperSystem::pendulum, period / 5, 25, 20));
-    draw(folder, "figure3",
-         motion_script("figure3", "time t (one period 1.180)", fmt::format("{:.3f}", 5.05 * period), "-2.1:2.1",
-                       "-1.9:1.9"),
-         640);
+    draw_figure(folder, "figure3",
+                motion_script("figure3", "time t (one period 1.180)", fmt::format("{:.3f}", 5.05 * period), "-2.1:2.1",
+                              "-1.9:1.9"),
+                640);
 
     Evolution pendulum =
         evolution(PaperSystem::pendulum, 5e3, 4 * std::numbers::pi_v<long double> * std::numbers::pi_v<long double>,
@@ -267,12 +229,13 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        "are of another kind or unit, which the text does not give: they do not fall with h, though "
                        "they would if the first two were exchanged."});
     write_file(folder + "/figure4.csv", pendulum.data);
-    draw(folder, "figure4",
-         std::string("set lmargin 11\nset rmargin 3\nset xrange [1:5000]\n") + logarithmic +
-             "set format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H − H(0)|/(mω^2)\"\nset yrange "
-             "[1e-10:1e-4]\n" +
-             "plot " + curves_of("figure4", 2, 2, true) + "\n",
-         480);
+    draw_figure(
+        folder, "figure4",
+        std::string("set lmargin 11\nset rmargin 3\nset xrange [1:5000]\n") + logarithmic +
+            "set format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H − H(0)|/(mω^2)\"\nset yrange "
+            "[1e-10:1e-4]\n" +
+            "plot " + curves_of("figure4", 2, 2, true) + "\n",
+        480);
     return figures;
 }
 

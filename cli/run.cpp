@@ -11,6 +11,7 @@
 #include "cli/commands.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/method_option.hpp"
+#include "cli/motion.hpp"
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
 #include "cli/watch.hpp"
@@ -29,6 +30,7 @@ struct RunOptions {
     std::string scene;
     std::string output;  // empty: out/NAME.csv
     MethodOption method;
+    bool general = false;
     Overrides overrides;
     bool quiet = false;
 };
@@ -59,66 +61,6 @@ private:
     struct sigaction before_[2]{};
 };
 
-// The number of steps to the end; the end itself when it is a multiple of h.
-struct Steps {
-    std::int64_t count = 0;
-    bool reaches_end = true;
-};
-
-Steps steps_of(const Scene& scene, const Overrides& overrides) {
-    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step"),
-                         until = scene.evaluate(scene.run.until, "the end time");
-    if (!step.is_positive()) {
-        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}",
-                                     overrides.step.empty() ? scene.path : "--step", step.to_double()));
-    }
-    if (until.is_negative()) {
-        throw InputError(fmt::format("{}: the end time must not be negative, but is {:.6g}",
-                                     overrides.until.empty() ? scene.path : "--until", until.to_double()));
-    }
-    const double ratio = (until / step).to_double();
-    if (!(ratio < 9e15))
-        throw InputError(fmt::format(
-            "{}: {:.3g} steps are too many to count; make the step larger or the end time smaller", scene.path, ratio));
-    const double nearest = std::round(ratio);
-    const bool reaches_end = std::fabs(ratio - nearest) <= 1e-9;
-    return {static_cast<std::int64_t>(reaches_end ? nearest : std::floor(ratio)), reaches_end};
-}
-
-std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& values, const std::string& what) {
-    std::vector<double> numbers;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-        const std::string name = fmt::format("the initial {} of {}", what, scene.coordinates[k].name);
-        numbers.push_back(scene.evaluate(values[k], name).to_double());
-    }
-    return numbers;
-}
-
-// Prepares and starts the stepper too: a start that is impossible is known before anything is written.
-TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper) {
-    TrajectoryRequest request;
-    for (const Parameter& parameter : scene.parameters)
-        request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
-    request.step = scene.evaluate(scene.run.step, "the step").to_double();
-    request.steps = steps;
-    request.every = scene.outputs.every;
-    const bool from_velocity = scene.start == Start::velocity;
-    request.q = doubles(scene, scene.initial_position, "position");
-    request.p = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
-
-    TrajectoryResult none;
-    none.status = stepper.prepare(request.parameters, request.step);
-    if (none.status == LOBATTO_OK) {
-        if (from_velocity) request.p = stepper.momentum(request.time, request.q, request.p);
-        none.status = stepper.start(request.time, request.q, request.p);
-    }
-    none.q = request.q;
-    none.p = request.p;
-    if (none.status != LOBATTO_OK)
-        throw ComputationError(fmt::format("{}: {}", scene.path, explain_stop(none, request)));
-    return request;
-}
-
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
     TrajectoryHeader header;
     header.scene = scene.title.empty() ? scene.name : scene.title;
@@ -129,9 +71,19 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
     header.columns = {{"t", ""}};
     for (const Coordinate& coordinate : scene.coordinates)
         header.columns.emplace_back(coordinate.name, coordinate.unit);
-    for (const Coordinate& coordinate : scene.coordinates) header.columns.emplace_back("p_" + coordinate.name, "");
+    if (scene.outputs.momenta)
+        for (const Coordinate& coordinate : scene.coordinates) header.columns.emplace_back("p_" + coordinate.name, "");
     header.energy = scene.outputs.energy;
     if (header.energy) header.columns.emplace_back("H", "");
+    return header;
+}
+
+// Of the file beside it with the events: their numbers, then the state as in the trajectory.
+TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
+    if (header.energy) header.columns.pop_back();
+    header.energy = false;
+    header.columns.insert(header.columns.begin(), {"event", ""});
+    for (const Event& event : scene.outputs.events) header.events.push_back(event.text);
     return header;
 }
 
@@ -150,34 +102,55 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// The stepper is prepared; a unit of the first coordinate may be empty.
-void print_table(const LoadedStepper<double>& stepper, const TrajectoryRequest& request, const TrajectoryResult& result,
-                 const Watch& watch, const std::string& unit) {
+bool has_forces(const Derivation& derivation) {
+    const auto& forces = derivation.system.outer_force;
+    return std::any_of(forces.begin(), forces.end(), [](const GiNaC::ex& force) { return !force.is_zero(); });
+}
+
+std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult& result) {
+    if (kernel.form == LOBATTO_LINEAR_MAP) return "none: the step is a linear map";
+    if (kernel.unknowns == 0) return "none: the step is explicit";
+    if (kernel.linear != 0) return "none: the equations of a step are linear";
+    return fmt::format("{:.2f} per step, at most {}",
+                       static_cast<double>(result.iterations) / static_cast<double>(result.steps_done),
+                       result.iterations_most);
+}
+
+// The stepper is prepared.
+void print_table(const Derivation& derivation, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
+                 const TrajectoryResult& result, const Watch& watch) {
     const std::string of_all = result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
     print_row("steps",
               fmt::format("{}{}, h = {:.6g}, to t = {:.6g}", result.steps_done, of_all, request.step, result.time));
     if (result.steps_done == 0) return;
-    const double steps = static_cast<double>(result.steps_done);
     const lobatto_kernel& kernel = stepper.kernel().table();
-    print_row("time per step", duration(result.seconds / steps));
-    print_row("Newton iterations", kernel.form == LOBATTO_LINEAR_MAP ? "none: the step is a linear map"
-                                   : kernel.unknowns == 0            ? "none: the step is explicit"
-                                                                     : fmt::format("{:.2f} per step, at most {}",
-                                                                                   static_cast<double>(result.iterations) / steps,
-                                                                                   result.iterations_most));
-    const double H0 = std::fabs(result.energy_start);
-    print_row("energy error",
-              fmt::format("{:.2g} at most{}", result.energy_error_largest,
-                          H0 > 0 ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
-    if (const auto error = watch.discrete_error())
+    print_row("time per step", duration(result.seconds / static_cast<double>(result.steps_done)));
+    print_row(derivation.structure.absorbed ? "iterations" : "Newton iterations", iterations_text(kernel, result));
+    const bool conserves = derivation.system.autonomous && !has_forces(derivation);
+    if (kernel.has_energy != 0) {
+        const double H0 = std::fabs(result.energy_start);
+        const bool relative = conserves && H0 > 0;
+        print_row(conserves ? "energy error" : "energy change",
+                  fmt::format("{:.2g} at most{}", result.energy_error_largest,
+                              relative ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
+    }
+    if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
-    print_row("symplectic defect",
-              fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p)));  // of the first step
+    if (kernel.has_tangent != 0 && !has_forces(derivation))
+        print_row("symplectic defect",
+                  fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p)));  // of the first step
     if (const auto error = watch.position_error()) {
+        const std::string& unit = derivation.scene.coordinates.front().unit;
         print_row("position error",
                   fmt::format("{:.2g}{} at most, against the exact {}solution", *error, unit.empty() ? "" : " " + unit,
                               watch.is_elliptic() ? "elliptic " : ""));
     }
+}
+
+void print_events(const std::vector<Event>& events, const std::vector<std::int64_t>& counts, const std::string& path) {
+    for (std::size_t i = 0; i < events.size(); ++i)
+        print_row(i == 0 ? "events" : "",
+                  fmt::format("{} of '{}'{}", counts[i], events[i].text, i + 1 < events.size() ? "" : ", in " + path));
 }
 
 std::string output_path(const RunOptions& options, const Scene& scene) {
@@ -190,11 +163,23 @@ std::string output_path(const RunOptions& options, const Scene& scene) {
     return "out/" + scene.name + ".csv";
 }
 
+// Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
+std::string event_path(const RunOptions& options, const Scene& scene) {
+    std::error_code ignored;
+    const bool beside = options.output.empty() || !std::filesystem::exists(options.output, ignored) ||
+                        std::filesystem::is_regular_file(options.output, ignored);
+    RunOptions without = options;
+    if (!beside) without.output.clear();
+    std::string path = output_path(without, scene);
+    if (path.ends_with(".csv")) path.resize(path.size() - 4);
+    return path + ".events.csv";
+}
+
 void run(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
-    const Derivation derivation = derive(scene);
+    const Derivation derivation = derive(scene, options.general);
     const KernelSource source = emit(derivation);
     const double derivation_seconds = seconds_since(start);
     apply(options.overrides, scene);  // after the derivation: one kernel serves all values
@@ -210,7 +195,18 @@ void run(const RunOptions& options) {
                                        : fmt::format("compiled in {:.2f} s", compiled.seconds));
     }
 
-    TrajectoryFile file(path, header_of(scene, source, request));
+    const TrajectoryHeader header = header_of(scene, source, request);
+    TrajectoryFile file(path, header);
+    std::optional<TrajectoryFile> event_file;
+    std::vector<std::int64_t> event_counts(scene.outputs.events.size(), 0);
+    if (!event_counts.empty()) {
+        event_file.emplace(event_path(options, scene), event_header_of(scene, header));
+        request.events = [&](const EventRecords& records) {
+            event_file->write(records);
+            for (std::int64_t i = 0; i < records.count; ++i)
+                ++event_counts[static_cast<std::size_t>(records.rows[i * records.columns])];
+        };
+    }
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
     Watch watch(scene, derivation.structure, stepper, velocity);
@@ -230,9 +226,11 @@ void run(const RunOptions& options) {
     }
     watch.look_at_end(result);
     file.finish();
+    if (event_file) event_file->finish();
 
     if (!options.quiet) {
-        print_table(stepper, request, result, watch, scene.coordinates.front().unit);
+        print_table(derivation, stepper, request, result, watch);
+        print_events(scene.outputs.events, event_counts, event_file ? event_path(options, scene) : "");
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
         if (!steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
@@ -256,6 +254,8 @@ void add_run(CLI::App& program) {
     command->add_option("scene", options->scene, "Scene file")->required();
     command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
     options->method.add_to(*command);
+    command->add_flag("--general", options->general,
+                      "use nothing of what the scene's structure allows, for comparison");
     command->add_option("--step", options->overrides.step,
                         "Step h; may use the scene's parameters, as in 2*pi/omega/50");
     command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");

@@ -20,7 +20,7 @@ long double nearest(const Scene& scene, const GiNaC::ex& value, const char* what
 
 Watch::Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
              const std::vector<double>& velocity)
-    : closed_(structure.closed_solution), discrete_(discrete_energy(stepper)) {
+    : between_(scene.outputs.dense), closed_(structure.closed_solution), discrete_(discrete_energy(stepper)) {
     if (!closed_) return;
     omega_squared_ = nearest(scene, closed_->omega_squared, "the squared frequency");
     q0_ = nearest(scene, scene.initial_position[0], "the initial position");
@@ -31,13 +31,14 @@ Watch::Watch(const Scene& scene, const Structure& structure, const LoadedStepper
 void Watch::look(const Records& records) {
     const int n = (records.columns - 1) / 2;
     for (std::int64_t i = 0; i < records.count; ++i, ++seen_) {
+        if (seen_ % (between_ + 1) != 0) continue;  // between two steps
         const double* row = records.rows + i * records.columns;
         if (discrete_) {
             const double value = (*discrete_)(row + 1, row + 1 + n);
             if (seen_ == 0) discrete_start_ = value;
             discrete_error_ = std::fmax(discrete_error_, std::fabs(value - discrete_start_));
         }
-        if (closed_ && seen_ % stride_ == 0) compare(row[0], row[1]);
+        if (closed_ && seen_ / (between_ + 1) % stride_ == 0) compare(row[0], row[1]);
     }
 }
 

@@ -27,6 +27,7 @@ public:
 private:
     void compare(double time, double q);
 
+    std::int64_t between_ = 0;  // states between two steps
     std::optional<ClosedSolution> closed_;
     long double omega_squared_ = 0, q0_ = 0, velocity0_ = 0;
     double position_error_ = 0;

@@ -28,15 +28,19 @@ public:
 
     Operand evaluate(const Syntax& formula, Frame& frame) {
         const Arithmetic arithmetic(frame.formula, work_);
-        try {
-            work_.spend(1);
-        } catch (const Refusal& refusal) {
-            fail(formula.at, frame, refusal.what());
-        }
+        spend(formula.at, frame, 1);
         if (++depth_ > deepest) fail_depth(formula.at, frame);
         Operand result = value_of(formula, frame, arithmetic);
         --depth_;
         return result;
+    }
+
+    void spend(const Token& at, const Frame& frame, double operations) const {
+        try {
+            work_.spend(operations);
+        } catch (const Refusal& refusal) {
+            fail(at, frame, refusal.what());
+        }
     }
 
     // A value that is needed as a whole number: a subscript, a bound.
@@ -257,7 +261,11 @@ Operand evaluate(const Source& source, const Syntax& formula, const Scope& scope
     Work own;
     Evaluator::Frame frame = frame_of(scope, indices);
     Work& work = scope.names != nullptr ? scope.names->work : own;
-    return Evaluator(source, work, scope.names, scope.motion_allowed).evaluate(formula, frame);
+    Evaluator evaluator(source, work, scope.names, scope.motion_allowed);
+    Operand result = evaluator.evaluate(formula, frame);
+    // Its value will be needed, with 60 digits.
+    if (!scope.motion_allowed) evaluator.spend(formula.at, frame, 4 * result.extent.size);
+    return result;
 }
 
 long evaluate_whole(const Source& source, const Syntax& formula, const Scope& scope) {

@@ -395,36 +395,25 @@ private:
             fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula,
                                  fmt::join(names, ", "), near));
         }
-        std::vector<std::string> declared, near;
-        std::string time;
+        std::vector<std::string> declared = indices_, near = indices_;
         if (scope_.names != nullptr) {
-            for (const auto& [declared_name, meaning] : scope_.names->all) {
-                const bool moves = meaning.role == Name::Role::coordinate || meaning.role == Name::Role::time;
-                if (meaning.role == Name::Role::time) time = declared_name;
-                if (moves && !scope_.motion_allowed) continue;
-                std::string brackets;
-                if (meaning.array) brackets = "[i]";
-                if (meaning.definition && !meaning.definition->indices.empty())
-                    brackets = fmt::format("[{}]", fmt::join(meaning.definition->indices, ","));
-                declared.push_back(declared_name + brackets);
-                near.push_back(declared_name);
-                if (meaning.role != Name::Role::coordinate) continue;
-                declared.push_back(declared_name + brackets + "'");
-                near.push_back(declared_name + "'");
+            if (name == "t" && scope_.motion_allowed) fail_time(at);
+            for (const Spelling& spelling : scope_.names->spellings(scope_.motion_allowed)) {
+                declared.push_back(spelling.written);
+                near.push_back(spelling.plain);
             }
         }
-        for (const std::string& index : indices_) {
-            declared.push_back(index);
-            near.push_back(index);
-        }
-        if (name == "t" && scope_.motion_allowed && scope_.names != nullptr)
-            fail(at, time.empty() ? "the scene declares no time: add the line time = \"t\" before its first [table]"
-                                  : fmt::format("the time of this scene is called {}", time));
         if (declared.empty())
             fail(at, fmt::format("unknown name '{}' in {}: only numbers, pi and functions of them may stand here",
                                  shown, scope_.formula));
         fail(at, fmt::format("unknown name '{}' in {}; declared: {}.{}", shown, scope_.formula, listing(declared),
                              suggestion(name, near)));
+    }
+
+    [[noreturn]] void fail_time(const Token& at) const {
+        for (const auto& [name, meaning] : scope_.names->all)
+            if (meaning.role == Name::Role::time) fail(at, fmt::format("the time of this scene is called {}", name));
+        fail(at, "the scene declares no time: add the line time = \"t\" before its first [table]");
     }
 
     const Source& source_;

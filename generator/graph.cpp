@@ -12,6 +12,10 @@ bool is_rational(const cln::cl_R& value) {
     return cln:: instanceof (value, cln::cl_RA_ring);
 }
 
+bool is_plain(const Constant& constant) {
+    return is_rational(constant.value) || constant.label.empty();
+}
+
 Id Graph::intern(Node node) {
     std::string key;
     const auto put = [&key](std::int32_t number) { key.append(reinterpret_cast<const char*>(&number), sizeof number); };
@@ -74,21 +78,21 @@ Id Graph::add(const std::vector<Id>& terms) {
             flat.push_back(term);
         }
     }
-    // Collect: rest of the term -> rational coefficient.
-    cln::cl_RA constant_term = 0;
-    std::vector<std::pair<Id, cln::cl_RA>> collected;
+    // Collect: rest of the term -> coefficient.
+    cln::cl_R constant_term = 0;
+    std::vector<std::pair<Id, cln::cl_R>> collected;
     std::unordered_map<Id, std::size_t> place;
     for (const Id term : flat) {
-        if (is_constant(term) && is_rational(constant_of(term).value)) {
-            constant_term = constant_term + cln::the<cln::cl_RA>(constant_of(term).value);
+        if (is_constant(term) && is_plain(constant_of(term))) {
+            constant_term = constant_term + constant_of(term).value;
             continue;
         }
-        cln::cl_RA coefficient = 1;
+        cln::cl_R coefficient = 1;
         Id rest = term;
         const Node& node = (*this)[term];
         if (node.op == Op::multiply && is_constant(node.operands.front()) &&
-            is_rational(constant_of(node.operands.front()).value)) {
-            coefficient = cln::the<cln::cl_RA>(constant_of(node.operands.front()).value);
+            is_plain(constant_of(node.operands.front()))) {
+            coefficient = constant_of(node.operands.front()).value;
             std::vector<Id> others(node.operands.begin() + 1, node.operands.end());
             rest = others.size() == 1 ? others.front() : intern({Op::multiply, Stage::constant, 0, std::move(others)});
         }
@@ -121,13 +125,13 @@ Id Graph::multiply(const std::vector<Id>& factors) {
         }
     }
     // Collect: base -> integer exponent.
-    cln::cl_RA coefficient = 1;
+    cln::cl_R coefficient = 1;
     std::vector<std::pair<Id, int>> collected;
     std::unordered_map<Id, std::size_t> place;
     for (const Id factor : flat) {
         const Node& node = (*this)[factor];
-        if (is_constant(factor) && is_rational(constant_of(factor).value)) {
-            coefficient = coefficient * cln::the<cln::cl_RA>(constant_of(factor).value);
+        if (is_constant(factor) && is_plain(constant_of(factor))) {
+            coefficient = coefficient * constant_of(factor).value;
             continue;
         }
         const Id base = node.op == Op::power ? node.operands.front() : factor;
@@ -148,7 +152,7 @@ Id Graph::multiply(const std::vector<Id>& factors) {
         operands.push_back(power(base, exponent));
         const Node& result = (*this)[operands.back()];
         simpler = simpler || result.op == Op::multiply ||
-                  (is_constant(operands.back()) && is_rational(constant_of(operands.back()).value));
+                  (is_constant(operands.back()) && is_plain(constant_of(operands.back())));
     }
     if (simpler) {
         operands.push_back(constant(coefficient));
@@ -173,9 +177,9 @@ Id Graph::power(Id base, int exponent) {
     if (exponent == 0) return number(1);
     if (exponent == 1) return base;
     const Node& node = (*this)[base];
-    if (is_constant(base) && is_rational(constant_of(base).value)) {
-        const cln::cl_RA value = cln::the<cln::cl_RA>(constant_of(base).value);
-        if (!cln::zerop(value)) return constant(cln::expt(value, exponent));
+    if (is_constant(base) && is_plain(constant_of(base))) {
+        const cln::cl_R& value = constant_of(base).value;
+        if (!cln::zerop(value)) return constant(cln::the<cln::cl_R>(cln::expt(value, exponent)));
     }
     if (node.op == Op::power) return power(node.operands.front(), node.index * exponent);
     if (node.op == Op::multiply) {

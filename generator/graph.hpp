@@ -54,8 +54,8 @@ struct Node {
     std::vector<Id> operands;  // add, multiply: sorted
 };
 
-// A constant: rational when known exactly, else a float of number_digits; how it reads ("sqrt(5)/10") when it is not
-// rational.
+// A constant: rational when known exactly, else a float of number_digits or more; how it reads ("sqrt(5)/10") when it
+// is not rational. Floats without a label, from the tables of long rules, read as digits.
 struct Constant {
     cln::cl_R value;
     std::string label;
@@ -86,7 +86,7 @@ public:
     Id number(long numerator, long denominator = 1);
     Id input(const Input& input);
 
-    // Operations in canonical form: nested sums and products are flattened, rational constants combined, equal terms
+    // Operations in canonical form: nested sums and products are flattened, plain constants combined, equal terms
     // and factors collected, operands sorted.
     Id add(const std::vector<Id>& terms);
     Id multiply(const std::vector<Id>& factors);
@@ -140,5 +140,6 @@ private:
 // The value of a constant operation, to number_digits.
 cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& operands);
 bool is_rational(const cln::cl_R& value);
+bool is_plain(const Constant& constant);  // rational, or a float without label: read as digits, and may be combined
 
 }  // namespace lobatto

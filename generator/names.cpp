@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// How names get their meaning, and how they are written.
 #include "generator/names.hpp"
+
+#include <fmt/format.h>
 
 namespace lobatto {
 
@@ -32,6 +35,21 @@ Name& Names::add_time(const std::string& name, const GiNaC::symbol& time) {
     added.values.back().moves = true;
     flow.next[time] = time + flow.dt;
     return added;
+}
+
+std::vector<Spelling> Names::spellings(bool motion_allowed) const {
+    std::vector<Spelling> result;
+    for (const auto& [name, meaning] : all) {
+        const bool coordinate = meaning.role == Name::Role::coordinate;
+        if (!motion_allowed && (coordinate || meaning.role == Name::Role::time)) continue;
+        std::string written = name;
+        if (meaning.array) written += "[i]";
+        if (meaning.definition && !meaning.definition->indices.empty())
+            written += fmt::format("[{}]", fmt::join(meaning.definition->indices, ","));
+        result.push_back({written, name});
+        if (coordinate) result.push_back({written + "'", name + "'"});
+    }
+    return result;
 }
 
 }  // namespace lobatto

@@ -36,6 +36,11 @@ struct Name {
     bool used = false;
 };
 
+// A name as formulas write it, x[i]', and without its brackets, as people misspell it.
+struct Spelling {
+    std::string written, plain;
+};
+
 struct Names {
     std::map<std::string, Name, std::less<>> all;
     Flow flow;
@@ -45,6 +50,9 @@ struct Names {
     Name& add_coordinate(const std::string& name, const std::vector<GiNaC::symbol>& positions,
                          const std::vector<GiNaC::symbol>& velocities, bool array = false);
     Name& add_time(const std::string& name, const GiNaC::symbol& time);
+
+    // For suggestions; without those that move unless they are allowed.
+    std::vector<Spelling> spellings(bool motion_allowed) const;
 };
 
 }  // namespace lobatto

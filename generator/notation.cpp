@@ -157,9 +157,6 @@ private:
         return text + suffix;
     }
 
-    // Shown by its digits.
-    static bool is_plain(const Constant& c) { return is_rational(c.value) || c.label.empty(); }
-
     Printed constant(Id id) const {
         const Constant& c = graph_.constant_of(id);
         if (notation_ == Notation::cpp) return {literal(c.value), cln::minusp(c.value) ? sign : atom};

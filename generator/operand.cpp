@@ -165,7 +165,7 @@ Operand Arithmetic::compute(const std::string& operation, const std::vector<cons
     Operand result;
     bool constant = true, rational = true;
     for (const Operand* operand : operands) {
-        parts += static_cast<double>(operand->expression.nops()) / 20;
+        parts += static_cast<double>(operand->expression.nops()) / 3;
         constant = constant && operand->value;
         rational = rational && is_a<numeric>(operand->expression);
         result.moves = result.moves || operand->moves;

@@ -3,6 +3,7 @@
 #include "generator/pipeline.hpp"
 
 #include "generator/programs.hpp"
+#include "generator/start.hpp"
 
 namespace lobatto {
 
@@ -15,6 +16,7 @@ Derivation derive(const Scene& scene, bool general) {
     Derivation derivation;
     derivation.scene = scene;
     derivation.system = build_system(scene);
+    check_start(scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     derivation.structure = find_structure(scene, derivation.system, derivation.quadrature, general);
     return derivation;

@@ -2,6 +2,9 @@
 // Formulas as numbers: 60 digits, at seeded points near a scene's start.
 #include "generator/sample.hpp"
 
+#include <stdexcept>
+#include <tuple>
+
 namespace lobatto {
 
 namespace {
@@ -10,6 +13,73 @@ const cln::float_format_t format = cln::float_format(number_digits);
 
 std::size_t index_of(const GiNaC::exmap& inputs, const GiNaC::ex& symbol) {
     return static_cast<std::size_t>(GiNaC::ex_to<GiNaC::numeric>(inputs.at(symbol)).to_int());
+}
+
+// |d value / d operand| at a value of an operation with one operand; infinite slopes, of roots and inverse functions at
+// the end of their domains, are given as 0.
+cln::cl_R slope(const Node& node, const cln::cl_R& x, const cln::cl_R& value) {
+    const auto over = [](const cln::cl_R& above, const cln::cl_R& below) {
+        return cln::zerop(below) ? cln::cl_R(0) : above / below;
+    };
+    switch (node.op) {
+        case Op::power:
+            return over(node.index * value, x);
+        case Op::sqrt:
+            return over(1, 2 * value);
+        case Op::sin:
+            return cln::cos(x);
+        case Op::cos:
+            return cln::sin(x);
+        case Op::tan:
+            return 1 + cln::square(value);
+        case Op::exp:
+            return value;
+        case Op::log:
+            return 1 / x;
+        case Op::sinh:
+            return cln::sqrt(1 + cln::square(value));
+        case Op::cosh:
+            return cln::sqrt(cln::max(cln::square(value) - 1, cln::cl_R(0)));
+        case Op::tanh:
+            return 1 - cln::square(value);
+        case Op::asin:
+        case Op::acos:
+            return over(1, cln::sqrt(cln::max(1 - cln::square(x), cln::cl_R(0))));
+        case Op::atan:
+            return 1 / (1 + cln::square(x));
+        default:
+            throw std::logic_error("slope: not an operation with one operand");
+    }
+}
+
+// The size of a value from those of its operands: first-order error analysis, each operand in error by its size.
+cln::cl_R size_of(const Node& node, const Sized& result, const std::vector<Sized>& operands) {
+    cln::cl_R size = cln::abs(result.value);
+    switch (node.op) {
+        case Op::constant:
+        case Op::input:
+            return size;
+        case Op::add:
+            for (const Sized& operand : operands) size = cln::max(size, operand.size);
+            return size;
+        case Op::multiply:
+            for (std::size_t i = 0; i < operands.size(); ++i) {
+                cln::cl_R product = operands[i].size;
+                for (std::size_t j = 0; j < operands.size(); ++j)
+                    if (j != i) product = product * cln::abs(operands[j].value);
+                size = cln::max(size, product);
+            }
+            return size;
+        case Op::raise: {  // x^y = exp(y log x)
+            const auto& [base, exponent] = std::tie(operands[0], operands[1]);
+            if (!cln::plusp(base.value)) return cln::max(size, base.size);
+            const cln::cl_R logarithm = cln::abs(cln::ln(cln::cl_float(base.value, format)));
+            return cln::max(
+                size, size * cln::max(cln::abs(exponent.value) * base.size / base.value, logarithm * exponent.size));
+        }
+        default:
+            return cln::max(size, operands[0].size * cln::abs(slope(node, operands[0].value, result.value)));
+    }
 }
 
 }  // namespace
@@ -21,15 +91,16 @@ cln::cl_R float_of(const GiNaC::numeric& value) {
 std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>& inputs,
                                 const std::vector<Id>& roots) {
     const std::vector<cln::cl_R> values = graph.evaluate(inputs, roots);
-    std::vector<cln::cl_R> sizes(values.size());
+    std::vector<Sized> sized(values.size());
     for (const Id id : graph.topological(roots)) {
-        cln::cl_R& here = sizes[static_cast<std::size_t>(id)];
-        here = cln::abs(values[static_cast<std::size_t>(id)]);
-        for (const Id operand : graph[id].operands) here = cln::max(here, sizes[static_cast<std::size_t>(operand)]);
+        std::vector<Sized> operands;
+        for (const Id operand : graph[id].operands) operands.push_back(sized[static_cast<std::size_t>(operand)]);
+        Sized& here = sized[static_cast<std::size_t>(id)];
+        here.value = values[static_cast<std::size_t>(id)];
+        here.size = size_of(graph[id], here, operands);
     }
     std::vector<Sized> result;
-    for (const Id root : roots)
-        result.push_back({values[static_cast<std::size_t>(root)], sizes[static_cast<std::size_t>(root)]});
+    for (const Id root : roots) result.push_back(sized[static_cast<std::size_t>(root)]);
     return result;
 }
 

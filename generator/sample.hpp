@@ -11,7 +11,8 @@
 
 namespace lobatto {
 
-// A value, and the largest number met on the way to it: what its rounding is measured against.
+// A value, and what its rounding is measured against: the change of it when each number on the way to it changes by
+// its own size. Free of units: for m in c^2*m/c^2 it is m, not c^2.
 struct Sized {
     cln::cl_R value, size;
     bool vanishes() const { return cln::abs(value) <= size * cln::expt(cln::cl_RA(10), -45); }

@@ -5,6 +5,7 @@
 #include <ginac/ginac.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "generator/source.hpp"
@@ -16,7 +17,8 @@ struct Coordinate {
     std::string unit;        // "" when none is given
     GiNaC::symbol position;  // prints as name
     GiNaC::symbol velocity;  // prints as name'
-    GiNaC::ex force = 0;  // generalised force beside the Lagrangian's own, in positions, velocities, time, parameters
+    GiNaC::ex force = 0;    // generalised force beside the Lagrangian's own, in positions, velocities, time, parameters
+    Position rate_at = {};  // where its initial velocity or momentum stands
     std::string written = name;  // in formulas: x[3]
     Position force_at = {};      // where its first force stands
 };
@@ -73,12 +75,15 @@ struct Scene {
     std::string name;        // stem of the file as a C identifier: pendulum
     std::string title;       // one line
     std::vector<Coordinate> coordinates;
-    bool has_time = false;                    // whether the scene declares the time; else no formula holds it
-    GiNaC::symbol time{"t"};                  // prints as the name the scene gives it
-    std::vector<Parameter> parameters;        // run-time parameters, in the order of the file
-    std::vector<Parameter> constants;         // declared constant: already substituted everywhere
-    std::string lagrangian_text;              // as written, white space collapsed, without comments
-    GiNaC::ex lagrangian;                     // in position and velocity symbols, time and run-time parameters
+    bool has_time = false;              // whether the scene declares the time; else no formula holds it
+    GiNaC::symbol time{"t"};            // prints as the name the scene gives it
+    std::vector<Parameter> parameters;  // run-time parameters, in the order of the file
+    std::vector<Parameter> constants;   // declared constant: already substituted everywhere
+    std::string lagrangian_text;        // as written, white space collapsed, without comments
+    GiNaC::ex lagrangian;               // in position and velocity symbols, time and run-time parameters
+    // Where bodies are in a plane, when the scene defines x and y, alone or with one index; in positions, time and
+    // run-time parameters. For pictures.
+    std::vector<std::pair<GiNaC::ex, GiNaC::ex>> places;
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;

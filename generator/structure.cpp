@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <tuple>
 
 #include "generator/notation.hpp"
 #include "generator/routhian.hpp"
@@ -138,14 +139,14 @@ private:
     void choose_form() {
         if (result_.general) {
             result_.form = Form::general;
-            find("general path", true, "asked for: nothing is looked for, every node is solved with full matrices");
+            find("general path", true,
+                 "asked for: nothing is looked for, all nodes of a step are solved for with full matrices");
             return;
         }
         find("constant mass matrix", system_.separable,
              system_.separable
-                 ? "the second derivatives of L in the velocities are free of positions: only the interior nodes are "
-                   "implicit"
-                 : system_.not_separable + ": all nodes of a step are solved together");
+                 ? "the masses are the same everywhere, so the end of a step needs no equations of its own"
+                 : system_.not_separable + ", so the end of a step is solved for with the points inside");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         result_.diagonal_mass = system_.separable && diagonal;
@@ -161,10 +162,13 @@ private:
         std::string coupling;
         for (const auto& [place, value] : system_.mass.entries())
             if (place.first < place.second && coupling.empty())
-                coupling = fmt::format("{}' and {}' are coupled by {}", name(place.first), name(place.second),
+                coupling = fmt::format("L holds {}'*{}' with the factor {}", name(place.first), name(place.second),
                                        canonical_text(value));
-        find("diagonal mass matrix", result_.diagonal_mass,
-             result_.diagonal_mass ? "no product of two different velocities occurs" : coupling);
+        if (n_ > 1)
+            find("diagonal mass matrix", result_.diagonal_mass,
+                 result_.diagonal_mass
+                     ? "no two velocities are multiplied: each momentum is its own mass times velocity"
+                     : coupling);
         linearity();
         // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has
         // one.
@@ -177,8 +181,11 @@ private:
                 for (const int j : columns) result_.entries.emplace_back(i, j);
         }
         const bool full = result_.entries.size() == static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_);
-        find("sparse second derivatives", !full,
-             fmt::format("{} of {} entries of M^-1 V'' are not identically zero", result_.entries.size(), n_ * n_));
+        if (n_ > 1)
+            find("sparse second derivatives", !full,
+                 full ? fmt::format("all {} entries of M^-1 V'' occur", n_ * n_)
+                      : fmt::format("{} of {} entries of M^-1 V'' are not zero, and only they are computed",
+                                    result_.entries.size(), n_ * n_));
         std::set<int> free;
         for (int k = 0; k < n_; ++k) free.insert(k);
         for (const auto& [place, value] : system_.hessian.entries()) {
@@ -189,18 +196,20 @@ private:
             if (!system_.gradient[static_cast<std::size_t>(k)].is_zero()) free.erase(k);
         if (!result_.diagonal_mass) free.clear();
         find("cyclic coordinates", !free.empty(),
-             free.empty() ? "every coordinate is held by L or by a force"
-                          : names(free) + ": moves uniformly, without equations to solve");
+             free.empty() ? "no coordinate is without a force"
+                          : names(free) + ": without a force, so the motion is uniform and nothing is solved for");
         Couplings couplings(static_cast<std::size_t>(n_));
         for (const auto& [row, column] : result_.entries) couplings.add(row, column);
         result_.groups = couplings.groups();
         describe_groups();
+        if (result_.form == Form::linear_map) return;
         repetition();
         absorption();
         find("small enough to write out", result_.unrolled,
-             fmt::format("{} unknowns at the interior nodes; up to {} every node and coordinate is written out, beyond "
-                         "that the code loops over both",
-                         interior_, unrolled_limit));
+             result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
+                                            interior_, unrolled_limit)
+                              : fmt::format("{} unknowns a step, more than {}: loops over points and coordinates",
+                                            interior_, unrolled_limit));
     }
 
     void general() {
@@ -217,10 +226,10 @@ private:
         }
         linearity();
         find("cyclic coordinates", !cyclic.empty(),
-             cyclic.empty() ? "every coordinate is held by L or by a force, or its velocity occurs more than squared"
+             cyclic.empty() ? "every coordinate itself occurs, or its velocity more than squared"
                             : names(cyclic) +
-                                  ": the momentum is constant, the velocity follows from it, and the "
-                                  "position by quadrature");
+                                  ": L holds only the velocity, so the momentum is constant and the motion "
+                                  "follows from it without equations");
         Couplings couplings(static_cast<std::size_t>(active));
         for (const auto& [place, value] : result_.routhian.second.entries())
             if (place.first < 2 * active && place.second < 2 * active)
@@ -235,7 +244,7 @@ private:
         }
         const std::size_t size = result_.routhian.z.size();
         find("sparse second derivatives", result_.routhian.second.entries().size() < size * size,
-             fmt::format("{} of {} second derivatives are not identically zero",
+             fmt::format("{} of {} second derivatives of L are not zero, and only they are computed",
                          result_.routhian.second.entries().size(), size * size));
         describe_groups();
         if (cyclic.empty()) repetition();
@@ -265,9 +274,9 @@ private:
         result_.looped = 4 * single <= count;
         if (result_.looped) result_.elements = std::move(elements);
         find("repeated terms", result_.looped,
-             result_.looped ? fmt::format("{} terms are {} formulas in loops over tables, and {} by themselves", count,
-                                          result_.elements.repeated.size(), single)
-                            : fmt::format("of {} terms {} do not repeat", count, single));
+             result_.looped ? fmt::format("{} terms of L are {} formulas in loops over tables, and {} written out",
+                                          count, result_.elements.repeated.size(), single)
+                            : fmt::format("of {} terms of L {} are unlike all others", count, single));
     }
 
     // The quadratic part of V: worth a frozen Jacobian when the rest bends the forces little at the start.
@@ -292,11 +301,10 @@ private:
         result_.absorbed = !result_.constant_hessian.entries().empty() && contraction < 0.1;
         find("quadratic part absorbed", result_.absorbed,
              result_.absorbed
-                 ? fmt::format(
-                       "V is nearly quadratic: at the start the rest contracts by {:.1g} a sweep, so the Jacobian "
-                       "of the quadratic part is factored once a step size",
-                       contraction)
-                 : "V is far from quadratic at the start: Newton's iteration");
+                 ? fmt::format("V is nearly quadratic at the start, so one matrix serves all iterations of "
+                               "all steps: an iteration leaves {:.1g} of the error there",
+                               contraction)
+                 : "V is far from quadratic at the start, so each iteration has a matrix of its own");
     }
 
     // h^2 |A| |M^-1 (V'' - its constant part)| at the start, norms of largest row sums.
@@ -326,35 +334,44 @@ private:
     }
 
     void linearity() {
-        std::string reason = "every second derivative of V is free of positions: the step is one matrix, no iteration";
+        std::string reason = "all forces are linear, so a step is one matrix: nothing is iterated";
         if (result_.linear && result_.form != Form::linear_map)
-            reason = "every second derivative of L is constant: one solve a step, its matrix factored once a step size";
-        if (!result_.linear) {
-            const auto text = [](const std::string& of, const std::string& by, const ex& value) {
-                std::string formula = canonical_text(value);
-                if (formula.size() > 200) formula = "a longer formula that";
-                return "d2" + of + "/d" + by + " = " + formula + " depends on the position";
-            };
-            const auto all = [&] {
-                std::vector<GiNaC::symbol> symbols = system_.q;
-                symbols.insert(symbols.end(), system_.v.begin(), system_.v.end());
-                symbols.push_back(system_.t);
-                return symbols;
-            }();
-            if (system_.separable) {
-                for (const auto& [place, value] : system_.hessian.entries())
-                    if (has_any(value, all)) {
-                        reason = text("V", name(place.first) + "d" + name(place.second), value);
-                        break;
-                    }
-            } else {
-                reason = "a second derivative of L is not constant";
-            }
-        }
+            reason = "all forces are linear, so one solve a step is exact, its matrix factored once for all steps";
+        if (!result_.linear) reason = curved();
         find("linear system", result_.linear, reason);
     }
 
+    // A second derivative that is not constant: "d2V/dadb = 2*a depends on the position".
+    std::string curved() const {
+        const auto blocks =
+            system_.separable
+                ? std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&system_.hessian, 0, 0}}
+                : std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&system_.momentum_v, true, true},
+                                                                           {&system_.momentum_q, true, false},
+                                                                           {&system_.force_v, false, true},
+                                                                           {&system_.force_q, false, false}};
+        const std::string of = system_.separable ? "V" : "L";
+        for (const auto& [matrix, by_velocity, then_velocity] : blocks)
+            for (const auto& [place, value] : matrix->entries()) {
+                const char* on = has_any(value, system_.q)   ? "position"
+                                 : has_any(value, system_.v) ? "velocity"
+                                 : value.has(system_.t)      ? "time"
+                                                             : nullptr;
+                if (on == nullptr) continue;
+                const std::string row = name(place.first), column = name(place.second) + (then_velocity ? "'" : "");
+                const bool outer =
+                    !by_velocity && !system_.outer_force[static_cast<std::size_t>(place.first)].is_zero();
+                const std::string text = canonical_text(outer && system_.separable ? -value : value),
+                                  formula = text.size() > 80 ? "" : " = " + text;
+                const std::string slope = outer ? fmt::format("df_{}/d{}", row, column)
+                                                : fmt::format("d2{}/d{}{}d{}", of, row, by_velocity ? "'" : "", column);
+                return fmt::format("{}{} depends on the {}", slope, formula, on);
+            }
+        return "a force depends on the time";
+    }
+
     void describe_groups() {
+        if (n_ == 1) return;
         const std::size_t count = result_.groups.size();
         const auto& in = result_.form == Form::general ? result_.routhian.active : std::vector<int>{};
         const auto listed = [&](const Group& group) {
@@ -365,12 +382,12 @@ private:
         };
         std::string reason;
         if (count == 1) {
-            reason = "all coordinates are coupled";
+            reason = "all coordinates act on one another";
         } else {
             for (std::size_t g = 0; g < count && g < 4; ++g)
                 reason += (g == 0 ? "{" : ", {") + listed(result_.groups[g]) + "}";
-            reason += count > 4 ? fmt::format(" and {} more are solved each by itself", count - 4)
-                                : " are solved each by itself";
+            reason += count > 4 ? fmt::format(" and {} more", count - 4) : "";
+            reason += " do not act on one another: each is solved by itself";
         }
         find("independent groups", count > 1, reason);
         int widest = 0;
@@ -379,24 +396,26 @@ private:
             widest = std::max(widest, group.bandwidth);
             largest = std::max(largest, group.coordinates.size());
         }
-        find("banded equations", 3 * widest + 3 < static_cast<int>(largest),
-             fmt::format("in the best order found coupled coordinates are at most {} apart, of {}", widest, largest));
+        const bool banded = 3 * widest + 3 < static_cast<int>(largest);
+        find("banded equations", banded,
+             fmt::format("in a good order only coordinates at most {} apart, of {}, act on one another{}", widest,
+                         largest, banded ? ": only this band is stored and solved" : ""));
     }
 
     void time_and_forces() {
         find("no explicit time", system_.autonomous,
-             system_.autonomous ? "neither L nor a force holds the time: it is not passed to any formula"
-                                : "L or a force depends on the time");
+             system_.autonomous ? "nothing depends on the time itself: no formula takes it"
+                                : "L or a force depends on the time, so no energy is conserved");
         std::vector<int> driven;
         for (int k = 0; k < n_; ++k)
             if (!system_.outer_force[static_cast<std::size_t>(k)].is_zero()) driven.push_back(k);
         find("no forces", driven.empty(),
-             driven.empty() ? "all forces follow from L: the step is symplectic"
-                            : "forces beside L act on " + names(driven) + ": the step is variational, not symplectic");
+             driven.empty() ? "all forces come from L, so every step is symplectic"
+                            : "forces beside L act on " + names(driven) + ", so energy is gained or lost");
         if (!scene_.constants.empty()) {
             std::string list;
             for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;
-            find("constant parameters", true, list + ": put into the formulas before anything is derived");
+            find("constant parameters", true, list + ": numbers in the formulas, not arguments of them");
         }
     }
 
@@ -406,8 +425,9 @@ private:
              closed ? (result_.closed_solution->kind == ClosedSolution::Kind::harmonic
                            ? "q'' = -w2*q"
                            : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
-                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared)
-                    : "neither a harmonic oscillator nor a plane pendulum");
+                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared) +
+                          ": a run is compared with it"
+                    : "this is neither a harmonic oscillator nor a plane pendulum");
     }
 
     const Scene& scene_;

@@ -14,6 +14,7 @@
 #include <map>
 #include <set>
 
+#include "generator/elimination.hpp"
 #include "generator/notation.hpp"
 #include "generator/sample.hpp"
 
@@ -129,68 +130,7 @@ private:
     const System& system_;
 };
 
-// Gaussian elimination of a sparse symmetric matrix of numbers; the first direction that it maps to zero, or nothing.
-std::vector<cln::cl_R> null_direction(const std::map<std::pair<int, int>, Sized>& entries, int n) {
-    const auto at = [](int index) { return static_cast<std::size_t>(index); };
-    std::vector<std::map<int, cln::cl_R>> rows(at(n));
-    std::vector<std::set<int>> columns(at(n));  // the rows not yet used that have an entry there
-    std::vector<cln::cl_R> sizes(at(n), cln::cl_R(0));
-    for (const auto& [place, value] : entries) {
-        rows[at(place.first)][place.second] = value.value;
-        columns[at(place.second)].insert(place.first);
-        sizes[at(place.first)] = cln::max(sizes[at(place.first)], value.size);
-    }
-    const cln::cl_R tiny = cln::expt(cln::cl_RA(10), -35);
-    std::vector<int> pivot_row(at(n), -1);
-    for (int column = 0; column < n; ++column) {
-        int pivot = -1;  // the diagonal where it serves, else the shortest row: the matrix stays sparse
-        for (const int row : columns[at(column)]) {
-            if (cln::abs(rows[at(row)].at(column)) <= tiny * sizes[at(row)]) continue;
-            if (pivot < 0 || row == column || (pivot != column && rows[at(row)].size() < rows[at(pivot)].size()))
-                pivot = row;
-        }
-        if (pivot < 0) {  // this component 1, the later ones 0, the earlier ones by substitution
-            std::vector<cln::cl_R> direction(at(n), cln::cl_R(0));
-            direction[at(column)] = 1;
-            for (int earlier = column - 1; earlier >= 0; --earlier) {
-                const auto& row = rows[at(pivot_row[at(earlier)])];
-                cln::cl_R sum = 0;
-                for (const auto& [j, value] : row)
-                    if (j > earlier && j <= column) sum = sum + value * direction[at(j)];
-                direction[at(earlier)] = -sum / row.at(earlier);
-            }
-            return direction;
-        }
-        pivot_row[at(column)] = pivot;
-        for (const auto& [j, value] : rows[at(pivot)]) columns[at(j)].erase(pivot);
-        for (const int row : std::set<int>(columns[at(column)])) {
-            const cln::cl_R factor = rows[at(row)].at(column) / rows[at(pivot)].at(column);
-            for (const auto& [j, value] : rows[at(pivot)]) {
-                if (j < column) continue;
-                const auto [target, is_new] = rows[at(row)].emplace(j, cln::cl_R(0));
-                if (is_new) columns[at(j)].insert(row);
-                target->second = target->second - factor * value;
-            }
-            rows[at(row)].erase(column);
-            columns[at(column)].erase(row);
-        }
-    }
-    return {};
-}
-
-// A direction in words: a' = -1, b' = 1.
-std::string words(const System& system, const std::vector<cln::cl_R>& direction) {
-    std::string text;
-    int shown = 0;
-    for (std::size_t k = 0; k < direction.size(); ++k) {
-        if (cln::abs(direction[k]) < cln::expt(cln::cl_RA(10), -30)) continue;
-        if (++shown > 8) return text + ", ...";
-        text += (text.empty() ? "" : ", ") + system.v[k].get_name() + " = " + decimal(direction[k], 6);
-    }
-    return text;
-}
-
-// Refuses a mass matrix that is singular near the start, and a start at a singularity.
+// Refuses a mass matrix that is singular near the start.
 void check_mass(const Scene& scene, const System& system) {
     std::vector<ex> entries;
     std::vector<std::pair<int, int>> places;
@@ -198,22 +138,23 @@ void check_mass(const Scene& scene, const System& system) {
         places.push_back(place);
         entries.push_back(value);
     }
-    const auto direction_at = [&](Formulas& formulas) {
+    const auto elimination_at = [&](Formulas& formulas) {
         const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(entries));
         std::map<std::pair<int, int>, Sized> matrix;
         for (std::size_t i = 0; i < places.size(); ++i) matrix[places[i]] = values[i];
-        return null_direction(matrix, system.n);
+        return eliminate(matrix, std::vector<cln::cl_R>(static_cast<std::size_t>(system.n), cln::cl_R(0)));
     };
     for (int attempt = 0;; ++attempt) {
         try {
             Formulas formulas;
             NearStart(scene, attempt).set_all(formulas);
-            const std::vector<cln::cl_R> direction = direction_at(formulas);
-            if (!direction.empty())
+            const Elimination elimination = elimination_at(formulas);
+            if (elimination.singular)
                 refuse(scene,
                        "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
                        "do not follow from momenta. No kinetic energy opposes the direction " +
-                           words(system, direction) + "; add the missing mass, or remove a coordinate");
+                           direction_text(system, elimination.vector) +
+                           "; add the missing mass, or remove a coordinate");
             break;
         } catch (const DomainError&) {
             if (attempt == sample_attempts) throw;
@@ -228,6 +169,17 @@ std::string slope_text(const std::string& of, const GiNaC::symbol& by, const ex&
 }
 
 }  // namespace
+
+std::string direction_text(const System& system, const std::vector<cln::cl_R>& direction) {
+    std::string text;
+    int shown = 0;
+    for (std::size_t k = 0; k < direction.size(); ++k) {
+        if (cln::abs(direction[k]) < cln::expt(cln::cl_RA(10), -30)) continue;
+        if (++shown > 8) return text + ", ...";
+        text += (text.empty() ? "" : ", ") + system.v[k].get_name() + " = " + decimal(direction[k], 6);
+    }
+    return text;
+}
 
 std::vector<ex> terms_of(const ex& expression, const Symbols& variables) {
     std::vector<ex> terms;

@@ -3,6 +3,7 @@
 // are.
 #pragma once
 
+#include <cln/cln.h>
 #include <ginac/ginac.h>
 
 #include <string>
@@ -40,9 +41,12 @@ struct System {
     SparseMatrix hessian;             // n x n: its derivative in q
 };
 
-// Throws InputError when L is degenerate (its second derivatives in the velocities are singular everywhere, or at the
-// start) or the start is a singularity of L, naming the direction or the reason.
+// Throws InputError when L is degenerate (its second derivatives in the velocities are singular everywhere) or real
+// nowhere near the start, naming the direction or the reason. The start itself: generator/start.hpp.
 System build_system(const Scene& scene);
+
+// A direction in words: a' = -1, b' = 1; components that are zero left out.
+std::string direction_text(const System& system, const std::vector<cln::cl_R>& direction);
 
 // The gradient of a sum of terms in some variables, and the derivative of vectors, found term by term: each term is
 // differentiated only by the variables it holds.

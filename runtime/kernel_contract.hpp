@@ -150,7 +150,7 @@ struct Workspace {
 
 // Lagrange's polynomials over the points, l_j(theta) and l_j'(theta).
 template <int count, class real>
-inline void lagrange(const real* points, real theta, real* value, real* slope) {
+constexpr void lagrange(const real* points, real theta, real* value, real* slope) {
     for (int j = 0; j < count; ++j) {
         value[j] = real(1);
         slope[j] = real(0);

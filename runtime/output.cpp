@@ -70,7 +70,7 @@ std::string exact_text(double value) {
 }
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header)
-    : path_(path), energy_(header.energy) {
+    : path_(path), energy_(header.energy), columns_(header.columns.size() - (header.energy ? 1 : 0)) {
     struct stat status {};
     if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
         partial_ = path_;
@@ -83,14 +83,16 @@ TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& 
         partial_ = path_ + ".partial";
         descriptor_ = open_locked(partial_);
     }
-    text_ = fmt::format("# lobatto trajectory\n# scene: {}\n# method: {}\n# kernel: {}\n", header.scene, header.method,
-                        header.kernel);
+    text_ = fmt::format("# lobatto {}\n# scene: {}\n# method: {}\n# kernel: {}\n",
+                        header.events.empty() ? "trajectory" : "events", header.scene, header.method, header.kernel);
     const char* separator = "# parameters: ";
     for (const auto& [name, value] : header.parameters) {
         text_ += fmt::format("{}{} = {}", separator, name, exact_text(value));
         separator = ", ";
     }
     if (!header.parameters.empty()) text_ += '\n';
+    for (std::size_t i = 0; i < header.events.size(); ++i)
+        text_ += fmt::format("# event {}: {}\n", i + 1, header.events[i]);
     separator = "# columns: ";
     for (const auto& [name, unit] : header.columns) {
         text_ += separator + (unit.empty() ? name : fmt::format("{} [{}]", name, unit));
@@ -111,11 +113,7 @@ TrajectoryFile::~TrajectoryFile() {
 
 void TrajectoryFile::write(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
-        const double* row = records.rows + i * records.columns;
-        for (int column = 0; column < records.columns; ++column) {
-            if (column > 0) text_ += ',';
-            append_number(text_, row[column]);
-        }
+        append(records.rows + i * records.columns, columns_);
         if (energy_) {
             text_ += ',';
             append_number(text_, records.energy[i]);
@@ -123,6 +121,24 @@ void TrajectoryFile::write(const Records& records) {
         text_ += '\n';
     }
     flush();
+}
+
+void TrajectoryFile::write(const EventRecords& records) {
+    for (std::int64_t i = 0; i < records.count; ++i) {
+        const double* row = records.rows + i * records.columns;
+        append_number(text_, row[0] + 1);
+        text_ += ',';
+        append(row + 1, columns_ - 1);
+        text_ += '\n';
+    }
+    flush();
+}
+
+void TrajectoryFile::append(const double* row, std::size_t count) {
+    for (std::size_t column = 0; column < count; ++column) {
+        if (column > 0) text_ += ',';
+        append_number(text_, row[column]);
+    }
 }
 
 void TrajectoryFile::finish() {

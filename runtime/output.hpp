@@ -17,8 +17,9 @@ struct TrajectoryHeader {
     std::string kernel;  // digest
     std::vector<std::pair<std::string, double>> parameters;
     std::vector<std::pair<std::string, std::string>>
-        columns;         // names and units ("" when unknown): t, q.., p.., and H when it is kept
+        columns;         // names and units ("" when unknown): t, q.., p.. when they are kept, and H when it is
     bool energy = true;  // whether the last column is H
+    std::vector<std::string> events;  // of a file of events, whose first column counts them from 1: what they are
 };
 
 // The file appears under its name only when `finish` is called. Until then its rows stand in NAME.partial beside it,
@@ -33,16 +34,20 @@ public:
     TrajectoryFile(const TrajectoryFile&) = delete;
     TrajectoryFile& operator=(const TrajectoryFile&) = delete;
 
+    // Rows may be longer than the file's: the momenta, which come last, are not kept then.
     void write(const Records& records);
+    void write(const EventRecords& records);
     void finish();
 
 private:
+    void append(const double* row, std::size_t count);
     void flush();
 
     std::string path_;     // the destination
     std::string partial_;  // what is being written; the same as path_ for a pipe or device
     int descriptor_ = -1;
     bool energy_ = true;
+    std::size_t columns_ = 0;  // of a row, without H
     std::string text_;
 };
 

@@ -314,7 +314,7 @@ TEST_CASE("an empty sum is 0, and its formula is read all the same") {
     CHECK(parse_with_arrays("q + sum(i = 5 .. 3, x[i])").is_equal(q));
     check_error_with_arrays(
         "sum(i = 5 .. 3, y[i])", 17,
-        "unknown name 'y' in the Lagrangian; declared: half, m, mass[i], n, omega, q, q', t, x[i], x[i]', i.");
+        "unknown name 'y' in the Lagrangian; declared: i, half, m, mass[i], n, omega, q, q', t, x[i], x[i]'.");
 }
 
 TEST_CASE("a comment ends with its line") {

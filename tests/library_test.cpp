@@ -26,6 +26,17 @@ struct Workshop {
                      "#include \"tests/handwritten_pendulum.hpp\"\n#include \"runtime/kernel_export.hpp\"\n"
                      "LOBATTO_EXPORT_KERNEL(lobatto::HandwrittenPendulum)\n");
     }
+    std::string build_double_pendulum(const std::string& number) const {
+        const bool quadruple = number == "__float128";
+        return compile({"double_pendulum",
+                        std::string(quadruple ? "#define LOBATTO_USE_FLOAT128\n" : "") +
+                            "#include \"tests/handwritten_double_pendulum.hpp\"\n"
+                            "#include \"runtime/kernel_export.hpp\"\n"
+                            "using K = lobatto::HandwrittenDoublePendulum<" +
+                            number + ", lobatto::LobattoFour<" + number + ">>;\nLOBATTO_EXPORT_KERNEL(K)\n",
+                        quadruple})
+            .object;
+    }
     // A table with these first two members and nothing behind them.
     std::string build_stub(const std::string& version, const std::string& bytes) const {
         return build(
@@ -209,4 +220,53 @@ TEST_CASE("the tangent map of the pendulum's step agrees with differences, and i
     stepper.tangent(0, {q}, {p - d}, q_minus, p_minus, unused);
     CHECK(T[1] == doctest::Approx((q_plus[0] - q_minus[0]) / (2 * d)).epsilon(1e-8));
     CHECK(T[3] == doctest::Approx((p_plus[0] - p_minus[0]) / (2 * d)).epsilon(1e-8));
+}
+
+TEST_CASE("a kernel of the general form says what it is, and computes in every number type") {
+    const Workshop workshop;
+    const auto check = [&]<class real>(const std::string& number, real rounding) {
+        INFO(number);
+        const Kernel kernel = Kernel::load(workshop.build_double_pendulum(number), digest);
+        CHECK(kernel->form == LOBATTO_GENERAL);
+        CHECK(kernel->nodes == 4);
+        CHECK(kernel->unknowns == 6);
+        CHECK(kernel->events == 2);
+        CHECK(kernel->events_of_step == 8);
+        LoadedStepper<real> stepper(kernel);
+        REQUIRE(stepper.prepare({}, real(1) / 16) == LOBATTO_OK);
+        const std::vector<real> q = {1, 2}, p = {real(1) / 4, real(1) / 8};
+        REQUIRE(stepper.start(0, q, p) == LOBATTO_OK);
+        std::vector<real> v, q1, p1, T, q_end, p_end;
+        REQUIRE(stepper.velocity(0, q, p, v) == LOBATTO_OK);
+        const std::vector<real> back = stepper.momentum(0, q, v);
+        for (int k = 0; k < 2; ++k) CHECK((back[k] - p[k]) * (back[k] - p[k]) <= 16 * rounding * rounding);
+        // The step from the start is that of the tangent map, whose determinant of one is at rounding.
+        REQUIRE(stepper.tangent(0, q, p, q1, p1, T) == LOBATTO_OK);
+        lobatto_advance call{};
+        call.steps = 1;
+        REQUIRE(stepper.advance(call) == LOBATTO_OK);
+        real time = 0;
+        stepper.state(time, q_end, p_end);
+        CHECK((q_end == q1 && p_end == p1));
+        const real symplectic = T[0] * T[10] + T[4] * T[14] - T[8] * T[2] - T[12] * T[6] - 1;
+        CHECK(symplectic * symplectic <= 400 * rounding * rounding);
+        // Newton's iteration on the same equations: they hold to rounding, whatever the number type.
+        std::vector<real> X(6), F, J;
+        const real thirds[3] = {(1 - 1 / real(2.2360679774997896964L)) / 2, (1 + 1 / real(2.2360679774997896964L)) / 2,
+                                1};
+        std::vector<real> inside, ignored;
+        for (int j = 0; j < 3; ++j) {
+            REQUIRE(stepper.dense(thirds[j], inside, ignored) == LOBATTO_OK);
+            for (int a = 0; a < 2; ++a) X[2 * j + a] = inside[a];
+        }
+        REQUIRE(stepper.residual(0, q, p, X, F) == LOBATTO_OK);
+        REQUIRE(stepper.jacobian(0, q, p, X, J) == LOBATTO_OK);
+        const real coarse = rounding > real(1e-20L) ? 1000 * rounding : real(1e-15L);  // sqrt(5) has 20 digits here
+        for (const real f : F) CHECK(f * f <= coarse * coarse);
+        CHECK(J.size() == 36);
+    };
+    check("float", 0x1p-23F);
+    check("double", 0x1p-52);
+    check("long double", 0x1p-63L);
+    check("__float128", __float128(1) / (__float128(1ull << 56) * __float128(1ull << 56)));
 }

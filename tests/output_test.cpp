@@ -42,7 +42,8 @@ TrajectoryHeader pendulum_header() {
             "0123456789abcdef",
             {{"m", 1}, {"omega", 6.283185307179586}},
             {{"t", ""}, {"q", "rad"}, {"p_q", ""}, {"H", ""}},
-            true};
+            true,
+            {}};
 }
 
 const double two_rows[] = {0, 0.1, -2, 0.25, 1.0 / 3, 1e-300};
@@ -158,4 +159,37 @@ TEST_CASE("a full disk, a missing folder and a folder in the way are named") {
               ": No such file or directory. Create its folder first, or choose another place with -o");
     CHECK(error_of(folder.path) ==
           "cannot write the trajectory to " + folder.path + ": Is a directory. Choose another place with -o");
+}
+
+TEST_CASE("a file without momenta and energy keeps the beginning of each row") {
+    const Folder folder;
+    TrajectoryHeader header = pendulum_header();
+    header.columns = {{"t", ""}, {"q", "rad"}};
+    header.energy = false;
+    TrajectoryFile file(folder / "a.csv", header);
+    file.write(two_records);
+    file.finish();
+    CHECK(content(folder / "a.csv").ends_with("# columns: t, q [rad]\nt,q\n0,0.1\n0.25,0.3333333333333333\n"));
+}
+
+TEST_CASE("a file of events counts them from one and says what they are") {
+    const Folder folder;
+    TrajectoryHeader header = pendulum_header();
+    header.columns = {{"event", ""}, {"t", ""}, {"q", "rad"}, {"p_q", ""}};
+    header.energy = false;
+    header.events = {"q = 0 rising", "q' = 0"};
+    const double rows[] = {1, 0.5, -2, 0, 0, 1, 0, 3.5};
+    TrajectoryFile file(folder / "a.csv", header);
+    file.write(EventRecords{rows, 2, 4});
+    file.finish();
+    CHECK(content(folder / "a.csv") ==
+          "# lobatto events\n"
+          "# scene: A pendulum\n"
+          "# method: Lobatto, 4 points, h = 0.1\n"
+          "# kernel: 0123456789abcdef\n"
+          "# parameters: m = 1, omega = 6.283185307179586\n"
+          "# event 1: q = 0 rising\n"
+          "# event 2: q' = 0\n"
+          "# columns: event, t, q [rad], p_q\n"
+          "event,t,q,p_q\n2,0.5,-2,0\n1,1,0,3.5\n");
 }

@@ -200,7 +200,8 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
           pendulum + ": 2e+31 steps are too many to count; make the step larger or the end time smaller\n");
     CHECK(refusal({"--every", "0"}) ==
           "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
-    CHECK(contains(refusal({"--points", "6"}), "lobatto: --points: Value 6 not in range"));
+    CHECK(contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
+    CHECK(contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
 }
 
 TEST_CASE("a run that stops keeps what was computed, explains itself and returns 3") {
@@ -280,4 +281,112 @@ TEST_CASE("a reader that goes away does not cost the trajectory") {
          "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
     CHECK(head.out == "t,q,p_q,H\n");
     CHECK(head.err == "");
+}
+
+TEST_CASE("a run keeps only what the scene asks for") {
+    const Place place;
+    const auto scene_with = [&](const std::string& output) {
+        const std::string path = place.file("scene.toml");
+        test::write_text(path,
+                         "title = \"Two\"\nlagrangian = \"(a'^2 + b'^2)/2 - a^2 - b^4 - a*b\"\n"
+                         "[coordinates]\na = { position = 1, velocity = 0 }\nb = { position = 0, velocity = 1 }\n"
+                         "[run]\nstep = 0.1\nuntil = 1\n[output]\n" +
+                             output);
+        return path;
+    };
+    const test::Finished bare =
+        place.run({scene_with("momenta = false\nenergy = false\ntangent = false\n"), "-o", place.file()});
+    CHECK(bare.err == "");
+    CHECK(read_trajectory(place.file()).columns == std::vector<std::string>{"t", "a", "b"});
+    CHECK(!contains(bare.out, "energy"));
+    CHECK(!contains(bare.out, "symplectic"));
+    const TrajectoryTable kept = read_trajectory(place.file());
+    const test::Finished full = place.run({scene_with(""), "-o", place.file()});
+    const TrajectoryTable all = read_trajectory(place.file());
+    CHECK(all.columns == std::vector<std::string>{"t", "a", "b", "p_a", "p_b", "H"});
+    CHECK(contains(full.out, "  energy error "));
+    CHECK(contains(full.out, "  symplectic defect "));
+    REQUIRE(kept.rows.size() == all.rows.size());
+    for (std::size_t i = 0; i < kept.rows.size(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) CHECK(kept.rows[i][k] == all.rows[i][k]);
+}
+
+TEST_CASE("states between steps lie on the motion, and those at steps are unchanged") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    const std::string text = test::read_file(pendulum);
+    test::write_text(scene, text);
+    REQUIRE(place.run({scene, "--until", "2", "-o", place.file("steps.csv"), "--quiet"}).err == "");
+    test::write_text(scene, std::regex_replace(text, std::regex("every = 1"), "dense = 3"));
+    const test::Finished done = place.run({scene, "--until", "2", "-o", place.file()});
+    CHECK(done.err == "");
+    CHECK(contains(done.out, ", 161 states\n"));
+    const TrajectoryTable steps = read_trajectory(place.file("steps.csv")), dense = read_trajectory(place.file());
+    REQUIRE(steps.rows.size() == 41);
+    REQUIRE(dense.rows.size() == 161);
+    const long double pi = std::acos(-1.0L);
+    double largest = 0;
+    for (std::size_t i = 0; i < dense.rows.size(); ++i) {
+        if (i % 4 == 0) CHECK(dense.rows[i][1] == steps.rows[i / 4][1]);
+        const PhasePoint exact = pendulum_solution(4 * pi * pi, pi / 2, 0, static_cast<long double>(dense.rows[i][0]));
+        largest = std::fmax(largest, std::fabs(dense.rows[i][1] - static_cast<double>(exact.q)));
+    }
+    CHECK(largest > 1e-7);  // the cubic's own error, h^4 q''''/384 and more: a straight line has 8e-3
+    CHECK(largest < 1e-4);
+}
+
+TEST_CASE("events go to a file beside the trajectory, each on the exact motion") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene, test::read_file(pendulum) + "events = [\"q = 0 rising\", \"q\' = 0\"]\n");
+    const test::Finished done = place.run({scene, "--until", "11.9", "-o", place.file()});
+    CHECK(done.err == "");
+    CHECK(contains(done.out, "  events                  10 of 'q = 0 rising'\n"));
+    CHECK(contains(done.out, "                          20 of 'q' = 0', in " + place.file("run.events.csv") + "\n"));
+    const TrajectoryTable table = read_trajectory(place.file("run.events.csv"));
+    CHECK(table.comments[0] == "lobatto events");
+    CHECK(table.comments[5] == "event 1: q = 0 rising");
+    CHECK(table.comments[6] == "event 2: q' = 0");
+    CHECK(table.columns == std::vector<std::string>{"event", "t", "q", "p_q"});
+    REQUIRE(table.rows.size() == 30);
+    // A swing from 90 degrees takes 4 K(sin 45)/(2 pi) = 1.1803405990161.
+    for (std::size_t i = 0, rising = 0; i < table.rows.size(); ++i) {
+        const std::vector<double>& row = table.rows[i];
+        if (row[0] != 1) continue;
+        CHECK(row[1] == doctest::Approx(1.1803405990161 * (0.75 + static_cast<double>(rising++))).epsilon(1e-5));
+        CHECK(std::fabs(row[2]) < 1e-12);
+        CHECK(row[3] > 0);
+    }
+}
+
+TEST_CASE("what a drive or friction does to the energy is called a change, and no symplecticity is promised") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "title = \"Damped\"\nlagrangian = \"x'^2/2 - x^4/4\"\n"
+                     "[coordinates]\nx = { position = 1, velocity = 0 }\n[forces]\nx = \"-x'/10\"\n"
+                     "[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished damped = place.run({scene, "-o", place.file()});
+    CHECK(damped.err == "");
+    CHECK(std::regex_search(damped.out, std::regex("\n  energy change           0\\.\\d+ at most\n")));
+    CHECK(!contains(damped.out, "symplectic"));
+    test::write_text(scene,
+                     "title = \"Driven\"\ntime = \"t\"\nlagrangian = \"x'^2/2 - x^4/4 + x*sin(t)\"\n"
+                     "[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished driven = place.run({scene, "-o", place.file()});
+    CHECK(driven.err == "");
+    CHECK(contains(driven.out, "\n  energy change "));
+    CHECK(contains(driven.out, "\n  symplectic defect "));  // a step is still symplectic
+}
+
+TEST_CASE("a run without shortcuts gives the same motion to rounding") {
+    const Place place;
+    const auto last = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments{pendulum, "--until", "5", "-o", place.file(), "--quiet"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        CHECK(place.run(arguments).err == "");
+        return read_trajectory(place.file()).rows.back();
+    };
+    const std::vector<double> with = last({}), without = last({"--general"});
+    for (std::size_t k = 0; k < with.size(); ++k) CHECK(with[k] == doctest::Approx(without[k]).epsilon(1e-11));
 }

@@ -113,3 +113,12 @@ TEST_CASE("only second derivatives that are not identically zero become entries"
     // A mass matrix that couples spreads each column of V'' over all rows.
     CHECK(entries("(a'^2 + a'*b' + b'^2)/2 - b^4") == Entries{{0, 1}, {1, 1}});
 }
+
+TEST_CASE("a Lagrangian in SI units is not degenerate because its mass is small") {
+    const System system =
+        build_system(scene_of("-m*c^2*sqrt(1 - (a'^2 + b'^2)/c^2)",
+                              "a = { position = 0, velocity = 1e8 }\nb = { position = 0, velocity = 0 }\n",
+                              "m = 9.1093837e-31\nc = 299792458\n"));
+    CHECK(system.momentum_v.entries().size() == 4);
+    CHECK_FALSE(system.separable);
+}

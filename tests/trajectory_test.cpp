@@ -37,6 +37,23 @@ const Kernel& pendulum() {
     return kernel;
 }
 
+// The same with events: q = 0 rising, and momenta that vanish.
+const Kernel& eventful_pendulum() {
+    static const Kernel kernel = [] {
+        KernelSource source;
+        source.name = "eventful_pendulum";
+        source.digest = "0123456789abcdef";
+        source.header =
+            test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
+            "namespace lobatto::kernels {\nstruct eventful_pendulum : HandwrittenPendulum {\n"
+            "    static constexpr int events = 2;\n    static constexpr int event_direction[2] = {1, 0};\n"
+            "    static void event(const Coefficients&, const real* q, const real* velocity, real* value) {\n"
+            "        value[0] = q[0];\n        value[1] = velocity[0];\n    }\n};\n}\n";
+        return kernel_in_own_cache(source, Precision::double_);
+    }();
+    return kernel;
+}
+
 // Two coordinates with a mass matrix that is not diagonal, in the given potential.
 Scene coupled(const std::string& potential) {
     return read_scene(
@@ -89,6 +106,49 @@ TEST_CASE("a run of many blocks keeps every state in order") {
         in_order = in_order && times[i] == 0.375 * static_cast<double>(i);
     CHECK(in_order);
     CHECK(times.back() == 0.125 * 60001);
+}
+
+TEST_CASE("dense rows stand between the steps, in order, and do not count in the energy error") {
+    TrajectoryRequest request = from_two(0.25, 10000);
+    const TrajectoryResult plain = integrate(pendulum(), request);
+    request.dense = 4;
+    std::vector<double> times;
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) times.push_back(records.rows[i * records.columns]);
+    };
+    const TrajectoryResult result = integrate(pendulum(), request);
+    REQUIRE(times.size() == 50001);
+    for (std::size_t i = 0; i < times.size(); ++i) CHECK(std::fabs(times[i] - 0.05 * static_cast<double>(i)) < 1e-9);
+    CHECK(result.energy_error_largest == plain.energy_error_largest);
+    CHECK(result.q == plain.q);
+    request.every = 2;
+    CHECK(integrate(pendulum(), request).status == LOBATTO_UNSUPPORTED);
+}
+
+TEST_CASE("events reach their sink in order, all of them") {
+    TrajectoryRequest request = from_two(0.1, 200000, 1000);
+    std::int64_t rising = 0, turning = 0;
+    double before = 0;
+    bool in_order = true;
+    request.events = [&](const EventRecords& events) {
+        CHECK(events.columns == 4);
+        for (std::int64_t i = 0; i < events.count; ++i) {
+            const double* const row = events.rows + 4 * i;
+            in_order = in_order && row[1] > before;
+            before = row[1];
+            ++(row[0] == 0 ? rising : turning);
+            // Velocities of two steps' polynomials differ where they meet: 1.3e-6 measured.
+            CHECK(std::fabs(row[0] == 0 ? row[2] : row[3]) < (row[0] == 0 ? 1e-13 : 1e-5));
+        }
+    };
+    const TrajectoryResult result = integrate(eventful_pendulum(), request);
+    const double period = 4 * std::comp_ellint_1(std::sin(1.0));
+    CHECK(in_order);
+    CHECK(result.events == rising + turning);
+    CHECK(rising == std::llround(20000 / period));
+    CHECK(std::llabs(turning - 2 * rising) <= 1);
+    // A kernel without events has none to seek.
+    CHECK(integrate(pendulum(), from_two(0.1, 10)).events == 0);
 }
 
 TEST_CASE("a trajectory follows the exact solution, forwards and backwards") {
