@@ -120,7 +120,7 @@ void gallery(const GalleryCommand& options) {
             fmt::print(stderr, "{}\n", failure.what());
         }
     }
-    write_file(options.folder + "/README.md", page);
+    write_text(options.folder + "/README.md", page);
     fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
                options.folder);
     if (failed > 0) throw CLI::RuntimeError(some_failed);
