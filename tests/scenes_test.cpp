@@ -98,10 +98,11 @@ void check_against_reference(const std::string& scene) {
     const test::SceneReference& reference = test::scene_reference(scene);
     const Trajectory trajectory(scene, {"--until", exact_text(reference.time)});
     REQUIRE(trajectory(trajectory.last(), "t") == doctest::Approx(reference.time).epsilon(1e-12));
-    for (const auto& [column, value] : reference.state) {
-        const double found = trajectory(trajectory.last(), column);
-        INFO(column << ": " << exact_text(found) << ", off by " << found - value);
-        CHECK(std::fabs(found - value) < reference.tolerance);
+    for (const auto& entry : reference.state) {
+        const std::string& column = entry.first;
+        const double found = trajectory(trajectory.last(), column), error = found - entry.second;
+        CAPTURE(column);
+        CHECK(std::fabs(error) < reference.tolerance);
     }
 }
 
