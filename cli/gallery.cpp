@@ -12,6 +12,7 @@
 #include "cli/gallery_picture.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/motion.hpp"
+#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {

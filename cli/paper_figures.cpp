@@ -10,6 +10,7 @@
 
 #include "cli/drawing.hpp"
 #include "cli/paper_tables.hpp"
+#include "runtime/cache.hpp"
 
 namespace lobatto {
 
