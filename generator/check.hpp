@@ -26,8 +26,11 @@ constexpr double difference_bound = 1e-32;
 
 std::vector<Check> check_quadrature(const Quadrature& quadrature);
 // The discrete equations against derivatives of L_d, the solved forms against combinations of them, the Jacobians
-// against derivatives and central differences.
+// against derivatives and central differences. Beyond the limit of what is written out, and for the general form, those
+// of check_action.
 std::vector<Check> check_equations(const Derivation& derivation);
+// One node's formulas and their sums over the nodes against differences of the action, in numbers.
+std::vector<Check> check_action(const Derivation& derivation);
 // The programs that are emitted against the formulas of the discretisation.
 std::vector<Check> check_programs(const Derivation& derivation, const Programs& optimised);
 

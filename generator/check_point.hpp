@@ -11,18 +11,19 @@
 
 namespace lobatto {
 
-// All symbols of the derivation (parameters, h, positions of both steps, momenta, velocities) at values near the
+using Numbers = std::vector<cln::cl_R>;
+
+// All symbols of the derivation (parameters, h, positions of both steps, momenta, velocities, times) at values near the
 // scene's. The further `attempt` is from 0, the nearer; from the tenth on the parameters are exactly the scene's.
 Formulas point_near_start(const Derivation& derivation, int attempt);
 
-// Calls work(formulas) at two points where everything is real; DomainError when there are none.
+// Calls work(attempt) until it has succeeded twice; DomainError when it never does.
 template <class Work>
-void at_two_points(const Derivation& derivation, const Work& work) {
+void at_two_attempts(const Work& work) {
     int done = 0;
     for (int attempt = 0; done < 2; ++attempt) {
-        Formulas formulas = point_near_start(derivation, attempt);
         try {
-            work(formulas);
+            work(attempt);
             ++done;
         } catch (const DomainError&) {
             if (attempt == sample_attempts) throw;
@@ -30,7 +31,37 @@ void at_two_points(const Derivation& derivation, const Work& work) {
     }
 }
 
+// Calls work(formulas) at two points where everything is real.
+template <class Work>
+void at_two_points(const Derivation& derivation, const Work& work) {
+    at_two_attempts([&](int attempt) {
+        Formulas formulas = point_near_start(derivation, attempt);
+        work(formulas);
+    });
+}
+
 // The largest |x_i - y_i|, relative to the largest |x_i| or |y_i|.
-double relative_difference(const std::vector<cln::cl_R>& x, const std::vector<cln::cl_R>& y);
+double relative_difference(const Numbers& x, const Numbers& y);
+
+Numbers times(const Numbers& A, const Numbers& x);  // A row by row
+// x with A x = y, A row by row: Gaussian elimination, the largest pivot of each column. DomainError when A is singular.
+Numbers solve(Numbers A, Numbers y);
+
+// Seeded, each component in the unit of its own value, or of the largest where that is zero.
+Numbers seeded_direction(const Numbers& start, Noise& noise);
+// (F(x + e d) - F(x - e d)) / 2e at x = start, with e = 1e-20.
+template <class Function>
+Numbers central_difference(const Numbers& start, const Numbers& direction, const Function& F) {
+    const cln::cl_R e = cln::cl_float(cln::expt(cln::cl_RA(10), -20), cln::float_format(number_digits));
+    const auto moved = [&](const cln::cl_R& step) {
+        Numbers x = start;
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] = x[i] + step * direction[i];
+        return F(x);
+    };
+    Numbers after = moved(e);
+    const Numbers before = moved(-e);
+    for (std::size_t i = 0; i < after.size(); ++i) after[i] = (after[i] - before[i]) / (2 * e);
+    return after;
+}
 
 }  // namespace lobatto

@@ -121,7 +121,9 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
             continue;
         }
         measured.order = measured.rows.back().order;
-        measured.settled = std::fabs(measured.order - measured.rows[count - 2].order) < 0.1;
+        // High orders settle late: between errors of 1e-10 and the rounding at 1e-29 there are few steps of theirs.
+        measured.settled =
+            std::fabs(measured.order - measured.rows[count - 2].order) < std::fmax(0.1, measured.order / 40);
         best = measured;
         coarse /= 2;
     }
@@ -132,7 +134,7 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
 }
 
 bool bears_out(const Convergence& convergence, int order, bool linear) {
-    constexpr double tolerance = 0.3;
+    const double tolerance = std::fmax(0.3, order / 30.0);
     if (convergence.exact || convergence.below_rounding) return true;
     return convergence.settled && convergence.order > order - tolerance &&
            (linear || convergence.order < order + tolerance);

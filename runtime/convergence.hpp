@@ -34,8 +34,8 @@ struct Convergence {
 // ComputationError when no step of the ladder can be taken.
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step);
 
-// Whether the measurement bears out an order: within 0.3, or for a linear system at least (some super-converge); or
-// cannot tell.
+// Whether the measurement bears out an order: within 0.3, or a thirtieth of orders beyond 9, or for a linear system at
+// least (some super-converge); or cannot tell.
 bool bears_out(const Convergence& convergence, int order, bool linear);
 
 }  // namespace lobatto

@@ -12,7 +12,8 @@
 namespace lobatto {
 
 // Forwards and, with -h, backwards again. The distance from the start, and the rounding that explains it: that of all
-// steps, times what the motion makes of a small disturbance (the norm of the flow's derivative).
+// steps, times what the way back makes of a small disturbance (the norm of the inverse of the flow's derivative; of a
+// symplectic flow, that of the derivative itself).
 struct Return {
     std::int64_t steps = 0;  // one way; fewer than asked for when a step failed
     double distance = 0;     // of positions relative to the farthest that one moves, or of momenta likewise
@@ -20,7 +21,7 @@ struct Return {
 };
 template <class real>
 Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters, const std::vector<real>& q,
-                      const std::vector<real>& p, real step, std::int64_t steps);
+                      const std::vector<real>& p, real step, std::int64_t steps, bool symplectic = true);
 
 // |T d - D(d)| relative to |T d|, entries relative to the size of their component, over all 2n directions d, where D is
 // the difference (8 (step(z + e d) - step(z - e d)) - (step(z + 2e d) - step(z - 2e d))) / 12e, and e is 1e-6 or 1e-9
@@ -40,6 +41,8 @@ struct EnergyDrift {
     double drift = 0;        // |mean of the second half - mean of the first|
     double rounding = 0;     // of H along the run, adding up step by step
     bool bounded = false;    // whether the motion stays within four times the region of its first half
+    bool chaotic = false;  // whether it makes more than 1e7 times as much of a small disturbance: errors of the energy
+                           // then wander, with no mean to return to
 };
 EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parameters, const std::vector<double>& q,
                          const std::vector<double>& p, double step, std::int64_t steps);

@@ -73,6 +73,109 @@ TEST_CASE("checks near the start find its real values: no log of a negative numb
     CHECK(failures(check_programs(derivation, optimised(derivation))) == Claims{});
 }
 
+namespace {
+
+// Lagrangian and coordinates of a scene, with what may follow them, for a method.
+Scene scene_with(const std::string& top, const std::string& coordinates, const std::string& rest,
+                 const std::string& method) {
+    return read_scene(Source("test.toml", "title = \"Test\"\n" + top + "\n[coordinates]\n" + coordinates + "\n" + rest +
+                                              "\n[method]\n" + method + "\n[run]\nstep = 0.1\nuntil = 1\n"));
+}
+
+const std::vector<std::string> methods = {"family = \"lobatto\"\npoints = 2", "family = \"lobatto\"\npoints = 4",
+                                          "family = \"lobatto\"\npoints = 7", "family = \"gauss\"\nstages = 1",
+                                          "family = \"gauss\"\nstages = 2",   "family = \"gauss\"\nstages = 5"};
+
+// A top: two cyclic coordinates, a mass matrix that depends on the third.
+const std::string top =
+    "lagrangian = \"(theta'^2 + sin(theta)^2*phi'^2)/2 + (psi' + cos(theta)*phi')^2/4 - cos(theta)\"";
+const std::string top_coordinates =
+    "theta = { position = 1, velocity = 0.25 }\nphi = { position = 0, velocity = 1 }\n"
+    "psi = { position = 0.5, velocity = 2 }";
+
+Derivation driven(const std::string& method) {
+    return derive(scene_with("time = \"t\"\nlagrangian = \"x'^2*(1 + y^2)/2 + y'^2/2 + x*y' - cos(x - t)*y^2\"",
+                             "x = { position = 1, velocity = 0.5 }\ny = { position = 0.5, velocity = 1 }",
+                             "[forces]\nx = \"-x'*y'^2 + sin(t)\"\n", method));
+}
+
+std::string claims_of(const std::vector<Check>& checks) {
+    std::string text;
+    for (const Check& check : checks) text += check.claim + "\n";
+    return text;
+}
+
+}  // namespace
+
+TEST_CASE("the equations of any Lagrangian hold for every method: forces, time, velocities, cyclic coordinates") {
+    for (const std::string& method : methods) {
+        INFO(method);
+        const Derivation relativistic = derive(scene_with("lagrangian = \"-sqrt(1 - x'^2) - x^2/2\"",
+                                                          "x = { position = 0.5, velocity = 0.25 }", "", method));
+        const Derivation spinning = derive(scene_with(top, top_coordinates, "", method));
+        REQUIRE(spinning.structure.routhian.cyclic == std::vector<int>{1, 2});
+        for (const Derivation& derivation : {relativistic, spinning, driven(method)}) {
+            const auto checks = check_equations(derivation);
+            INFO(claims_of(checks));
+            CHECK(derivation.structure.form == Form::general);
+            CHECK(checks.size() >= 7);
+            CHECK(failures(checks) == Claims{});
+        }
+        const Derivation shaken = derive(
+            scene_with("time = \"t\"\nlagrangian = \"x'^2/2 + y'^2 + x'*y'/2 - (1 + cos(3*t))*(1 - cos(x - y)) - y^4\"",
+                       "x = { position = 1, velocity = 0.5 }\ny = { position = 0.5, velocity = 1 }",
+                       "[forces]\ny = \"x^2*cos(t)\"\n", method));
+        REQUIRE(shaken.system.separable);
+        CHECK(failures(check_equations(shaken)) == Claims{});
+    }
+}
+
+TEST_CASE("with structure off the equations are those of the general form, and hold") {
+    const Derivation derivation = derive(test::coupled_scene(4), true);
+    const auto checks = check_equations(derivation);
+    CHECK(failures(checks) == Claims{});
+    CHECK(claims_of(checks).find("Jacobian of the step against differences\n") != std::string::npos);
+}
+
+TEST_CASE("a chain too long to be written out is checked by the action's slopes") {
+    for (const std::string& method : methods) {
+        const Derivation chain =
+            derive(scene_with("lagrangian = \"sum(i = 1 .. 40, x[i]'^2/2) - sum(i = 2 .. 40, (x[i] - x[i-1])^4/4)\"",
+                              "x = { count = 40, position = \"sin(i)\", velocity = 0 }", "", method));
+        CHECK(!is_written_out(chain.system, chain.quadrature));
+        const auto checks = check_equations(chain);
+        CHECK(failures(checks) == Claims{});
+        CHECK(claims_of(checks) ==
+              "momentum and force are slopes of L\nsecond derivatives against differences\n"
+              "residual is the slope of the action\nstage equations combine these\n");
+    }
+}
+
+TEST_CASE("a wrong force, second derivative, Routhian or stage matrix fails the checks by numbers") {
+    const auto failed_after = [&](const Derivation& right, const auto& spoil) {
+        Derivation derivation = right;
+        spoil(derivation);
+        return failures(check_action(derivation));
+    };
+    const GiNaC::ex tiny = GiNaC::pow(GiNaC::ex(10), -12);
+    const Derivation right = driven("family = \"lobatto\"\npoints = 4");
+    CHECK(failed_after(right, [](Derivation&) {}) == Claims{});
+    CHECK(failed_after(right, [&](Derivation& d) { d.system.force[1] += tiny; }) ==
+          Claims{"momentum and force are slopes of L", "residual is the slope of the action"});
+    CHECK(failed_after(right, [&](Derivation& d) { d.structure.routhian.second.put(3, 0, tiny); }) ==
+          Claims{"second derivatives against differences", "Jacobian of the step against differences"});
+    const Derivation spinning = derive(scene_with(top, top_coordinates, "", "points = 5"));
+    CHECK(failed_after(spinning, [&](Derivation& d) { d.structure.routhian.gradient[3] += tiny; }) ==
+          Claims{"cyclic coordinates follow from momenta"});
+    CHECK(failed_after(spinning, [&](Derivation& d) { d.quadrature.legendre[1] += tiny; }) ==
+          Claims{"cyclic coordinates follow from momenta"});
+    const Derivation coupled = derive(test::coupled_scene(4));
+    CHECK(failed_after(coupled, [&](Derivation& d) { d.quadrature.A(0, 1) += tiny; }) ==
+          Claims{"stage equations combine these"});
+    CHECK(failed_after(coupled, [&](Derivation& d) { d.system.hessian.put(0, 1, tiny); }) ==
+          Claims{"second derivatives against differences"});
+}
+
 TEST_CASE("a wrong weight, stage matrix or basis fails its checks") {
     Quadrature wrong = quadrature_of({Family::lobatto, 4});
     wrong.b[1] += GiNaC::pow(GiNaC::ex(10), -30);

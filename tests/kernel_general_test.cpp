@@ -104,8 +104,7 @@ void check_tangent(const State<double>& state, double h, double time = 0) {
 // L = -sqrt(1 - v^2): p = v / sqrt(1 - v^2).
 struct Relativistic : HandwrittenKernel, LobattoFour<double> {
     using real = double;
-    static constexpr const char* name = "relativistic";
-    static constexpr int coordinates = 1, parameter_count = 0;
+    static constexpr int coordinates = 1;
     static constexpr Form form = Form::general;
     static constexpr bool autonomous = true, linear = false;
     static constexpr int active = 1, cyclic = 0, active_index[1] = {0}, cyclic_index[1] = {0};
