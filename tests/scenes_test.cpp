@@ -399,3 +399,16 @@ TEST_CASE("the swinging Atwood's machine is where it should be after 10 s and ke
     });
     CHECK(drift < 3e-9);  // measured 8.4e-10
 }
+
+TEST_CASE("a scene of many equal terms gives the same bytes from every process") {
+    const test::TemporaryFolder folder;
+    std::string first;
+    for (const std::string run : {"a", "b", "c", "d"}) {
+        const std::string to = folder / run;
+        const test::Finished done = test::run({LOBATTO_PROGRAM, "emit", Trajectory::scene_file("fput_beta"), "-o", to});
+        REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+        const std::string text = test::read_file(to + "/fput_beta.hpp");
+        if (first.empty()) first = text;
+        CHECK(text == first);
+    }
+}
