@@ -13,7 +13,8 @@ using namespace lobatto;
 namespace {
 
 // The first line of the refusal; the Lagrangian stands at 2:15, the first coordinate in line 4.
-std::string refusal(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters = "") {
+std::string refusal(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters = "",
+                    const std::string& forces = "") {
     try {
         derive(read_scene(Source(
             "scene.toml", "title = \"test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" + coordinates +

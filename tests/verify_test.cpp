@@ -66,5 +66,5 @@ TEST_CASE("a step that is not positive and a scene that is missing are mistakes 
     write_text(folder / "back.toml", scene_text("q'^2/2 - q^2/2", "q = { position = 1, velocity = 0 }", "-1"));
     CHECK(verify({(folder / "back.toml").string()}).exit_code == 2);
     CHECK(verify({(folder / "none.toml").string()}).exit_code == 2);
-    CHECK(verify({LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "--points", "6"}).exit_code == 2);
+    CHECK(verify({LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "--points", "13"}).exit_code == 2);
 }
