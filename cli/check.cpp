@@ -107,7 +107,6 @@ void print_findings(const std::string& heading, const std::vector<Finding>& find
 void print(const Checked& checked) {
     const Derivation& derivation = checked.derivation;
     const Scene& scene = derivation.scene;
-    const bool general = derivation.structure.general;
     fmt::print(std::cout, "{} ({})\n\n", scene.title, scene.path);
     print_row("Lagrangian", scene.lagrangian_text.size() <= 400
                                 ? scene.lagrangian_text
@@ -118,10 +117,16 @@ void print(const Checked& checked) {
 
     fmt::print(std::cout, "\nA step of {} (order {})\n", scene.method.name(), scene.method.order());
     print_row("its form", form_of(derivation));
+    const auto compared = [](long here, long without) {
+        return here == without ? std::string() : fmt::format("; {} without what was found", without);
+    };
     const int unknowns = unknowns_of(derivation);
-    const std::string beside = general ? "" : fmt::format("; {} without what was found", unknowns_of(checked.without));
-    print_row("unknowns", (unknowns == 0 ? "none" : std::to_string(unknowns)) + beside);
+    print_row("unknowns",
+              (unknowns == 0 ? "none" : std::to_string(unknowns)) + compared(unknowns, unknowns_of(checked.without)));
     if (const std::string solver = solver_text(derivation); !solver.empty()) print_row("solved", solver);
+    const long elimination = elimination_of(derivation);
+    print_row("elimination", fmt::format("some {} multiplications{}", elimination,
+                                         compared(elimination, elimination_of(checked.without))));
 
     fmt::print(std::cout, "\nThe kernel\n");
     for (const Output& output : checked.outputs)
@@ -129,9 +134,11 @@ void print(const Checked& checked) {
                                : output.operations == 0
                                    ? output.text
                                    : fmt::format("{}: {} operations", output.text, output.operations));
-    print_row("operations",
-              fmt::format("{} to evaluate each of its formulas once{}", checked.operations,
-                          general ? "" : fmt::format("; {} without what was found", checked.operations_without)));
+    // A general kernel has one function for all points of a step, and loops over them.
+    const bool written_out = derivation.structure.form != Form::general && derivation.structure.unrolled;
+    print_row("operations", fmt::format("{} in all its formulas, each counted once{}{}", checked.operations,
+                                        compared(checked.operations, checked.operations_without),
+                                        written_out ? ", for one point of a step" : ""));
     print_row("derived and written in", fmt::format("{:.2f} s", checked.seconds));
 }
 
@@ -161,6 +168,8 @@ nlohmann::ordered_json json_of(const Checked& checked) {
               {"form", form_of(derivation)},
               {"unknowns", unknowns_of(derivation)},
               {"unknowns_without", unknowns_of(checked.without)},
+              {"multiplications", elimination_of(derivation)},
+              {"multiplications_without", elimination_of(checked.without)},
               {"groups", groups}}},
             {"outputs", outputs},
             {"operations", checked.operations},

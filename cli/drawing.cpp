@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 
+#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
 #include "runtime/process.hpp"
 
@@ -32,16 +32,10 @@ set key outside top center horizontal maxrows 1 reverse Left samplen 2 width -1
 
 }  // namespace
 
-void write_text(const std::string& path, const std::string& text) {
-    std::ofstream stream(path, std::ios::binary);
-    if (!(stream << text).flush())
-        throw MachineError(fmt::format("cannot write {}. Is the folder writable, is the disk full?", path));
-}
-
 void draw(const std::string& folder, const std::string& name, const std::string& script, int width, int height,
           const std::string& advice) {
     const std::string path = folder + "/" + name + ".gnuplot";
-    write_text(path, fmt::format("set terminal svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb "
+    write_file(path, fmt::format("set terminal svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb "
                                  "\"white\"{}set output \"{}.svg\"\n{}",
                                  width, height, style, name, script));
     ProcessRequest request;

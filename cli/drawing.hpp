@@ -6,9 +6,6 @@
 
 namespace lobatto {
 
-// MachineError when the machine refuses.
-void write_text(const std::string& path, const std::string& text);
-
 // Writes NAME.svg into `folder` as the script says; it finds the data files of the folder, a white page and the common
 // grid, axes and line styles. The same script gives the same bytes. MachineError, with `advice` for the case that
 // gnuplot is missing, when it fails.

@@ -12,6 +12,7 @@
 #include "cli/gallery_picture.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/motion.hpp"
+#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -120,7 +121,7 @@ void gallery(const GalleryCommand& options) {
             fmt::print(stderr, "{}\n", failure.what());
         }
     }
-    write_text(options.folder + "/README.md", page);
+    write_file(options.folder + "/README.md", page);
     fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
                options.folder);
     if (failed > 0) throw CLI::RuntimeError(some_failed);

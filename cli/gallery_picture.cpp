@@ -5,8 +5,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 
 #include "generator/sample.hpp"
@@ -16,7 +18,8 @@ namespace lobatto {
 namespace {
 
 constexpr std::size_t most_points = 7000;  // of a picture: some 100 kB
-constexpr int fewest_in_waterfall = 8, lines_in_waterfall = 48;
+constexpr std::size_t fewest_in_waterfall = 8, lines_in_waterfall = 48;
+constexpr double pi = std::numbers::pi;
 constexpr const char* colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444"};
 
 struct Point {
@@ -26,7 +29,7 @@ struct Point {
 struct Curve {
     std::vector<Point> points;
     std::string colour;
-    double width = 1.5;
+    double width = 0;   // 0: the thinner the longer
     bool dot = false;   // marks its end
     bool fill = false;  // white below: hides what lies behind
 };
@@ -34,7 +37,6 @@ struct Curve {
 struct Axes {
     std::string x, y;    // labels
     bool equal = false;  // one unit is as long on both
-    bool bare = false;   // no axes
     bool y_is_time = false;
 };
 
@@ -114,6 +116,11 @@ std::vector<Point> simplified(const std::vector<Point>& points, double tolerance
     return result;
 }
 
+// Long curves cover themselves.
+double line_width(std::size_t points) {
+    return points > 3000 ? 0.8 : points > 1000 ? 1.2 : 1.8;
+}
+
 // The script, and the size of the page.
 Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, const std::string& caption) {
     Range x, y;
@@ -124,7 +131,7 @@ Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, c
         }
     x.widen(axes.y_is_time ? 0 : 0.05);
     y.widen(0.05);
-    constexpr double left = 80, right = 25, top = 45, bottom = 80;
+    constexpr double left = 90, right = 25, top = 45, bottom = 100;
     double width = 560, height = 400;  // of the field
     if (axes.equal) {
         const double ratio = std::clamp(y.length() / x.length(), 0.2, 5.0);
@@ -140,20 +147,15 @@ Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, c
     const double per_x = width / x.length(), per_y = height / y.length();
     for (Curve& curve : curves)
         for (Point& point : curve.points) point = {(point.x - x.low) * per_x, (point.y - y.low) * per_y};
-    double tolerance = 0.1;
     std::vector<std::vector<Point>> thinned;
     std::size_t count = 0;
-    do {
-        thinned.clear();
-        count = 0;
-        for (const Curve& curve : curves) {
-            thinned.push_back(simplified(curve.points, tolerance));
-            count += thinned.back().size();
-        }
-        tolerance *= 1.4;
-    } while (count > most_points && tolerance < 20);
+    for (const Curve& curve : curves) {
+        thinned.push_back(simplified(curve.points, 0.12));  // pixels
+        count += thinned.back().size();
+    }
 
-    Picture picture{caption, "", static_cast<int>(width + left + right), static_cast<int>(height + top + bottom)};
+    Picture picture{caption, "", static_cast<int>(width + left + right), static_cast<int>(height + top + bottom),
+                    count};
     const double page_width = picture.width, page_height = picture.height;
     std::string& script = picture.script;
     for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -171,8 +173,11 @@ Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, c
                           quoted(scene.title), 20 / page_width, 1 - 22 / page_height);
     script += fmt::format("set label 2 {} at screen {:.6f},{:.6f} left noenhanced font ',12' tc rgb '#666666'\n",
                           quoted(caption), 20 / page_width, 16 / page_height);
-    script += fmt::format("set xlabel {} noenhanced offset 0,0.4\nset ylabel {} noenhanced\n", quoted(axes.x),
-                          quoted(axes.y));
+    const double middle_x = (left + width / 2) / page_width, middle_y = (bottom + height / 2) / page_height;
+    script += fmt::format("set label 3 {} at screen {:.6f},{:.6f} center noenhanced\n", quoted(axes.x), middle_x,
+                          44 / page_height);
+    script += fmt::format("set label 4 {} at screen {:.6f},{:.6f} center rotate by 90 noenhanced\n", quoted(axes.y),
+                          22 / page_width, middle_y);
     script += "set xtics autofreq\nset ytics autofreq\n";
     std::string plot;
     for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -180,7 +185,8 @@ Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, c
         plot += i == 0 ? "plot " : ", \\\n  ";
         if (curve.fill)
             plot += fmt::format("$curve{0} using 1:2 with filledcurves y1={1:.6g} fc rgb '#ffffff', ", i, y.low);
-        plot += fmt::format("$curve{} using 1:2 with lines lw {:.3g} lc rgb '{}'", i, curve.width, curve.colour);
+        plot += fmt::format("$curve{} using 1:2 with lines lw {:.3g} lc rgb '{}'", i,
+                            curve.width > 0 ? curve.width : line_width(count), curve.colour);
     }
     for (std::size_t i = 0; i < curves.size(); ++i)
         if (curves[i].dot)
@@ -194,29 +200,45 @@ std::string colour(std::size_t index) {
     return colours[index % std::size(colours)];
 }
 
-// Long curves that cover themselves are drawn thinner.
-double line_width(std::size_t states) {
-    return states > 20000 ? 0.7 : states > 4000 ? 1.0 : 1.6;
-}
-
 std::string span(const States& states) {
     return fmt::format("{:.6g}", states.time(states.count() - 1));
 }
 
+// The states of one turn around the middle of the motion, or all of them.
+std::size_t one_turn(const States& states) {
+    Range q, p;
+    for (std::size_t i = 0; i < states.count(); ++i) {
+        q.take(states.q(i, 0));
+        p.take(states.p(i, 0));
+    }
+    const auto angle = [&](std::size_t i) {
+        return std::atan2((states.p(i, 0) - (p.low + p.high) / 2) / p.length(),
+                          (states.q(i, 0) - (q.low + q.high) / 2) / q.length());
+    };
+    double turned = 0;
+    for (std::size_t i = 1; i < states.count(); ++i) {
+        turned += std::remainder(angle(i) - angle(i - 1), 2 * pi);
+        if (std::fabs(turned) > 2 * pi) return i + 1;
+    }
+    return states.count();
+}
+
 Picture phase(const Scene& scene, const States& states, const std::vector<States>& smaller) {
-    const auto curve = [](const States& of, const std::string& in, double width) {
+    const auto curve = [](const States& of, std::size_t count, const std::string& in, double width) {
         Curve result{{}, in, width};
-        for (std::size_t i = 0; i < of.count(); ++i) result.points.push_back({of.q(i, 0), of.p(i, 0)});
+        for (std::size_t i = 0; i < count; ++i) result.points.push_back({of.q(i, 0), of.p(i, 0)});
         return result;
     };
-    std::vector<Curve> curves;
-    for (const States& one : smaller) curves.push_back(curve(one, "#a9cfe5", 1.2));
-    curves.push_back(
-        curve(states, smaller.empty() ? colour(0) : colour(1), smaller.empty() ? line_width(states.count()) : 2));
     const Coordinate& q = scene.coordinates.front();
-    return drawn(scene, curves, {label_of(q, q.name), "momentum p_" + q.name},
-                 smaller.empty() ? fmt::format("Momentum over position, to t = {}.", span(states))
-                                 : "Momentum over position: the scene's motion (orange) and smaller ones.");
+    const Axes axes{label_of(q, q.name), "momentum p_" + q.name};
+    if (smaller.empty())
+        return drawn(scene, {curve(states, states.count(), colour(0), 0)}, axes,
+                     fmt::format("Momentum over position, from t = {:.4g} to t = {:.4g}.", states.time(0),
+                                 states.time(states.count() - 1)));
+    std::vector<Curve> curves;
+    for (const States& one : smaller) curves.push_back(curve(one, one_turn(one), "#8fc1de", 1.4));
+    curves.push_back(curve(states, one_turn(states), colour(1), 2.2));
+    return drawn(scene, curves, axes, "Momentum over position: the scene's motion (orange) and smaller ones.");
 }
 
 struct Bodies {
@@ -237,37 +259,38 @@ Picture path(const Scene& scene, const States& states) {
     const auto bodies = bodies_of(scene);
     std::vector<Curve> curves;
     if (!bodies) {
-        Curve curve{{}, colour(0), line_width(states.count()), true};
+        Curve curve{{}, colour(0), 0, true};
         for (std::size_t i = 0; i < states.count(); ++i) curve.points.push_back({states.q(i, 0), states.q(i, 1)});
         const Coordinate &a = scene.coordinates[0], &b = scene.coordinates[1];
         return drawn(scene, {curve}, {label_of(a, a.written), label_of(b, b.written), a.unit == b.unit},
                      fmt::format("{} over {}, to t = {}.", b.written, a.written, span(states)));
     }
-    // Space is seen from the front right, from 25 degrees above: the vertical stays vertical.
-    const double turn = 0.6, lift = 0.45;
+    // Bodies in space are seen along the direction in which they move least.
+    std::array<std::pair<std::string, std::vector<int>>, 3> axes{
+        {{"x", bodies->x}, {"y", bodies->y}, {"z", bodies->z}}};
+    std::string along;
+    if (!bodies->z.empty()) {
+        const auto extent = [&](const std::vector<int>& of) {
+            Range range;
+            for (std::size_t i = 0; i < states.count(); ++i)
+                for (const int k : of) range.take(states.q(i, k));
+            return range.length();
+        };
+        const auto least = std::min_element(axes.begin(), axes.end(), [&](const auto& a, const auto& b) {
+            return extent(a.second) < extent(b.second);
+        });
+        along = ", seen along " + least->first;
+        std::rotate(least, least + 1, axes.end());
+    }
     for (std::size_t b = 0; b < bodies->x.size(); ++b) {
-        Curve curve{{}, colour(b), line_width(states.count()), true};
-        for (std::size_t i = 0; i < states.count(); ++i) {
-            const double x = states.q(i, bodies->x[b]), y = states.q(i, bodies->y[b]);
-            if (bodies->z.empty()) {
-                curve.points.push_back({x, y});
-            } else {
-                const double z = states.q(i, bodies->z[b]);
-                const double depth = std::sin(turn) * x + std::cos(turn) * y;
-                curve.points.push_back(
-                    {std::cos(turn) * x - std::sin(turn) * y, std::cos(lift) * z + std::sin(lift) * depth});
-            }
-        }
+        Curve curve{{}, colour(b), 0, true};
+        for (std::size_t i = 0; i < states.count(); ++i)
+            curve.points.push_back({states.q(i, axes[0].second[b]), states.q(i, axes[1].second[b])});
         curves.push_back(curve);
     }
     const Coordinate& first = scene.coordinates.front();
-    const std::string end = fmt::format("to t = {}", span(states));
-    if (!bodies->z.empty())
-        return drawn(scene, curves, {label_of(first, "across"), label_of(first, "up, seen slantwise"), true},
-                     fmt::format("The {} in space, seen from aside and above, {}.",
-                                 curves.size() == 1 ? "orbit" : "orbits", end));
-    return drawn(scene, curves, {label_of(first, "x"), label_of(first, "y"), true},
-                 fmt::format("The {} in the plane, {}.", curves.size() == 1 ? "orbit" : "orbits", end));
+    return drawn(scene, curves, {label_of(first, axes[0].first), label_of(first, axes[1].first), true},
+                 fmt::format("The {}{}, to t = {}.", curves.size() == 1 ? "orbit" : "orbits", along, span(states)));
 }
 
 // Rods from the origin to each body in turn at equal times, the older the paler, and the path of the last body; until
@@ -326,7 +349,7 @@ Picture strobe(const Scene& scene, const States& states) {
 
 Picture polar(const Scene& scene, const States& states) {
     const int r = indices_of(scene, "r").front(), theta = indices_of(scene, "theta").front();
-    Curve curve{{}, colour(0), line_width(states.count()), true};
+    Curve curve{{}, colour(0), 0, true};
     for (std::size_t i = 0; i < states.count(); ++i)
         curve.points.push_back(
             {states.q(i, r) * std::sin(states.q(i, theta)), -states.q(i, r) * std::cos(states.q(i, theta))});
@@ -335,16 +358,57 @@ Picture polar(const Scene& scene, const States& states) {
                  fmt::format("The path in the plane, to t = {}.", span(states)));
 }
 
+// Whether the potential energy is lower at theta = 0: then that is the lowest point.
+bool hangs(const Scene& scene, const Coordinate& theta) {
+    Formulas formulas;
+    for (const Parameter& parameter : scene.parameters)
+        formulas.set(parameter.symbol, float_of(scene.evaluate(parameter.value, "the parameter " + parameter.name)));
+    formulas.set(scene.time, 0);
+    for (const Coordinate& coordinate : scene.coordinates) {
+        formulas.set(coordinate.position, 0);
+        formulas.set(coordinate.velocity, 0);
+    }
+    const auto L_at = [&](const cln::cl_R& angle) {
+        formulas.set(theta.position, angle);
+        return formulas({scene.lagrangian}).front();
+    };
+    return L_at(cln::cl_RA("1/10")) > L_at(3);
+}
+
+// Seen from 20 degrees above the equator; what lies behind is paler.
 Picture sphere(const Scene& scene, const States& states) {
     const int theta = indices_of(scene, "theta").front(), phi = indices_of(scene, "phi").front();
-    Curve rim{{}, "#bbbbbb", 1}, curve{{}, colour(0), line_width(states.count()), true};
-    for (int i = 0; i <= 180; ++i) rim.points.push_back({std::cos(i * M_PI / 90), std::sin(i * M_PI / 90)});
-    for (std::size_t i = 0; i < states.count(); ++i) {
-        const double distance = std::sin(states.q(i, theta));
-        curve.points.push_back({distance * std::cos(states.q(i, phi)), distance * std::sin(states.q(i, phi))});
+    const double lift = pi / 9, up = hangs(scene, scene.coordinates[static_cast<std::size_t>(theta)]) ? -1 : 1;
+    struct Place {
+        Point point;
+        bool front;
+    };
+    const auto place = [&](double polar, double around) {
+        const double height = up * std::cos(polar), toward = -std::sin(polar) * std::sin(around);
+        return Place{{std::sin(polar) * std::cos(around), height * std::cos(lift) - toward * std::sin(lift)},
+                     height * std::sin(lift) + toward * std::cos(lift) >= 0};
+    };
+    std::vector<Curve> curves{{{}, "#bbbbbb", 1}, {{}, "#dddddd", 1}};
+    for (int i = 0; i <= 180; ++i) {
+        curves[0].points.push_back({std::cos(i * pi / 90), std::sin(i * pi / 90)});
+        curves[1].points.push_back(place(pi / 2, i * pi / 90).point);
     }
-    return drawn(scene, {rim, curve}, {"sin(theta) cos(phi)", "sin(theta) sin(phi)", true},
-                 fmt::format("The path on the sphere, seen along its axis, to t = {}.", span(states)));
+    std::vector<Curve> behind, before;
+    bool front = false;
+    for (std::size_t i = 0; i < states.count(); ++i) {
+        const Place here = place(states.q(i, theta), states.q(i, phi));
+        if (i == 0 || here.front != front) {
+            if (i > 0) (front ? before : behind).back().points.push_back(here.point);
+            front = here.front;
+            (front ? before : behind).push_back({{}, front ? colour(0) : "#a9cfe5"});
+        }
+        (front ? before : behind).back().points.push_back(here.point);
+    }
+    (front ? before : behind).back().dot = true;
+    curves.insert(curves.end(), behind.begin(), behind.end());
+    curves.insert(curves.end(), before.begin(), before.end());
+    return drawn(scene, curves, {"", "", true},
+                 fmt::format("The path on the sphere, to t = {}; paler behind it.", span(states)));
 }
 
 // The longest array.
@@ -363,11 +427,19 @@ Picture waterfall(const Scene& scene, const States& states) {
     Range values;
     for (std::size_t i = 0; i < count; ++i)
         for (const int k : array) values.take(states.q(i, k));
-    const double end = states.time(count - 1), between = end / static_cast<double>(lines);
-    const double scale = 3.5 * between / values.length();
+    double squares = 0;
+    for (std::size_t i = 0; i < count; ++i)
+        for (const int k : array) squares += states.q(i, k) * states.q(i, k);
+    const double usual = std::sqrt(squares / static_cast<double>(count * array.size())) / values.length();
+    // Where all swing at once the first states are followed one by one; a few crests may travel the whole time, and
+    // overlap.
+    const bool swing = usual > 0.2;
+    const std::size_t last = swing ? lines - 1 : count - 1;
+    const double between = states.time(last) / static_cast<double>(lines);
+    const double scale = (swing ? 1.6 : 4.0) * between / values.length();
     std::vector<Curve> curves;
     for (std::size_t line = lines; line-- > 0;) {  // the last one first: earlier ones stand before it
-        const std::size_t row = lines > 1 ? line * (count - 1) / (lines - 1) : 0;
+        const std::size_t row = lines > 1 ? line * last / (lines - 1) : 0;
         const double share = static_cast<double>(line) / static_cast<double>(lines);
         Curve curve{{},
                     fmt::format("#{:02x}{:02x}{:02x}", static_cast<int>(213 * share),
@@ -415,8 +487,10 @@ Shape shape_of(const Scene& scene) {
     return n == 2 ? Shape::path : Shape::series;
 }
 
-Picture picture_of(const Scene& scene, const States& states, const std::vector<States>& smaller) {
-    switch (shape_of(scene)) {
+namespace {
+
+Picture picture_as(Shape shape, const Scene& scene, const States& states, const std::vector<States>& smaller) {
+    switch (shape) {
         case Shape::strobe:
             return strobe(scene, states);
         case Shape::phase:
@@ -432,7 +506,30 @@ Picture picture_of(const Scene& scene, const States& states, const std::vector<S
         case Shape::series:
             return series(scene, states);
     }
-    throw std::logic_error("picture_of: no such shape");
+    throw std::logic_error("picture_as: no such shape");
+}
+
+}  // namespace
+
+Picture picture_of(const Scene& scene, const States& states, const std::vector<States>& smaller) {
+    const Shape shape = shape_of(scene);
+    const bool bodies = shape == Shape::path && scene.coordinates.size() > 3;
+    const std::size_t budget = bodies || shape == Shape::strobe || shape == Shape::waterfall ? most_points
+                               : shape == Shape::series                                      ? 1800
+                               : shape == Shape::phase                                       ? 3000
+                                                                                             : 4500;
+    // Of a motion too long for a picture its end is cut off; of a driven one, which settles, the beginning.
+    States shown = states;
+    const auto row = static_cast<std::ptrdiff_t>(1 + 2 * states.n);
+    while (true) {
+        Picture picture = picture_as(shape, scene, shown, smaller);
+        if (picture.points <= budget || shown.count() < 100) return picture;
+        const auto cut = static_cast<std::ptrdiff_t>(shown.count() / 5);
+        if (shape == Shape::phase)
+            shown.rows.erase(shown.rows.begin(), shown.rows.begin() + cut * row);
+        else
+            shown.rows.erase(shown.rows.end() - cut * row, shown.rows.end());
+    }
 }
 
 }  // namespace lobatto

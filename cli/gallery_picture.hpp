@@ -26,6 +26,7 @@ struct Picture {
     std::string caption;  // one line
     std::string script;
     int width = 0, height = 0;
+    std::size_t points = 0;
 };
 
 enum class Shape {
@@ -33,7 +34,7 @@ enum class Shape {
     phase,      // one coordinate: momentum over position
     path,       // bodies in the plane or in space: x and y (and z), alone or arrays of one length; or two coordinates
     polar,      // r and theta, the angle from the vertical
-    sphere,     // theta and phi, seen along the axis
+    sphere,     // theta, the angle from the axis, and phi around it
     waterfall,  // an array of many: its values over the index, at times one above the other
     series      // anything else: coordinates over time
 };

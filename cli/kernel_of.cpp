@@ -23,6 +23,7 @@ void append_part(std::string& whole, const std::string& text) {
 Translation translation_of(const KernelSource& source, Precision precision) {
     Translation translation;
     translation.name = source.name;
+    translation.optimisation = source.unrolled ? 3 : 2;
     translation.quadruple = precision == Precision::quadruple;
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
     for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text})

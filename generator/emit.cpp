@@ -283,6 +283,7 @@ KernelSource emit_kernel(const Derivation& derivation, Programs programs, const 
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
     source.report = optimise(programs);
+    source.unrolled = derivation.structure.form != Form::general && derivation.structure.unrolled;
     const Emitter emitter(derivation, programs, options);
     // The digest of the text with the digest left out, put in its place.
     source.header = emitter.header(source.name, "", source.report);

@@ -126,6 +126,20 @@ std::vector<GroupSolve> solves_of(const Derivation& derivation) {
     return solves;
 }
 
+long elimination_of(const Derivation& derivation) {
+    const bool factored = derivation.structure.linear || derivation.structure.absorbed;  // once for all
+    long multiplications = 0;
+    for (const GroupSolve& solve : solves_of(derivation)) {
+        const long N = solve.unknowns, band = solve.band;
+        if (solve.method == "nothing to solve") continue;
+        if (solve.method == "banded matrix")
+            multiplications += (factored ? 0 : 2 * N * band * band) + 3 * N * band;
+        else
+            multiplications += (factored ? 0 : N * N * N / 3) + N * N;
+    }
+    return multiplications;
+}
+
 std::string solver_text(const Derivation& derivation) {
     const std::vector<GroupSolve> solves = solves_of(derivation);
     if (solves.empty()) return "";
@@ -140,11 +154,9 @@ std::string solver_text(const Derivation& derivation) {
     std::vector<std::pair<std::string, std::vector<int>>> kinds;  // groups solved alike, together
     for (const GroupSolve& solve : solves) {
         const std::string text = words(solve);
-        const auto known =
-            std::find_if(kinds.begin(), kinds.end(), [&](const auto& kind) { return kind.first == text; });
-        if (known == kinds.end()) kinds.push_back({text, {}});
-        auto& list = known == kinds.end() ? kinds.back().second : known->second;
-        list.push_back(solve.coordinates.front());
+        auto known = std::find_if(kinds.begin(), kinds.end(), [&](const auto& kind) { return kind.first == text; });
+        if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
+        known->second.push_back(solve.coordinates.front());
     }
     std::string text = derivation.structure.linear     ? "once a step, without iteration; "
                        : derivation.structure.absorbed ? "by iterations with one matrix for all steps; "

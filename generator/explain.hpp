@@ -27,4 +27,7 @@ std::vector<GroupSolve> solves_of(const Derivation& derivation);
 // "Newton's iteration; {x, y}: 4 equations as a full matrix; ..."
 std::string solver_text(const Derivation& derivation);
 
+// Multiplications of one elimination with all of them, about.
+long elimination_of(const Derivation& derivation);
+
 }  // namespace lobatto

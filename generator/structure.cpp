@@ -243,9 +243,12 @@ private:
             result_.groups = {all};
         }
         const std::size_t size = result_.routhian.z.size();
-        find("sparse second derivatives", result_.routhian.second.entries().size() < size * size,
-             fmt::format("{} of {} second derivatives of L are not zero, and only they are computed",
-                         result_.routhian.second.entries().size(), size * size));
+        const std::size_t present = result_.routhian.second.entries().size();
+        find("sparse second derivatives", present < size * size,
+             present == size * size
+                 ? fmt::format("all {} second derivatives of L occur", present)
+                 : fmt::format("{} of {} second derivatives of L are not zero, and only they are computed", present,
+                               size * size));
         describe_groups();
         if (cyclic.empty()) repetition();
     }
@@ -273,9 +276,10 @@ private:
         const std::size_t single = elements.others.size() + elements.other_forces.size();
         result_.looped = 4 * single <= count;
         if (result_.looped) result_.elements = std::move(elements);
+        const std::size_t formulas = result_.elements.repeated.size();
         find("repeated terms", result_.looped,
-             result_.looped ? fmt::format("{} terms of L are {} formulas in loops over tables, and {} written out",
-                                          count, result_.elements.repeated.size(), single)
+             result_.looped ? fmt::format("{} of {} terms of L are {}, computed in loops over tables", count - single,
+                                          count, formulas == 1 ? "one formula" : fmt::format("{} formulas", formulas))
                             : fmt::format("of {} terms of L {} are unlike all others", count, single));
     }
 
@@ -371,7 +375,7 @@ private:
     }
 
     void describe_groups() {
-        if (n_ == 1) return;
+        if (n_ == 1 || (result_.form == Form::general && result_.routhian.active.size() == 1)) return;
         const std::size_t count = result_.groups.size();
         const auto& in = result_.form == Form::general ? result_.routhian.active : std::vector<int>{};
         const auto listed = [&](const Group& group) {

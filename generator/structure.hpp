@@ -71,7 +71,7 @@ struct Structure {
 // Largest sizes of what is written out: coordinates of a linear map, unknowns of a separable step.
 constexpr int linear_map_limit = 16, unrolled_limit = 24;
 // Terms of L from which on loops are looked for.
-constexpr int looped_from = 48;
+constexpr int looped_from = 32;
 // The additive part of a second derivative that does not depend on the variables.
 GiNaC::ex constant_part(const GiNaC::ex& value, const std::vector<GiNaC::symbol>& variables);
 
