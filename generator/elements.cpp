@@ -50,6 +50,14 @@ public:
                                       : ex(symbols_[static_cast<std::size_t>(graph_[id].index)]);
     }
 
+    // An order of coefficients that does not depend on when they were met: parameters as declared, then numbers by
+    // size.
+    bool precedes(Id a, Id b) const {
+        const bool number_a = graph_.is_constant(a), number_b = graph_.is_constant(b);
+        if (number_a != number_b) return number_b;
+        return number_a ? graph_.constant_of(a).value < graph_.constant_of(b).value : graph_[a].index < graph_[b].index;
+    }
+
 private:
     static constexpr int coefficient = -1, time = -2;
 
@@ -153,8 +161,7 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
         std::size_t source;  // in terms, then forces
     };
     Shapes shapes(system, variables);
-    std::map<std::string, std::size_t> known;
-    std::vector<std::pair<int, std::vector<Row>>> families;  // target slot, rows; in order of first appearance
+    std::map<std::string, std::pair<int, std::vector<Row>>> families;  // by formula: target slot, rows
     const auto sort_in = [&](const ex& term, int acted_on, std::size_t source) {
         const Id root = shapes.convert(term);
         Leaves leaves = shapes.leaves(root);
@@ -166,15 +173,25 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
             if (target == count) leaves.variables.push_back(acted_on);
         }
         const std::string key = std::to_string(target) + ":" + leaves.shape;
-        const auto [place, is_new] = known.emplace(key, families.size());
-        if (is_new) families.push_back({target, {}});
-        families[place->second].second.push_back({root, std::move(leaves), source});
+        const auto place = families.emplace(key, std::make_pair(target, std::vector<Row>())).first;
+        place->second.second.push_back({root, std::move(leaves), source});
     };
     for (std::size_t i = 0; i < terms.size(); ++i) sort_in(terms[i], -1, i);
     for (std::size_t i = 0; i < forces.size(); ++i) sort_in(forces[i].second, forces[i].first, terms.size() + i);
 
+    // NOTE: the order of a sum's terms changes from process to process; that of variables and of values does not.
+    const auto comes_before = [&](const Row& a, const Row& b) {
+        if (a.leaves.variables != b.leaves.variables) return a.leaves.variables < b.leaves.variables;
+        return std::lexicographical_compare(a.leaves.coefficients.begin(), a.leaves.coefficients.end(),
+                                            b.leaves.coefficients.begin(), b.leaves.coefficients.end(),
+                                            [&](Id left, Id right) { return shapes.precedes(left, right); });
+    };
+
     Elements result;
-    for (const auto& [target, rows] : families) {
+    for (auto& [key, family] : families) {
+        const int target = family.first;
+        std::vector<Row>& rows = family.second;
+        std::stable_sort(rows.begin(), rows.end(), comes_before);
         if (rows.size() < fewest_rows) {
             for (const Row& row : rows) {
                 if (row.source < terms.size())

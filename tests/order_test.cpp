@@ -78,6 +78,82 @@ TEST_CASE("the order is 2, 4, 6, 8 for s = 2 ... 5 with two coordinates and a ma
     }
 }
 
+namespace {
+
+struct Motion {
+    std::string name, text;  // the scene without its method
+};
+
+const Motion henon_heiles = {"Henon and Heiles",
+                             "lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - x^2*y + y^3/3\"\n[coordinates]\n"
+                             "x = { position = 0.25, velocity = 0.375 }\ny = { position = 0.125, velocity = 0.25 }\n"};
+const Motion double_pendulum = {"a double pendulum",
+                                "lagrangian = \"a'^2 + b'^2/2 + a'*b'*cos(a - b) + 2*cos(a) + cos(b)\"\n[coordinates]\n"
+                                "a = { position = 0.75, velocity = 0.25 }\nb = { position = -0.5, velocity = 0.5 }\n"};
+const Motion relativistic = {"a relativistic oscillator",
+                             "lagrangian = \"-sqrt(1 - x'^2) - x^2/2 - x^4/8\"\n[coordinates]\n"
+                             "x = { position = 0.75, velocity = 0.25 }\n"};
+const Motion charged = {"a charge in a magnetic field that varies",
+                        "lagrangian = \"(x'^2 + y'^2)/2 + (x*y' - y*x')*(1 + x^2)/2 - cos(y)*x^2/2\"\n[coordinates]\n"
+                        "x = { position = 0.5, velocity = 0.5 }\ny = { position = 0.25, velocity = -0.25 }\n"};
+// Two cyclic coordinates.
+const Motion top = {"a top",
+                    "lagrangian = \"(theta'^2 + sin(theta)^2*phi'^2)/2 + (psi' + cos(theta)*phi')^2/4 - "
+                    "cos(theta)\"\n[coordinates]\ntheta = { position = 1, velocity = 0.25 }\n"
+                    "phi = { position = 0, velocity = 1 }\npsi = { position = 0.5, velocity = 2 }\n"};
+const Motion shaken = {"a pendulum shaken and pushed",  // separable, with time
+                       "time = \"t\"\nlagrangian = \"q'^2/2 + (1 + cos(2*t)/2)*cos(q)\"\n[coordinates]\n"
+                       "q = { position = 1, velocity = 0.5 }\n[forces]\nq = \"sin(t)/2 - q/4\"\n"};
+const Motion driven = {"a driven pendulum with friction",
+                       "time = \"t\"\nlagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\n"
+                       "q = { position = 1, velocity = 0.5 }\n[forces]\nq = \"cos(2*t)/2 - q'/4 - q'^3/8\"\n"};
+
+// The order from the scene's start over eight steps of about 0.2.
+void check_order(const Motion& motion, const Method& method) {
+    Scene scene =
+        read_scene(Source("test.toml", "title = \"Test\"\n" + motion.text + "[run]\nstep = 0.1\nuntil = 1\n"));
+    scene.method = method;
+    scene.outputs.tangent = scene.outputs.energy = false;
+    const Kernel kernel = quadruple_kernel(scene);
+    LoadedStepper<__float128> stepper(kernel);
+    REQUIRE(stepper.prepare({}, 0.2) == LOBATTO_OK);
+    std::vector<__float128> q, velocity;
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {  // exact in double
+        q.push_back(scene.evaluate(scene.initial_position[k], "q").to_double());
+        velocity.push_back(scene.evaluate(scene.initial_rate[k], "v").to_double());
+    }
+    const Convergence convergence = measure_order(kernel, {{}, q, stepper.momentum(0, q, velocity)}, 0.2);
+    INFO(motion.name << ", " << method.name() << ": order " << convergence.order << ", settled " << convergence.settled
+                     << ", errors from " << (convergence.rows.empty() ? 0.0 : convergence.rows.front().error));
+    CHECK(convergence.settled);
+    CHECK(!convergence.exact);
+    CHECK(bears_out(convergence, method.order(), false));
+    CHECK(kernel->order == method.order());
+}
+
+const std::vector<Motion> motions = {henon_heiles, double_pendulum, relativistic, charged, top, shaken, driven};
+
+}  // namespace
+
+TEST_CASE("every form of kernel has its method's order: Lobatto's 2 s - 2, Gauss's 2 s, forces and time included") {
+    check_order(henon_heiles, {Family::lobatto, 8});
+    check_order(henon_heiles, {Family::gauss, 3});
+    check_order(double_pendulum, {Family::lobatto, 6});
+    check_order(double_pendulum, {Family::gauss, 2});
+    check_order(relativistic, {Family::lobatto, 3});
+    check_order(charged, {Family::gauss, 4});
+    check_order(top, {Family::lobatto, 4});
+    check_order(shaken, {Family::gauss, 1});
+    check_order(driven, {Family::lobatto, 5});
+}
+
+TEST_CASE("and so has every member, up to Lobatto's order 22 and Gauss's 20" * doctest::test_suite("slow")) {
+    for (int points = 2; points <= 12; ++points)
+        check_order(motions[static_cast<std::size_t>(points) % motions.size()], {Family::lobatto, points});
+    for (int stages = 1; stages <= 10; ++stages)
+        check_order(motions[static_cast<std::size_t>(stages + 3) % motions.size()], {Family::gauss, stages});
+}
+
 TEST_CASE("a Stoermer-Verlet kernel does not pass for one of order 4, nor a kernel of order 6 for one of order 4") {
     const Convergence verlet = measure_order(quadruple_kernel(test::pendulum_scene(2)), wide_swing, 0.1);
     CHECK(bears_out(verlet, 2, false));

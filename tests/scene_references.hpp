@@ -22,33 +22,33 @@ struct SceneReference {
 // values of GeometricProblems.jl (double_pendulum), GNI I.5 (stiff_fput) and the Test Set for IVP Solvers (pleiades)
 // agree. "Measured" is the error of the scene's own step and method.
 inline const std::vector<SceneReference> scene_references = {
-    // measured ?
-    {"pendulum", 120, {{"q", -0.83079525095751004}, {"p_q", 7.2965541353862764}}, 1e-6},
-    // measured ?
+    // measured 1.3e-7
+    {"pendulum", 120, {{"q", -0.83079525095751004}, {"p_q", 7.2965541353862764}}, 5e-7},
+    // measured 4.3e-11
     {"two_pendulums",
      20,
      {{"a", -0.41617587676156434},
       {"b", -0.65868374090904289},
       {"p_a", -1.0171106138519695},
       {"p_b", -0.037467392392963536}},
-     1e-6},
-    // measured ?
-    {"driven_damped_pendulum", 10, {{"theta", 2.1246024209156589}, {"p_theta", -0.54401959213039968}}, 1e-6},
-    // measured ?
-    {"duffing", 25.132741228718345, {{"x", 2.6783211141920441}, {"p_x", 5.0457027593030046}}, 1e-6},
-    // measured ?
-    {"kapitza_pendulum", 1.0053096491487339, {{"theta", 3.0048579080422136}, {"p_theta", -0.016237274861428994}}, 1e-6},
-    // measured ?
-    {"relativistic_oscillator", 20, {{"x", 1.9946504690364949}, {"p_x", 0.14657308867299546}}, 1e-6},
-    // measured ?
+     2e-10},
+    // measured 4.3e-9
+    {"driven_damped_pendulum", 10, {{"theta", 2.1246024209156589}, {"p_theta", -0.54401959213039968}}, 2e-8},
+    // measured 5.9e-12
+    {"duffing", 25.132741228718345, {{"x", 2.6783211141920441}, {"p_x", 5.0457027593030046}}, 2e-11},
+    // measured 1.1e-8
+    {"kapitza_pendulum", 1.0053096491487339, {{"theta", 3.0048579080422136}, {"p_theta", -0.016237274861428994}}, 5e-8},
+    // measured 3.3e-11
+    {"relativistic_oscillator", 20, {{"x", 1.9946504690364949}, {"p_x", 0.14657308867299546}}, 1e-10},
+    // measured 4.9e-11
     {"double_pendulum",
      10,
      {{"a", 0.87467888012217220},
       {"b", 0.55850349693447697},
       {"p_a", -29.990234627250070},
       {"p_b", -16.575241474479331}},
-     1e-6},
-    // measured ?
+     2e-10},
+    // measured 4.1e-11
     {"triple_pendulum",
      5,
      {{"theta_1", -1.3358789282109377},
@@ -57,8 +57,8 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_theta_1", -7.8564755620764459},
       {"p_theta_2", -6.8807775222444882},
       {"p_theta_3", -1.9977993238525037}},
-     1e-6},
-    // measured ?
+     2e-10},
+    // measured 1.1e-9
     {"ten_link_pendulum",
      1,
      {{"theta_1", -1.0337151717528459},     {"theta_2", -1.9023819802737816},     {"theta_3", -2.0198154681643570},
@@ -68,15 +68,15 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_theta_3", 0.016531523233569552},  {"p_theta_4", 0.013974304905197623},  {"p_theta_5", 0.011661758407579184},
       {"p_theta_6", 0.0086280519966087790}, {"p_theta_7", 0.0059977496214736380}, {"p_theta_8", 0.0040222989036280668},
       {"p_theta_9", 0.0024936965994549712}, {"p_theta_10", 0.0013607381568195835}},
-     1e-6},
-    // measured ?
+     5e-9},
+    // measured 1.1e-9
     {"spherical_pendulum",
      100,
      {{"theta", 0.72933833862116451},
       {"phi", 114.76816788401338},
       {"p_theta", 0.44800334587754330},
       {"p_phi", 0.50000000000000000}},
-     1e-6},
+     5e-9},
     // measured 2.4e-8
     {"swinging_spring",
      100,
@@ -87,28 +87,28 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_y", 0.022629699135493276},
       {"p_z", 0.27134022790753658}},
      1e-7},
-    // measured ?
+    // measured 1.4e-9
     {"swinging_atwood",
      10,
      {{"r", 0.37286278146086908},
       {"theta", -5.4288013646497437},
       {"p_r", 11.118892145076952},
       {"p_theta", -1.2259117476739813}},
-     1e-6},
-    // measured ?
+     5e-9},
+    // measured 8.9e-12
     {"lagrange_top",
      50,
      {{"theta", 1.1154925854526206},
       {"phi", 55.414539190148206},
       {"psi", 91.240448659050618},
       {"p_theta", 0.31495908933737839}},
-     1e-6},
-    // measured ?
+     5e-11},
+    // measured 2.9e-10
     {"arenstorf",
      8.532608280078982,
      {{"x", -1.2448220520265697}, {"y", 0}, {"p_x", 0}, {"p_y", -0.69083174388434664}},
-     1e-6},
-    // measured ?
+     2e-9},
+    // measured 1.5e-9
     {"magnetic_bottle",
      100,
      {{"x", 1.4810731668154609},
@@ -117,7 +117,7 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_x", 1.2440276983174670},
       {"p_y", -0.15203209347100804},
       {"p_z", 0.29157542534552085}},
-     1e-6},
+     5e-9},
     // measured 3.7e-9
     {"toda_lattice",
      50,
@@ -144,7 +144,7 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_b_2", 0.22468371856386706},
       {"p_b_3", 0.0025490694862363961}},
      1e-5},
-    // measured 4.9e-12 with 5 points
+    // measured 1.7e-14, rounding
     {"figure_eight",
      6.32591398,
      {{"x_1", 0.97000434443112532},
@@ -159,8 +159,8 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_y_1", 0.43236572051200777},
       {"p_y_2", 0.43236573991692572},
       {"p_y_3", -0.86473146042893349}},
-     1e-10},
-    // measured ?
+     1e-13},
+    // measured 8.2e-8
     {"pleiades",
      3,
      {{"x_1", 0.37061391439705129},   {"x_2", 3.2372840920572331},    {"x_3", -3.2225590324183233},
@@ -173,8 +173,8 @@ inline const std::vector<SceneReference> scene_references = {
       {"p_y_1", -3.7412449612340085}, {"p_y_2", 0.75469193715012581}, {"p_y_3", 2.8160576608653237},
       {"p_y_4", 1.4671688908802279},  {"p_y_5", -1.7370231769042472}, {"p_y_6", 14.069492689085622},
       {"p_y_7", -13.629143039843043}},
-     1e-6},
-    // measured 5.5e-11 with 5 points
+     3e-7},
+    // measured 8.3e-12, rounding
     {"outer_solar_system",
      200000,
      {{"x_1", 1.2358425423546087},
@@ -195,8 +195,8 @@ inline const std::vector<SceneReference> scene_references = {
       {"z_4", 6.7824634099176085},
       {"z_5", 7.8947954147482021},
       {"z_6", -15.043469221823263}},
-     1e-9},
-    // measured ?
+     5e-11},
+    // measured 2.7e-10
     {"fput_beta",
      200,
      {{"x_1", 0.070605644245582439}, {"x_2", 0.14098823902710484},  {"x_3", 0.21090848825447220},
@@ -210,7 +210,7 @@ inline const std::vector<SceneReference> scene_references = {
       {"x_25", 0.54377479616424139}, {"x_26", 0.48038181450968777}, {"x_27", 0.41513179578351915},
       {"x_28", 0.34827713269304637}, {"x_29", 0.28010175017892001}, {"x_30", 0.21090848825447220},
       {"x_31", 0.14098823902710484}, {"x_32", 0.070605644245582439}},
-     1e-6},
+     1e-9},
 };
 
 inline const SceneReference& scene_reference(const std::string& scene) {
