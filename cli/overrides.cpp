@@ -76,6 +76,10 @@ void apply(const Overrides& overrides, Scene& scene) {
     if (overrides.every && *overrides.every < 1)
         throw InputError(fmt::format(
             "--every: {} is not a number of states; give 1 to keep each, 10 to keep every tenth", *overrides.every));
+    if (overrides.every && *overrides.every > 1 && scene.outputs.dense > 0)
+        throw InputError(
+            fmt::format("--every: the scene asks for states between two steps (dense = {}), so all steps are kept",
+                        scene.outputs.dense));
     if (overrides.every) scene.outputs.every = *overrides.every;
 }
 

@@ -53,18 +53,18 @@ std::string names_of(const Derivation& d, const std::vector<int>& coordinates) {
 std::string kind_of(const Derivation& derivation) {
     const System& system = derivation.system;
     std::string text;
-    if (system.separable) {
-        text = "Kinetic minus potential energy, with constant masses";
-    } else if (holds_any(system.momentum_v, system.v)) {
+    const bool linear_terms = has_linear_terms(system);
+    if (holds_any(system.momentum_v, system.v))
         text = "Not quadratic in the velocities, as in relativity";
-    } else {
-        text = holds_any(system.momentum_v, system.q)
-                   ? "Quadratic in the velocities, with masses that depend on the position"
-               : holds_any(system.momentum_v, {system.t})
-                   ? "Quadratic in the velocities, with masses that depend on the time"
-                   : "Quadratic in the velocities, with constant masses";
-        if (has_linear_terms(system)) text += ", and terms linear in them, as of magnetic fields and rotating frames";
-    }
+    else if (holds_any(system.momentum_v, system.q))
+        text = "Quadratic in the velocities, with masses that depend on the position";
+    else if (holds_any(system.momentum_v, {system.t}))
+        text = "Quadratic in the velocities, with masses that depend on the time";
+    else
+        text = linear_terms ? "Quadratic in the velocities, with constant masses"
+                            : "Kinetic minus potential energy, with constant masses";
+    if (linear_terms && !holds_any(system.momentum_v, system.v))
+        text += ", and terms linear in them, as of magnetic fields and rotating frames";
     if (!system.autonomous) text += "; the time itself occurs";
     std::vector<int> forced;
     for (std::size_t k = 0; k < system.outer_force.size(); ++k)

@@ -36,3 +36,130 @@ std::string temporary_scene(const test::TemporaryFolder& folder, const std::stri
 }
 
 }  // namespace
+
+TEST_CASE("check says what it found, what that saves, and what it looked for in vain") {
+    const test::Finished done = check(scene_path("pendulum"));
+    CHECK(done.err == "");
+    CHECK(done.exit_code == 0);
+    const std::string text = std::regex_replace(done.out, std::regex("\\d\\.\\d\\d s"), "TIME s");
+    CHECK(text == "A plane pendulum (" + scene_path("pendulum") +
+                      ")\n"
+                      "\n"
+                      "  Lagrangian                  m*q'^2/2 - m*omega^2*(1 - cos(q))\n"
+                      "  its kind                    Kinetic minus potential energy, with constant masses.\n"
+                      "\n"
+                      "Found, and put to use\n"
+                      "  constant mass matrix        the masses are the same everywhere, so the end of a step needs "
+                      "no equations of its\n"
+                      "                              own\n"
+                      "  small enough to write out   2 unknowns a step, at most 24: every formula is written out, no "
+                      "loops\n"
+                      "  no explicit time            nothing depends on the time itself: no formula takes it\n"
+                      "  no forces                   all forces come from L, so every step is symplectic\n"
+                      "  solution in closed form     q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2: "
+                      "a run is\n"
+                      "                              compared with it\n"
+                      "\n"
+                      "Looked for, not found\n"
+                      "  linear system               d2V/dqdq = m*omega^2*cos(q) depends on the position\n"
+                      "  cyclic coordinates          no coordinate is without a force\n"
+                      "\n"
+                      "A step of Lobatto, 4 points (order 6)\n"
+                      "  its form                    the positions at the 2 points inside it are solved for; its end "
+                      "follows from them\n"
+                      "  unknowns                    2; 3 without what was found\n"
+                      "  solved                      by Newton's iteration; 2 equations, by a closed formula\n"
+                      "  elimination                 some 6 multiplications; 18 without what was found\n"
+                      "\n"
+                      "The kernel\n"
+                      "  energy                      H at every kept state: 7 operations\n"
+                      "  momenta                     columns p_... of the trajectory\n"
+                      "  tangent                     the derivative of a step, from the matrix of its equations\n"
+                      "  dense                       not asked for, left out\n"
+                      "  events                      not asked for, left out\n"
+                      "  operations                  125 in all its formulas, each counted once; 21 without what was "
+                      "found, for one point\n"
+                      "                              of a step\n"
+                      "  derived and written in      TIME s\n");
+}
+
+TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
+    const test::TemporaryFolder folder;
+    const auto kind = [&](const std::string& lagrangian, const std::string& more = "") {
+        const std::string two = "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0.5 }\n";
+        return report_of(temporary_scene(folder, lagrangian, two, more)).at("kind").get<std::string>();
+    };
+    CHECK(kind("(x'^2 + y'^2)/2 - x^4 - y^4") == "Kinetic minus potential energy, with constant masses.");
+    CHECK(kind("(x'^2 + y'^2)/2 - x^4*cos(t)", "time = \"t\"\n") ==
+          "Kinetic minus potential energy, with constant masses; the time itself occurs.");
+    CHECK(kind("(x'^2 + (1 + x^2)*y'^2)/2 - x^4") ==
+          "Quadratic in the velocities, with masses that depend on the position.");
+    CHECK(kind("(x'^2 + y'^2)/2 + x*y' - y*x'") ==
+          "Quadratic in the velocities, with constant masses, and terms linear in them, as of magnetic fields and "
+          "rotating frames.");
+    CHECK(kind("-sqrt(1 - x'^2 - y'^2) - x^2") == "Not quadratic in the velocities, as in relativity.");
+    CHECK(
+        report_of(scene_path("driven_damped_pendulum")).at("kind") ==
+        "Kinetic minus potential energy, with constant masses; the time itself occurs; beside L, forces act on theta.");
+}
+
+TEST_CASE("what was found shrinks the equations of a step, and --general undoes it") {
+    struct Row {
+        const char* scene;
+        int unknowns, without;
+        const char* method;
+    };
+    // 256 beads at 2 inner points; theta at 4 points and two multipliers; two coordinates at 2 inner points.
+    for (const Row& row : {Row{"wave_chain", 512, 768, "banded matrix"}, Row{"lagrange_top", 6, 12, "full matrix"},
+                           Row{"henon_heiles", 4, 6, "full matrix"}, Row{"pendulum", 2, 3, "closed formula"}}) {
+        CAPTURE(row.scene);
+        const nlohmann::json report = report_of(scene_path(row.scene));
+        CHECK(report.at("step").at("unknowns") == row.unknowns);
+        CHECK(report.at("step").at("unknowns_without") == row.without);
+        CHECK(report.at("step").at("groups").at(0).at("method") == row.method);
+        CHECK(report.at("step").at("multiplications") < report.at("step").at("multiplications_without"));
+        const nlohmann::json general = report_of(scene_path(row.scene), {"--general"});
+        CHECK(general.at("step").at("unknowns") == row.without);
+        CHECK(general.at("findings").at(0).at("name") == "general path");
+    }
+    const nlohmann::json linear = report_of(scene_path("harmonic_oscillator"));
+    CHECK(linear.at("step").at("unknowns") == 0);
+    CHECK(linear.at("step").at("groups").empty());
+}
+
+TEST_CASE("coordinates that do not act on one another are solved each by itself") {
+    const test::TemporaryFolder folder;
+    const std::string scene =
+        temporary_scene(folder, "(x'^2 + y'^2)/2 - x^4 - y^4",
+                        "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }\n");
+    const nlohmann::json groups = report_of(scene).at("step").at("groups");
+    REQUIRE(groups.size() == 2);
+    CHECK(groups.at(0).at("coordinates") == nlohmann::json{"x"});
+    CHECK(groups.at(0).at("unknowns") == 2);
+    CHECK(groups.at(1).at("coordinates") == nlohmann::json{"y"});
+    const std::string text = check(scene).out;
+    CHECK(text.find("by Newton's iteration; for each of 2 groups 2 equations, by a closed formula\n") !=
+          std::string::npos);
+}
+
+TEST_CASE("outputs that are not asked for are left out of the kernel, and what the others add is counted") {
+    const nlohmann::json all = report_of(scene_path("pendulum"));
+    CHECK(all.at("outputs").at(0) == nlohmann::json{{"name", "energy"}, {"asked", true}, {"operations", 7}});
+    const test::TemporaryFolder folder;
+    std::string text = test::read_file(scene_path("pendulum"));
+    text = std::regex_replace(text, std::regex("energy = true[^\n]*"), "energy = false");
+    test::write_text(folder / "scene.toml", text);
+    const nlohmann::json less = report_of(folder / "scene.toml");
+    CHECK(less.at("outputs").at(0) == nlohmann::json{{"name", "energy"}, {"asked", false}, {"operations", 0}});
+    CHECK(less.at("operations").get<long>() == all.at("operations").get<long>() - 7);
+}
+
+TEST_CASE("the method on the command line takes the place of the scene's") {
+    const nlohmann::json gauss = report_of(scene_path("pendulum"), {"--stages", "3"});
+    CHECK(gauss.at("step").at("method") == "Gauss, 3 stages");
+    CHECK(gauss.at("step").at("order") == 6);
+    CHECK(gauss.at("step").at("unknowns") == 3);
+    const nlohmann::json verlet = report_of(scene_path("pendulum"), {"--points", "2"});
+    CHECK(verlet.at("step").at("unknowns") == 0);
+    CHECK(verlet.at("step").at("form") == "explicit: the end of a step follows from its beginning without equations");
+}

@@ -60,7 +60,7 @@ TEST_CASE("a scene that fails is reported without stopping the others") {
     const test::Finished done = gallery(folder / "out", {escape, wrong, scene_path("pendulum")});
     CHECK(done.exit_code == 3);
     CHECK(contains(done.err, escape + ": the run stopped in step "));
-    CHECK(contains(done.err, wrong + ":2:25: unknown name 'y'"));
+    CHECK(contains(done.err, wrong + ":2:24: unknown name 'y'"));
     CHECK(contains(done.out, "1 of 3 scenes drawn; "));
     CHECK(std::filesystem::exists(folder / "out/pendulum.svg"));
     CHECK(!std::filesystem::exists(folder / "out/escape.svg"));

@@ -331,6 +331,8 @@ TEST_CASE("states between steps lie on the motion, and those at steps are unchan
         const PhasePoint exact = pendulum_solution(4 * pi * pi, pi / 2, 0, static_cast<long double>(dense.rows[i][0]));
         largest = std::fmax(largest, std::fabs(dense.rows[i][1] - static_cast<double>(exact.q)));
     }
+    CHECK(place.run({scene, "--every", "2", "-o", place.file()}).err ==
+          "--every: the scene asks for states between two steps (dense = 3), so all steps are kept\n");
     CHECK(largest > 1e-7);  // the cubic's own error, h^4 q''''/384 and more: a straight line has 8e-3
     CHECK(largest < 1e-4);
 }

@@ -50,10 +50,10 @@ TEST_CASE("a start at a singularity is refused with the term, the place and the 
           "scene.toml:2:15: the second derivative d2L/dxdx = -3/(4*sqrt(x)) has no value at the start, x = 0: division "
           "by zero; start elsewhere, or mend the formula");
     CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-x'/sqrt(x)\"\n") ==
-          "scene.toml:6:6: the force on x has no value at the start, x = 0, x' = 0: division by zero; start elsewhere, "
+          "scene.toml:6:5: the force on x has no value at the start, x = 0, x' = 0: division by zero; start elsewhere, "
           "or mend the formula");
     CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-sqrt(x')\"\n") ==
-          "scene.toml:6:6: the force on x has no derivative in x' at the start, x' = 0: division by zero; start "
+          "scene.toml:6:5: the force on x has no derivative in x' at the start, x' = 0: division by zero; start "
           "elsewhere, or mend the formula");
     CHECK(refusal("x'^2/2 - sqrt(x)", "x = { position = 1e-30, velocity = 0 }\n") == "accepted");
 }
