@@ -50,11 +50,13 @@ TEST_CASE("the help of each command ends with an example of that command") {
 TEST_CASE("a word that is no command is refused with exit code 2, the commands, and what was probably meant") {
     const Answer unknown = shell(program + " nonsense");
     CHECK(unknown.code == 2);
-    CHECK(unknown.text == "lobatto: unknown command 'nonsense'; the commands are: derive, emit, run, verify, paper.\n");
+    CHECK(unknown.text ==
+          "lobatto: unknown command 'nonsense'; the commands are: check, derive, emit, run, verify, gallery, paper.\n");
     const Answer scene = shell(program + " scenes/pendulum.toml");
     CHECK(scene.code == 2);
     CHECK(scene.text ==
-          "lobatto: unknown command 'scenes/pendulum.toml'; the commands are: derive, emit, run, verify, paper. "
+          "lobatto: unknown command 'scenes/pendulum.toml'; the commands are: check, derive, emit, run, verify, "
+          "gallery, paper. "
           "Did you mean `lobatto run scenes/pendulum.toml`?\n");
 }
 
