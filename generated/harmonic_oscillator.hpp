@@ -5,10 +5,10 @@
 // Lagrangian   L = m*q'^2/2 - m*omega^2*q^2/2
 // Method       Lobatto, 4 points: order 6, symplectic, symmetric
 // Coordinates  q[0] = q [m]
-// Structure    constant mass matrix: the second derivatives of L in the velocities are free of positions: only the
-//              interior nodes are implicit
-// Structure    diagonal mass matrix: no product of two different velocities occurs
-// Structure    linear system: every second derivative of V is free of positions: the step is one matrix, no iteration
+// Structure    constant mass matrix: the masses are the same everywhere, so the end of a step needs no equations
+// Structure    linear system: all forces are linear, so a step is one matrix: nothing is iterated
+// Structure    no explicit time: nothing depends on the time itself: no formula takes it
+// Structure    no forces: all forces come from L, so every step is symplectic
 // Structure    solution in closed form: q'' = -w2*q with w2 = omega^2
 // Operations   52 in all, 57 as derived: 14 additions, 35 multiplications, 3 divisions, 0 functions
 #pragma once
@@ -21,26 +21,27 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "27ad36bb45a2a696";
+    static constexpr const char* digest = "475265599860c790";
     static constexpr const char* method = "Lobatto, 4 points";
+    static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
-    static constexpr int points = 4;            // s, nodes of a step, both ends included
     static constexpr int order = 6;             // of accuracy in h
-    static constexpr int unknowns = 0;          // N = n (s - 2) of the stage equations; 0: none to solve
-    static constexpr Form form = Form::linear_map;  // the step is an affine map
-    static constexpr bool autonomous = true;    // no formula depends on time
-    static constexpr bool linear = true;        // the second derivatives are constant
-    static constexpr bool has_energy = true;    // energy() is compiled
-    static constexpr bool has_tangent = true;   // tangent maps are compiled
-    static constexpr int events = 0;            // event functions
+    static constexpr int unknowns = 0;          // of the equations of a step; 0: none to solve
+    static constexpr bool linear = true;        // all second derivatives are constant
+    static constexpr bool autonomous = true;    // no formula holds the time
+    static constexpr bool has_energy = true;    // asked for by the scene
+    static constexpr bool has_tangent = true;   // the derivative of a step
     static constexpr int parameter_count = 2;   // in the order of the scene
+    static constexpr int events = 0;            // that are watched for
+    static constexpr int event_direction[1] = {};
+    static constexpr int points = 4;            // nodes of a step, both ends included
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};
 
-    // nodes c_1 ... c_s on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1
+    // nodes on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1
     static constexpr real c[4] = {0.0, 0.276393202250021, 0.7236067977499789, 1.0};
-    // weights b_1 ... b_s: 1/12; 5/12; 5/12; 1/12
+    // their weights: 1/12; 5/12; 5/12; 1/12
     static constexpr real b[4] = {0.08333333333333333, 0.4166666666666667, 0.4166666666666667, 0.08333333333333333};
     // stage map A_ij over the interior nodes, row-major: 1/60; 11/120 - sqrt(5)/24; sqrt(5)/24 + 11/120; 1/60
     static constexpr real A[4] = {0.016666666666666666, -0.0015028323958245708, 0.1848361657291579,
