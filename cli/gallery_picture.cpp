@@ -433,7 +433,7 @@ Picture waterfall(const Scene& scene, const States& states) {
     const double usual = std::sqrt(squares / static_cast<double>(count * array.size())) / values.length();
     // Where all swing at once the first states are followed one by one; a few crests may travel the whole time, and
     // overlap.
-    const bool swing = usual > 0.2;
+    const bool swing = usual > 0.14;
     const std::size_t last = swing ? lines - 1 : count - 1;
     const double between = states.time(last) / static_cast<double>(lines);
     const double scale = (swing ? 1.6 : 4.0) * between / values.length();

@@ -220,7 +220,7 @@ void print(const std::vector<Row>& rows, const Convergence& convergence) {
                    row.holds ? "ok" : "FAILED");
     if (convergence.rows.empty()) return;
     fmt::print("\nThe error over {:.4g} time units, in quadruple precision:\n  {:>12}  {:>12}  {:>6}\n",
-               8 * convergence.rows.front().step, "step", "error", "order");
+               convergence.duration, "step", "error", "order");
     for (const ConvergenceRow& row : convergence.rows)
         fmt::print("  {:>12.6g}  {:>12.3e}  {:>6}\n", row.step, row.error,
                    &row == &convergence.rows.front() ? "" : fmt::format("{:.2f}", row.order));

@@ -3,7 +3,9 @@
 #include "runtime/convergence.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "runtime/error.hpp"
@@ -15,10 +17,12 @@ namespace {
 using Quadruple = __float128;
 using States = std::vector<Quadruple>;  // q, p at the eight times, one after the other
 
-constexpr int coarse_steps = 8;  // of the largest step: where errors are compared
-constexpr int rungs = 5;
+constexpr int coarse_steps = 8;  // where errors are compared
+// How many steps each of these is divided into. Of a high order two halvings lead from too coarse a step to rounding.
+constexpr std::array<int, 5> halvings = {1, 2, 4, 8, 16}, near_ones = {2, 3, 4, 6, 8};
+constexpr int high_order = 12;
 constexpr int finest_ratio = 8;    // the reference against the smallest step of the ladder
-constexpr int most_attempts = 14;  // ladders, each half of the one before, or four times it below rounding
+constexpr int most_attempts = 14;  // ladders, each half of the one before, or three or four times it below rounding
 constexpr double roundings = 64;   // of a step, all the same way; measured: 5 on the linear oscillator
 constexpr double least_error = 1e-29;
 
@@ -64,9 +68,9 @@ double error_of(const States& states, const States& reference, const QuadrupleSt
 }
 
 // What rounding alone may put into error_of: that of the reference's steps, relative to the farthest moved.
-double rounding_error(const States& reference, const QuadrupleStart& start) {
+double rounding_error(const States& reference, const QuadrupleStart& start, int reference_ratio) {
     const std::size_t n = start.q.size();
-    constexpr int steps = coarse_steps * (1 << (rungs - 1)) * finest_ratio;
+    const int steps = coarse_steps * reference_ratio;
     double worst = least_error;
     for (const bool momenta : {false, true}) {
         Quadruple largest = 0, range = 0;
@@ -86,27 +90,33 @@ double rounding_error(const States& reference, const QuadrupleStart& start) {
 
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step) {
     LoadedStepper<Quadruple> stepper(kernel);
+    const auto& ladder = kernel->order > high_order ? near_ones : halvings;
+    const int reference_ratio = ladder.back() * finest_ratio;
     Convergence best;
     bool below_rounding = false;
+    double least_change = std::numeric_limits<double>::infinity();  // between the last two orders of a ladder
     Quadruple coarse = step;
     for (int attempt = 0; attempt < most_attempts && !best.settled; ++attempt) {
-        const std::optional<States> reference = states_with(stepper, start, coarse, (1 << (rungs - 1)) * finest_ratio);
+        const std::optional<States> reference = states_with(stepper, start, coarse, reference_ratio);
         if (!reference) {
             coarse /= 2;
             continue;
         }
-        const double rounding = rounding_error(*reference, start);
+        const double rounding = rounding_error(*reference, start, reference_ratio);
         Convergence measured;
+        measured.duration = static_cast<double>(coarse_steps * coarse);
         bool too_coarse = false;
-        for (int rung = 0; rung < rungs; ++rung) {
-            const std::optional<States> states = states_with(stepper, start, coarse, 1 << rung);
+        for (const int ratio : ladder) {
+            const std::optional<States> states = states_with(stepper, start, coarse, ratio);
             if (!states) {
                 too_coarse = true;
                 continue;
             }
-            ConvergenceRow row{static_cast<double>(coarse) / (1 << rung), error_of(*states, *reference, start), 0};
+            ConvergenceRow row{static_cast<double>(coarse) / ratio, error_of(*states, *reference, start), 0};
             if (row.error < rounding) break;
-            if (!measured.rows.empty()) row.order = std::log2(measured.rows.back().error / row.error);
+            if (!measured.rows.empty())
+                row.order =
+                    std::log(measured.rows.back().error / row.error) / std::log(measured.rows.back().step / row.step);
             measured.rows.push_back(row);
         }
         const std::size_t count = measured.rows.size();
@@ -117,14 +127,14 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
         if (count < 3) {  // below rounding too soon
             below_rounding = true;
             if (best.rows.empty()) best.exact = count == 0;
-            coarse *= 4;
+            coarse *= kernel->order > high_order ? 3 : 4;  // 3 / 2: other steps than those tried
             continue;
         }
         measured.order = measured.rows.back().order;
-        // High orders settle late: between errors of 1e-10 and the rounding at 1e-29 there are few steps of theirs.
-        measured.settled =
-            std::fabs(measured.order - measured.rows[count - 2].order) < std::fmax(0.1, measured.order / 40);
-        best = measured;
+        const double change = std::fabs(measured.order - measured.rows[count - 2].order);
+        measured.settled = change < std::fmax(0.1, measured.order / 30);
+        if (best.rows.empty() || change < least_change) best = measured;
+        least_change = std::fmin(least_change, change);
         coarse /= 2;
     }
     best.below_rounding = below_rounding && !best.settled && !best.exact;
@@ -134,10 +144,10 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
 }
 
 bool bears_out(const Convergence& convergence, int order, bool linear) {
-    const double tolerance = std::fmax(0.3, order / 30.0);
     if (convergence.exact || convergence.below_rounding) return true;
-    return convergence.settled && convergence.order > order - tolerance &&
-           (linear || convergence.order < order + tolerance);
+    // High orders settle from above, and little room is left above rounding for them to do so.
+    const double below = std::fmax(0.3, order / 30.0), above = std::fmax(0.3, order / 15.0);
+    return convergence.settled && convergence.order > order - below && (linear || convergence.order < order + above);
 }
 
 }  // namespace lobatto

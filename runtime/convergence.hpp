@@ -18,11 +18,12 @@ struct ConvergenceRow {
     double step = 0;
     double error = 0;  // the largest at eight times; against a step 1/8 of the smallest of the ladder; positions
                        // relative to the farthest that one moves, momenta likewise
-    double order = 0;  // log2 of the error before by this one; 0 in the first row
+    double order = 0;  // of the errors and steps, this row against the one before; 0 in the first row
 };
 
 struct Convergence {
-    std::vector<ConvergenceRow> rows;  // five steps, each half of the one before
+    std::vector<ConvergenceRow> rows;  // five steps, each half of the one before, or closer for orders beyond 12
+    double duration = 0;               // time units over which they were compared
     double order = 0;                  // of the last row
     bool settled = false;              // the last two orders agree: the ladder is fine enough
     bool below_rounding = false;       // not settled, and finer ladders drown in rounding: nothing can be said
@@ -34,8 +35,8 @@ struct Convergence {
 // ComputationError when no step of the ladder can be taken.
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step);
 
-// Whether the measurement bears out an order: within 0.3, or a thirtieth of orders beyond 9, or for a linear system at
-// least (some super-converge); or cannot tell.
+// Whether the measurement bears out an order: within 0.3 (for high orders a thirtieth below, a fifteenth above), or
+// for a linear system at least (some super-converge); or cannot tell.
 bool bears_out(const Convergence& convergence, int order, bool linear);
 
 }  // namespace lobatto

@@ -48,7 +48,7 @@ TEST_CASE("derive shows the paper's K, its four polynomials and its system for t
              "    W = omega^2*sin(q)\n",
              "    S = [ omega^2*cos(q) ]\n",
              "    dF_L[1,1] = 1 - h^2*omega^2*cos(q_2)/15\n",
-             "    yes solution in closed form: q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2\n",
+             "    yes solution in closed form: q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2",
          }) {
         INFO(line);
         CHECK(contains(shown.out, line));
@@ -134,6 +134,41 @@ TEST_CASE("--latex is a whole document in which nothing of the scene is markup")
         depth += text[i] == '{' ? 1 : text[i] == '}' ? -1 : 0;
     }
     CHECK(depth == 0);
+}
+
+TEST_CASE("any other Lagrangian shows its momenta, forces, second derivatives and its step in blocks") {
+    const std::string text = text_of(
+        description_of("lagrangian = \"(theta'^2 + sin(theta)^2*phi'^2)/2 + cos(theta)\"\n[coordinates]\n"
+                       "theta = { position = 1, velocity = 0 }\nphi = { position = 0, velocity = 1 }\n[forces]\n"
+                       "theta = \"-theta'/4\"\n[method]\npoints = 3\n[run]\nstep = 0.1\nuntil = 1\n"));
+    INFO(text);
+    for (const char* line : {
+             "Forces       theta: -theta'/4\n",
+             "    p_phi = phi'*sin(theta)^2\n",
+             "    f_theta = phi'^2*sin(theta)*cos(theta) - theta'/4 - sin(theta)\n",
+             "    theta_2' = -(theta_1 - theta_3)/h\n",
+             "    phi' = P_phi/sin(theta)^2\n",
+             "    R_kappa = g_P_1*h/6 - g_P_2*h/3 + g_P_3*h/6\n",
+             "(D30) R = 0",
+         }) {
+        INFO(line);
+        CHECK(contains(text, line));
+    }
+}
+
+TEST_CASE("a large system is derived without the equations of all nodes, and says so") {
+    const Description chain = description_of(
+        "lagrangian = \"sum(i = 1 .. 40, x[i]'^2/2) - sum(i = 2 .. 40, (x[i] - x[i-1])^4/4)\"\n[coordinates]\n"
+        "x = { count = 40, position = \"sin(i)\", velocity = 0 }\n[method]\npoints = 4\n[run]\nstep = 0.1\nuntil = "
+        "1\n");
+    const std::string text = text_of(chain);
+    CHECK(
+        contains(text,
+                 "Equations    not written out: 40 coordinates at 4 points of a step are 160 positions, more than 60; "
+                 "the kernel assembles them from the formulas of one node\n"));
+    CHECK(contains(text, "    S_1_2 = -3*(x_1 - x_2)^2\n"));
+    CHECK(!contains(text, "L_d"));
+    CHECK(nlohmann::json::parse(json_of(chain))["formulas"].size() == 12);
 }
 
 TEST_CASE("names of the scene that the derivation uses too stay apart") {

@@ -80,3 +80,33 @@ TEST_CASE("the Jacobian of several coupled coordinates is the derivative of the 
     for (unsigned i = 0; i < 6; ++i)
         for (unsigned j = 0; j < 6; ++j) CHECK(equal(d.full_jacobian(i, j), d.full_system[i].diff(d.full_unknowns[j])));
 }
+
+TEST_CASE("Gauss with one stage is the implicit midpoint rule: L_d = h L((q0 + q1)/2, (q1 - q0)/h)") {
+    Scene scene = test::pendulum_scene(4);
+    scene.method = {Family::gauss, 1};
+    const Derivation derivation = derive(scene);
+    const Discretisation& d = derivation.discretisation();
+    const ex m = derivation.system.parameters[0], omega = derivation.system.parameters[1];
+    const ex q0 = d.Q[0][0], q1 = d.Q[1][0];
+    REQUIRE(d.Q.size() == 2);
+    CHECK(equal(d.L_d,
+                m * GiNaC::pow(q1 - q0, 2) / (2 * d.h) - d.h * m * omega * omega * (1 - GiNaC::cos((q0 + q1) / 2))));
+    CHECK(d.full_system.empty());
+    // One stage Y = (q0 + q1)/2: Y = q0 + h/2 v - h^2/4 W(Y).
+    REQUIRE(d.reduced_system.size() == 1);
+    const ex Y = d.Y[1][0];
+    CHECK(equal(d.reduced_system[0], Y - q0 - d.h / 2 * d.p0[0] / m + d.h * d.h / 4 * omega * omega * GiNaC::sin(Y)));
+}
+
+TEST_CASE("forces and time enter the slopes by the quadrature of the action: Lobatto with two points") {
+    const Derivation derivation =
+        derive(read_scene(Source("test.toml",
+                                 "title = \"Test\"\ntime = \"t\"\nlagrangian = \"q'^2*(1 + q^2)/2\"\n[coordinates]\n"
+                                 "q = { position = 1, velocity = 1 }\n[forces]\nq = \"t*q'\"\n[method]\npoints = 2\n"
+                                 "[run]\nstep = 0.1\nuntil = 1\n")));
+    const Discretisation& d = derivation.discretisation();
+    const ex q0 = d.Q[0][0], q1 = d.Q[1][0], h = d.h, v = (q1 - q0) / h;
+    CHECK(equal(d.L_d, h / 4 * v * v * (2 + q0 * q0 + q1 * q1)));
+    CHECK(equal(d.left_momentum[0], v * (2 + q0 * q0 + q1 * q1) / 2 - h / 2 * (q0 * v * v + d.t0 * v)));
+    CHECK(equal(d.right_momentum[0], v * (2 + q0 * q0 + q1 * q1) / 2 + h / 2 * (q1 * v * v + (d.t0 + h) * v)));
+}
