@@ -433,10 +433,10 @@ Picture waterfall(const Scene& scene, const States& states) {
     const double usual = std::sqrt(squares / static_cast<double>(count * array.size())) / values.length();
     // Where all swing at once the first states are followed one by one; a few crests may travel the whole time, and
     // overlap.
-    const bool swing = usual > 0.2;
+    const bool swing = usual > 0.14;
     const std::size_t last = swing ? lines - 1 : count - 1;
     const double between = states.time(last) / static_cast<double>(lines);
-    const double scale = (swing ? 1.6 : 4.0) * between / values.length();
+    const double scale = 4 * between / values.length();
     std::vector<Curve> curves;
     for (std::size_t line = lines; line-- > 0;) {  // the last one first: earlier ones stand before it
         const std::size_t row = lines > 1 ? line * last / (lines - 1) : 0;

@@ -144,9 +144,8 @@ private:
             return;
         }
         find("constant mass matrix", system_.separable,
-             system_.separable
-                 ? "the masses are the same everywhere, so the end of a step needs no equations of its own"
-                 : system_.not_separable + ", so the end of a step is solved for with the points inside");
+             system_.separable ? "the masses are the same everywhere, so the end of a step needs no equations"
+                               : system_.not_separable + ", so the end of a step is solved for with the points inside");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         result_.diagonal_mass = system_.separable && diagonal;
@@ -429,8 +428,7 @@ private:
              closed ? (result_.closed_solution->kind == ClosedSolution::Kind::harmonic
                            ? "q'' = -w2*q"
                            : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
-                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared) +
-                          ": a run is compared with it"
+                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared)
                     : "this is neither a harmonic oscillator nor a plane pendulum");
     }
 
