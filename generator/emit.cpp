@@ -43,8 +43,7 @@ public:
           options_(options),
           hoisted_(programs),
           looped_(derivation, programs, options.precision, [this](Id id) { return name_of(id); }),
-          n_(derivation.system.n),
-          s_(derivation.quadrature.points) {}
+          n_(derivation.system.n) {}
 
     std::string header(const std::string& name, const std::string& digest,
                        const std::vector<PassReport>& report) const {
@@ -273,7 +272,7 @@ private:
     const EmitOptions& options_;
     Hoisted hoisted_;
     LoopedText looped_;
-    int n_, s_;
+    int n_;
 };
 
 }  // namespace

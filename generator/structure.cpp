@@ -285,7 +285,6 @@ private:
     // The quadratic part of V: worth a frozen Jacobian when the rest bends the forces little at the start.
     void absorption() {
         if (result_.form != Form::separable || result_.unrolled || result_.linear || !result_.diagonal_mass) return;
-        SparseMatrix rest(n_, n_);
         result_.constant_hessian = SparseMatrix(n_, n_);
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
