@@ -29,8 +29,9 @@ Formulas point_near_start(const Derivation& derivation, int attempt) {
         }
         for (const auto& stage : d.Y)
             if (derivation.quadrature.method.family == Family::gauss) formulas.set(stage[k], start.position(k));
-        formulas.set(d.p0[k], start.velocity(k));
-        formulas.set(d.p1[k], start.velocity(k));
+        const cln::cl_R p = formulas({derivation.system.momentum[k]})[0];  // in its own unit
+        formulas.set(d.p0[k], start.near(p));
+        formulas.set(d.p1[k], start.near(p));
     }
     return formulas;
 }
