@@ -94,9 +94,9 @@ private:
             const auto known = entry_.find(place);
             if (known == entry_.end()) continue;  // zero after all
             node.outputs.push_back({add_to(at(second(), known->second)), convert(value)});
-            const ex constant = constant_part(value, variables);
-            if (d_.structure.absorbed && !constant.is_zero())
-                quadratic.outputs.push_back({add_to(at("S0", known->second)), convert(constant)});
+            if (!d_.structure.absorbed) continue;
+            const ex constant = ConstantPart(variables).of(value);
+            if (!constant.is_zero()) quadratic.outputs.push_back({add_to(at("S0", known->second)), convert(constant)});
         }
         if (d_.scene.outputs.energy) {
             Ids values;
@@ -140,7 +140,7 @@ private:
             node.outputs.push_back(
                 {add_to(fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column)),
                  convert(value)});
-            const ex constant = constant_part(value, element.x);
+            const ex constant = ConstantPart(element.x).of(value);
             if (d_.structure.absorbed && !constant.is_zero())
                 quadratic.outputs.push_back(
                     {add_to(fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column)),

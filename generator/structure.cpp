@@ -289,8 +289,9 @@ private:
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
         std::vector<ex> stiffness;
+        const ConstantPart constant_part(variables);
         for (const auto& [place, value] : system_.hessian.entries()) {
-            const ex constant = constant_part(value, variables);
+            const ex constant = constant_part.of(value);
             if (!constant.is_zero()) result_.constant_hessian.put(place.first, place.second, constant);
             stiffness.push_back((value - constant) / system_.mass(static_cast<std::size_t>(place.first),
                                                                   static_cast<std::size_t>(place.first)));
@@ -440,25 +441,35 @@ private:
 
 }  // namespace
 
-ex constant_part(const ex& value, const std::vector<GiNaC::symbol>& variables) {
-    if (!has_any(value, variables)) return value;
-    if (!GiNaC::is_a<GiNaC::add>(value)) {
-        // A factor before a sum: m (1 + q^2).
-        if (!GiNaC::is_a<GiNaC::mul>(value)) return 0;
-        ex factor = 1, sum = 0;
-        for (const ex& part : value) {
-            if (!has_any(part, variables))
-                factor *= part;
-            else if (GiNaC::is_a<GiNaC::add>(part) && sum.is_zero())
-                sum = part;
-            else
-                return 0;
-        }
-        return factor * constant_part(sum, variables);
+ConstantPart::ConstantPart(const std::vector<GiNaC::symbol>& variables) {
+    for (const auto& symbol : variables) variables_.insert(symbol);
+}
+
+bool ConstantPart::holds_variable(const ex& value) const {
+    for (auto part = value.preorder_begin(); part != value.preorder_end(); ++part)
+        if (GiNaC::is_a<GiNaC::symbol>(*part) && variables_.contains(*part)) return true;
+    return false;
+}
+
+ex ConstantPart::of(const ex& value) const {
+    if (!holds_variable(value)) return value;
+    if (GiNaC::is_a<GiNaC::add>(value)) {
+        ex constant = 0;
+        for (const ex& term : value) constant += of(term);
+        return constant;
     }
-    ex constant = 0;
-    for (const ex& term : value) constant += constant_part(term, variables);
-    return constant;
+    // A factor before a sum: m (1 + q^2).
+    if (!GiNaC::is_a<GiNaC::mul>(value)) return 0;
+    ex factor = 1, sum = 0;
+    for (const ex& part : value) {
+        if (!holds_variable(part))
+            factor *= part;
+        else if (GiNaC::is_a<GiNaC::add>(part) && sum.is_zero())
+            sum = part;
+        else
+            return 0;
+    }
+    return factor * of(sum);
 }
 
 Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general) {

@@ -5,6 +5,7 @@
 #include <ginac/ginac.h>
 
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -72,8 +73,16 @@ struct Structure {
 constexpr int linear_map_limit = 16, unrolled_limit = 24;
 // Terms of L from which on loops are looked for.
 constexpr int looped_from = 32;
-// The additive part of a second derivative that does not depend on the variables.
-GiNaC::ex constant_part(const GiNaC::ex& value, const std::vector<GiNaC::symbol>& variables);
+// The additive part of a second derivative that does not depend on some variables.
+class ConstantPart {
+public:
+    explicit ConstantPart(const std::vector<GiNaC::symbol>& variables);
+    GiNaC::ex of(const GiNaC::ex& value) const;
+
+private:
+    bool holds_variable(const GiNaC::ex& value) const;
+    std::set<GiNaC::ex, GiNaC::ex_is_less> variables_;
+};
 
 // `general`: find nothing, for comparison.
 Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general = false);

@@ -249,8 +249,9 @@ System build_system(const Scene& scene) {
     // A value that does not depend on what its formula mentions is written without it.
     GiNaC::exmap origin;
     for (const auto& symbol : all) origin[symbol] = 0;
+    const Occurrences of_motion(all);
     const auto constant_form = [&](const ex& value) -> ex {
-        if (Occurrences(all).in(value).empty()) return value;
+        if (of_motion.in(value).empty()) return value;
         try {
             return value.subs(origin, GiNaC::subs_options::no_pattern);
         } catch (const std::exception&) {  // a pole at the origin: one away from it
