@@ -133,6 +133,8 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
         print_row(conserves ? "energy error" : "energy change",
                   fmt::format("{:.2g} at most{}", result.energy_error_largest,
                               relative ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
+        if (conserves && relative && result.energy_error_largest > H0)
+            print_row("", "more than the energy itself: the step is probably too long");
     }
     if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
@@ -238,6 +240,12 @@ void run(const RunOptions& options) {
     if (result.status != LOBATTO_OK) {
         throw ComputationError(
             fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
+    }
+    if (scene.outputs.energy && !std::isfinite(result.energy_error_largest)) {
+        throw ComputationError(fmt::format(
+            "{}: the energy left the range of numbers: the motion grows without bound. The step is probably beyond the "
+            "stability limit; try a smaller one. What was computed is in {}.",
+            scene.path, path));
     }
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.\n", result.time, path);

@@ -66,6 +66,12 @@ private:
         return radial - term;
     }
 
+    // The quadratic part of V depends neither on the variables nor on the time.
+    ConstantPart free_of(std::vector<GiNaC::symbol> variables) const {
+        variables.push_back(d_.system.t);
+        return ConstantPart(variables);
+    }
+
     // What does not repeat: straight-line code over q, or z.
     void written_out() {
         before_ = symbols_;
@@ -86,6 +92,7 @@ private:
             const SparseMatrix slopes = derivative_of({term}, variables);
             for (const auto& [place, value] : slopes.entries()) entries[{acted_on, place.second}] += value;
         }
+        const ConstantPart constant_part = free_of(variables);
         Program node{"rest_node", {}}, slope_only{"rest_slope", {}}, quadratic{"rest_quadratic", {}};
         for (std::size_t i = 0; i < gradient.size(); ++i)
             if (!gradient[i].is_zero()) slope_only.outputs.push_back({add_to(at(slope(), i)), convert(gradient[i])});
@@ -95,7 +102,7 @@ private:
             if (known == entry_.end()) continue;  // zero after all
             node.outputs.push_back({add_to(at(second(), known->second)), convert(value)});
             if (!d_.structure.absorbed) continue;
-            const ex constant = ConstantPart(variables).of(value);
+            const ex constant = constant_part.of(value);
             if (!constant.is_zero()) quadratic.outputs.push_back({add_to(at("S0", known->second)), convert(constant)});
         }
         if (d_.scene.outputs.energy) {
@@ -129,6 +136,7 @@ private:
         std::vector<ex> gradient;
         for (const auto& x : element.x) gradient.push_back(is_force ? ex(0) : term.diff(x));
         if (is_force) gradient[static_cast<std::size_t>(element.target)] = term;
+        const ConstantPart constant_part = free_of(element.x);
         Program node{name + "_node", {}}, slope_only{name + "_slope", {}}, quadratic{name + "_quadratic", {}};
         for (std::size_t j = 0; j < gradient.size(); ++j)
             if (!gradient[j].is_zero())
@@ -140,7 +148,7 @@ private:
             node.outputs.push_back(
                 {add_to(fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column)),
                  convert(value)});
-            const ex constant = ConstantPart(element.x).of(value);
+            const ex constant = constant_part.of(value);
             if (d_.structure.absorbed && !constant.is_zero())
                 quadratic.outputs.push_back(
                     {add_to(fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column)),

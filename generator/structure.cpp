@@ -399,6 +399,7 @@ private:
             widest = std::max(widest, group.bandwidth);
             largest = std::max(largest, group.coordinates.size());
         }
+        if (largest == 1) return;
         const bool banded = 3 * widest + 3 < static_cast<int>(largest);
         find("banded equations", banded,
              fmt::format("in a good order only coordinates at most {} apart, of {}, act on one another{}", widest,
@@ -408,7 +409,7 @@ private:
     void time_and_forces() {
         find("no explicit time", system_.autonomous,
              system_.autonomous ? "nothing depends on the time itself: no formula takes it"
-                                : "L or a force depends on the time, so no energy is conserved");
+                                : "L, a force or an event depends on the time: every formula is given it");
         std::vector<int> driven;
         for (int k = 0; k < n_; ++k)
             if (!system_.outer_force[static_cast<std::size_t>(k)].is_zero()) driven.push_back(k);

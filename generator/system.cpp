@@ -83,9 +83,34 @@ public:
         bool zero = true, on_q = false, on_v = false, on_t = false;
     };
 
-    Dependence(const Scene& scene, const System& system) : scene_(scene), system_(system) {}
+    Dependence(const Scene& scene, const System& system, const Symbols& motion)
+        : scene_(scene), system_(system), motion_(motion) {}
+
+    // A root or other broken power of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2) does: what
+    // holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a point is
+    // constant.
+    bool is_broken(const ex& expression) const {
+        for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
+            if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::integer) &&
+                !motion_.in(*part).empty())
+                return true;
+        return false;
+    }
 
     std::vector<Kind> of(const std::vector<ex>& expressions) const {
+        std::vector<Kind> kinds = sampled(expressions);
+        const std::size_t n = system_.q.size();
+        for (std::size_t i = 0; i < kinds.size(); ++i) {
+            if (!is_broken(expressions[i])) continue;
+            kinds[i].zero = false;
+            for (const std::size_t variable : motion_.in(expressions[i]))
+                (variable < n ? kinds[i].on_q : variable < 2 * n ? kinds[i].on_v : kinds[i].on_t) = true;
+        }
+        return kinds;
+    }
+
+private:
+    std::vector<Kind> sampled(const std::vector<ex>& expressions) const {
         std::vector<Kind> kinds(expressions.size());
         for (int attempt = 0, done = 0; done < 2; ++attempt) {
             try {
@@ -101,7 +126,6 @@ public:
         return kinds;
     }
 
-private:
     void look(const std::vector<ex>& expressions, int attempt, std::vector<Kind>& kinds) const {
         Formulas formulas;
         NearStart near(scene_, attempt);
@@ -128,6 +152,7 @@ private:
 
     const Scene& scene_;
     const System& system_;
+    const Occurrences motion_;  // q, v, t
 };
 
 // Refuses a mass matrix that is singular near the start.
@@ -244,7 +269,8 @@ System build_system(const Scene& scene) {
     const std::size_t first_order = looked_at.size();
     for (const SparseMatrix& matrix : derived)
         for (const auto& [place, value] : matrix.entries()) looked_at.push_back(value);
-    const std::vector<Dependence::Kind> kinds = Dependence(scene, system).of(looked_at);
+    const Dependence dependence(scene, system, all);
+    const std::vector<Dependence::Kind> kinds = dependence.of(looked_at);
 
     // A value that does not depend on what its formula mentions is written without it.
     GiNaC::exmap origin;
@@ -293,7 +319,13 @@ System build_system(const Scene& scene) {
         ex& value = i < system.momentum.size() ? system.momentum[i] : system.force[i - system.momentum.size()];
         if (kinds[i].zero) value = 0;
         if (kinds[i].on_t) system.autonomous = false;
+        if (!dependence.is_broken(value)) continue;
+        system.linear = false;
+        if (kinds[i].on_v && i >= system.momentum.size())
+            reason("f_" + coordinate_of(i - system.momentum.size()) + ": the force depends on the velocity");
     }
+    for (const Event& event : scene.outputs.events)
+        if (event.value.has(system.t)) system.autonomous = false;  // events are given the time with everything else
     check_mass(scene, system);
 
     GiNaC::exmap at_rest;
@@ -303,7 +335,7 @@ System build_system(const Scene& scene) {
         std::vector<ex> at_zero;
         for (const ex& momentum : system.momentum)
             at_zero.push_back(momentum.subs(at_rest, GiNaC::subs_options::no_pattern));
-        const std::vector<Dependence::Kind> rest = Dependence(scene, system).of(at_zero);
+        const std::vector<Dependence::Kind> rest = dependence.of(at_zero);
         for (std::size_t k = 0; k < rest.size(); ++k)
             if (!rest[k].zero && system.separable)
                 reason("p_" + coordinate_of(k) + " = " + canonical_text(at_zero[k]) + " at rest");

@@ -286,3 +286,36 @@ TEST_CASE("diagonal mass and sparse second derivatives leave fewer operations th
     }
     CHECK(derive(library("stiff_fput")).structure.entries.size() < 36);
 }
+
+TEST_CASE("a force that jumps is not taken for a constant one") {
+    const std::string start = "[coordinates]\nx = { position = 3, velocity = 0.2 }\n" + run;
+    for (const char* lagrangian : {"x'^2/2 - sqrt((x-1)^2)", "x'^2/2 - sqrt(x^2)", "(2 + x/sqrt(x^2))*x'^2/2 - x^2"}) {
+        const Scene jumps = scene("lagrangian = \"" + std::string(lagrangian) + "\"\n" + start);
+        const Derivation derivation = derive(jumps);
+        CHECK_FALSE(derivation.structure.linear);
+        CHECK(distance(motion(derivation, 20), motion(derive(jumps, true), 20)) < 1e-13);
+    }
+    // Dry friction: the velocity 0.2 falls by 0.1 a unit of time.
+    const Scene friction = scene("lagrangian = \"x'^2/2\"\n" + start + "[forces]\nx = \"-x'/sqrt(x'^2)/10\"\n");
+    const Motion slowed = motion(derive(friction), 20);
+    CHECK(std::fabs(slowed.p[0] - 0.1) < 1e-13);
+    CHECK(std::fabs(slowed.q[0] - 3.15) < 1e-13);
+}
+
+TEST_CASE("an event may hold the time where the Lagrangian does not") {
+    const std::string text =
+        header(scene("time = \"t\"\nlagrangian = \"x'^2/2 - x^4/4\"\n[coordinates]\n"
+                     "x = { position = 1, velocity = 0 }\n" +
+                     run + "[output]\nevents = [\"x = t/10 falling\"]\n"));
+    CHECK(text.find("void event(const Coefficients&, real time,") != std::string::npos);
+}
+
+TEST_CASE("a driven chain absorbs only what does not depend on the time") {
+    const Scene driven = scene(
+        "time = \"t\"\nlagrangian = \"sum(i=1..n, x[i]'^2/2) - sum(i=1..n-1, (1 + 0.2*sin(t))*(x[i+1]-x[i])^2 + "
+        "(x[i+1]-x[i])^4/10 + (x[i+1]-x[i])^2)\"\n[coordinates]\nx = { count = \"n\", position = \"sin(pi*i/n)\", "
+        "velocity = 0 }\n[parameters]\nn = { value = 40, constant = true }\n" +
+        run);
+    CHECK(derive(driven).structure.looped);
+    CHECK(distance(motion(derive(driven), 20), motion(derive(driven, true), 20)) < 1e-12);
+}
