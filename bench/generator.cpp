@@ -102,9 +102,10 @@ int main() {
         "cold "
         "compile, s |\n|---|---|---|---|---|---|---|---|\n";
     fmt::print(
-        "# How fast the generator is\n\nWritten by `bench_generator`; best of five derivations, best of three "
-        "cold compilations.\n\n{}",
-        head);
+        "# How fast the generator is\n\nWritten by `cmake --build build/release --target bench_generator && "
+        "build/release/bench_generator > docs/generator_speed.md` on {}, {} cores; best of five derivations, best "
+        "of three cold compilations. A kernel is compiled once; then it comes from the cache.\n\n{}",
+        processor(), sysconf(_SC_NPROCESSORS_ONLN), head);
     const std::vector<std::pair<std::string, std::string>> scenes = {
         {"pendulum", ""},           {"kepler", ""},       {"henon_heiles", ""},        {"double_pendulum", "0.05"},
         {"triple_pendulum", "0.2"}, {"lagrange_top", ""}, {"outer_solar_system", "1"}, {"wave_chain", "1"},
