@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The five problems of the race, mass 1, written by hand for the peers: accelerations where the mass matrix is
+// constant, slopes of the first-order form (q, p)' = (dH/dp, -dH/dq) for all, each for every number type.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "bench/peers/number.hpp"
+
+namespace lobatto::bench {
+
+template <class real, int n>
+struct State {
+    std::array<real, n> q, p;
+};
+
+// For problems with H = p^2/2 + V(q): from the acceleration and V. y = (q, p).
+template <class Problem, int n>
+struct Separable {
+    static constexpr bool separable = true;
+    static constexpr int coordinates = n;
+    template <class real>
+    static void slope(const real* y, real* dy) {
+        for (int k = 0; k < n; ++k) dy[k] = y[n + k];
+        Problem::acceleration(y, dy + n);
+    }
+    template <class real>
+    static real energy(const real* q, const real* p) {
+        real H = Problem::potential(q);
+        for (int k = 0; k < n; ++k) H += p[k] * p[k] / 2;
+        return H;
+    }
+};
+
+// P1. The pendulum: V = 1 - cos q.
+struct Pendulum : Separable<Pendulum, 1> {
+    template <class real>
+    static void acceleration(const real* q, real* a) {
+        a[0] = -sine(q[0]);
+    }
+    template <class real>
+    static real potential(const real* q) {
+        return 1 - cosine(q[0]);
+    }
+};
+
+// P2. Henon and Heiles: V = (x^2 + y^2)/2 + x^2 y - y^3/3.
+struct HenonHeiles : Separable<HenonHeiles, 2> {
+    template <class real>
+    static void acceleration(const real* q, real* a) {
+        const real x = q[0], y = q[1];
+        a[0] = -(x + 2 * x * y);
+        a[1] = (y * y - x * x) - y;
+    }
+    template <class real>
+    static real potential(const real* q) {
+        const real x = q[0], y = q[1];
+        return (x * x + y * y) / 2 + x * x * y - y * y * y / 3;
+    }
+};
+
+// P3. The double pendulum, unit masses and lengths, g = 9.81: M = (2, cos d; cos d, 1) with d = q1 - q2.
+struct DoublePendulum {
+    static constexpr bool separable = false;
+    static constexpr int coordinates = 2;
+    static constexpr double g = 9.81;
+    template <class real>
+    static void slope(const real* y, real* dy) {
+        const real c = cosine(y[0] - y[1]), s = sine(y[0] - y[1]), inverse = 1 / (1 + s * s);  // of det M = 2 - c^2
+        dy[0] = (y[2] - c * y[3]) * inverse;
+        dy[1] = (2 * y[3] - c * y[2]) * inverse;
+        const real coupling = dy[0] * dy[1] * s;
+        dy[2] = -coupling - 2 * real(g) * sine(y[0]);
+        dy[3] = coupling - real(g) * sine(y[1]);
+    }
+    template <class real>
+    static real energy(const real* q, const real* p) {
+        const real c = cosine(q[0] - q[1]), s = sine(q[0] - q[1]);
+        const real kinetic = (p[0] * p[0] - 2 * c * p[0] * p[1] + 2 * p[1] * p[1]) / (2 * (1 + s * s));
+        return kinetic - real(g) * (2 * cosine(q[0]) + cosine(q[1]));
+    }
+};
+
+// P4. Kepler: V = -1/|q|.
+struct Kepler : Separable<Kepler, 2> {
+    template <class real>
+    static void acceleration(const real* q, real* a) {
+        const real r2 = q[0] * q[0] + q[1] * q[1], factor = -1 / (r2 * square_root(r2));
+        a[0] = factor * q[0];
+        a[1] = factor * q[1];
+    }
+    template <class real>
+    static real potential(const real* q) {
+        return -1 / square_root(q[0] * q[0] + q[1] * q[1]);
+    }
+};
+
+// P5. Fermi, Pasta, Ulam, Tsingou: 32 masses, fixed ends, V = sum of d^2/2 + 0.3 d^4/4 over the 33 springs.
+struct Chain : Separable<Chain, 32> {
+    static constexpr double beta = 0.3;
+    template <class real>
+    static void acceleration(const real* q, real* a) {
+        constexpr int n = 32;
+        real d[n + 1], tension[n + 1];
+        d[0] = q[0];
+        for (int i = 1; i < n; ++i) d[i] = q[i] - q[i - 1];
+        d[n] = -q[n - 1];
+        for (int i = 0; i <= n; ++i) tension[i] = d[i] + real(beta) * d[i] * d[i] * d[i];
+        for (int i = 0; i < n; ++i) a[i] = tension[i + 1] - tension[i];
+    }
+    template <class real>
+    static real potential(const real* q) {
+        real V = 0, before = 0;
+        for (int i = 0; i <= 32; ++i) {
+            const real here = i < 32 ? q[i] : real(0), d = here - before, d2 = d * d;
+            V += d2 / 2 + real(beta) * d2 * d2 / 4;
+            before = here;
+        }
+        return V;
+    }
+};
+
+// The same for what is chosen at run time. Numbers are the nearest doubles of the problem's.
+struct Problem {
+    std::string name;   // "P1"
+    std::string title;  // "pendulum"
+    std::string scene;  // file below bench/scenes/
+    double until;       // T
+    std::vector<double> q, p;
+};
+const std::vector<Problem>& problems();
+
+// Calls action with the problem's type: action(Pendulum()).
+template <class Action>
+auto with_type_of(const Problem& problem, Action action) {
+    switch (problem.name[1]) {
+        case '1':
+            return action(Pendulum());
+        case '2':
+            return action(HenonHeiles());
+        case '3':
+            return action(DoublePendulum());
+        case '4':
+            return action(Kepler());
+        default:
+            return action(Chain());
+    }
+}
+
+}  // namespace lobatto::bench

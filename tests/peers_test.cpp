@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The peers of the race are what their papers say: each has its order, and the symplectic ones keep the energy.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "bench/peers/gauss.hpp"
+#include "bench/peers/nystrom.hpp"
+#include "bench/peers/splitting.hpp"
+
+using namespace lobatto::bench;
+
+namespace {
+
+using Quad = __float128;
+using Planar = State<Quad, 2>;
+
+const Planar star{{Quad(0.18), Quad(0.18)}, {Quad(0.18), Quad(0.18)}};
+
+template <class Problem, class Integrate>
+Planar after(Planar state, const Integrate& integrate, double until, long steps) {
+    integrate(state, Quad(until) / steps, steps);
+    return state;
+}
+
+double distance(const Planar& a, const Planar& b) {
+    double largest = 0;
+    for (int k = 0; k < 2; ++k) {
+        largest = std::max(largest, std::fabs(static_cast<double>(a.q[k] - b.q[k])));
+        largest = std::max(largest, std::fabs(static_cast<double>(a.p[k] - b.p[k])));
+    }
+    return largest;
+}
+
+// The order from two step sizes, against Gauss with 12 stages in quadruple precision.
+template <class Problem, class Integrate>
+double measured_order(const Planar& start, const Integrate& integrate, double until, long steps) {
+    const Planar reference = after<Problem>(
+        start, [](Planar& s, Quad h, long m) { integrate_gauss<12, Problem>(s, h, m, exact("1e-30")); }, until,
+        static_cast<long>(until * 10));
+    const double coarse = distance(after<Problem>(start, integrate, until, steps), reference);
+    const double fine = distance(after<Problem>(start, integrate, until, 2 * steps), reference);
+    MESSAGE("errors " << coarse << " and " << fine);
+    return std::log2(coarse / fine);
+}
+
+template <const auto& table>
+double order_of_splitting(long steps) {
+    return measured_order<HenonHeiles>(
+        star, [](Planar& s, Quad h, long m) { integrate_splitting<table, HenonHeiles>(s, h, m); }, 4, steps);
+}
+
+// The largest relative energy error of the two halves of a run of 20000 steps.
+template <class Problem, class Integrate>
+void check_energy(State<double, Problem::coordinates> state, double h, double bound, const Integrate& integrate) {
+    const double start = Problem::energy(state.q.data(), state.p.data());
+    double largest[2] = {0, 0};
+    for (int half = 0; half < 2; ++half)
+        for (int block = 0; block < 1000; ++block) {
+            integrate(state, h, 10L);
+            const double error = std::fabs(Problem::energy(state.q.data(), state.p.data()) / start - 1);
+            largest[half] = std::max(largest[half], error);
+        }
+    MESSAGE("largest relative energy errors of the halves: " << largest[0] << ", " << largest[1]);
+    CHECK(largest[0] > 0);
+    CHECK(largest[0] < bound);
+    CHECK(largest[1] < 1.5 * largest[0]);
+}
+
+template <const auto& table>
+void check_energy_of_splitting(double h, double bound) {
+    check_energy<HenonHeiles>({{0.18, 0.18}, {0.18, 0.18}}, h, bound, [](auto& s, double step, long m) {
+        integrate_splitting<table, HenonHeiles>(s, step, m);
+    });
+}
+
+}  // namespace
+
+TEST_CASE("numbers of papers keep 33 digits") {
+    CHECK(exact("-12.5e-1") == Quad(-1.25));
+    CHECK(exact("7/2400") == Quad(7) / 2400);
+    CHECK(exact("0.1") == Quad(1) / 10);
+    CHECK(exact("3e2") == Quad(300));
+}
+
+TEST_CASE("the peers' splitting methods have their orders on Henon-Heiles") {
+    CHECK(order_of_splitting<stoermer_verlet>(64) == doctest::Approx(2).epsilon(0.05));
+    CHECK(order_of_splitting<blanes_moan_11>(32) == doctest::Approx(6).epsilon(0.03));
+    CHECK(order_of_splitting<blanes_moan_14>(32) == doctest::Approx(6).epsilon(0.03));
+    CHECK(order_of_splitting<kahan_li_8>(32) == doctest::Approx(8).epsilon(0.03));
+    CHECK(order_of_splitting<sofroniou_spaletta_10>(16) == doctest::Approx(10).epsilon(0.03));
+}
+
+TEST_CASE("the peers' Gauss methods have orders 12 and 16, in the second-order and in the first-order form") {
+    const auto gauss_6 = [](Planar& s, Quad h, long m) { integrate_gauss<6, HenonHeiles>(s, h, m, exact("1e-30")); };
+    const auto gauss_8 = [](Planar& s, Quad h, long m) { integrate_gauss<8, HenonHeiles>(s, h, m, exact("1e-30")); };
+    CHECK(measured_order<HenonHeiles>(star, gauss_6, 8, 16) == doctest::Approx(12).epsilon(0.03));
+    CHECK(measured_order<HenonHeiles>(star, gauss_8, 8, 16) == doctest::Approx(16).epsilon(0.03));
+    const Planar pendulums{{Quad(0.5), Quad(0.3)}, {0, 0}};
+    const auto general = [](Planar& s, Quad h, long m) { integrate_gauss<6, DoublePendulum>(s, h, m, exact("1e-30")); };
+    CHECK(measured_order<DoublePendulum>(pendulums, general, 1, 16) == doctest::Approx(12).epsilon(0.05));
+}
+
+TEST_CASE("Dormand, El-Mikkawy and Prince's pair has orders 12 and 10") {
+    const NystromTable& t = nystrom_12;
+    const auto integer_power = [](Quad x, int exponent) {
+        Quad result = 1;
+        for (; exponent > 0; --exponent) result *= x;
+        return result;
+    };
+    // Rows: the sum over j of a_ij c_j^m is c_i^(m+2)/((m+1)(m+2)), for m = 0 in each row (29 printed digits, sums
+    // below 100).
+    for (int i = 1; i < t.stages; ++i) {
+        Quad sum = 0;
+        for (int j = 0; j < i; ++j) sum += t.a[i][j];
+        CHECK(std::fabs(static_cast<double>(sum - t.c[i] * t.c[i] / 2)) < 1e-27);
+    }
+    for (int m = 0; m < 12; ++m) {
+        Quad b = 0, slope_b = 0, lower_b = 0, lower_slope_b = 0;
+        for (int j = 0; j < t.stages; ++j) {
+            const Quad power = integer_power(t.c[j], m);
+            b += t.b[j] * power;
+            slope_b += t.slope_b[j] * power;
+            lower_b += t.lower_b[j] * power;
+            lower_slope_b += t.lower_slope_b[j] * power;
+        }
+        CAPTURE(m);
+        CHECK(std::fabs(static_cast<double>(slope_b - Quad(1) / (m + 1))) < 1e-27);
+        if (m < 11) CHECK(std::fabs(static_cast<double>(b - Quad(1) / ((m + 1) * (m + 2)))) < 1e-27);
+        if (m < 10) CHECK(std::fabs(static_cast<double>(lower_slope_b - Quad(1) / (m + 1))) < 1e-27);
+        if (m < 9) CHECK(std::fabs(static_cast<double>(lower_b - Quad(1) / ((m + 1) * (m + 2)))) < 1e-27);
+    }
+    const auto nystrom = [](Planar& s, Quad h, long m) { integrate_nystrom_fixed<HenonHeiles>(s, h, m); };
+    CHECK(measured_order<HenonHeiles>(star, nystrom, 8, 16) == doctest::Approx(12).epsilon(0.03));
+}
+
+TEST_CASE("the adaptive peer keeps the tolerance it was given, about") {
+    State<double, 2> state{{0.18, 0.18}, {0.18, 0.18}};
+    const AdaptiveCount count = integrate_nystrom<HenonHeiles>(state, 100, 1e-10);
+    Planar reference = star;
+    integrate_gauss<12, HenonHeiles>(reference, Quad(0.1), 1000, exact("1e-25"));
+    const Planar end{{Quad(state.q[0]), Quad(state.q[1])}, {Quad(state.p[0]), Quad(state.p[1])}};
+    MESSAGE(count.steps << " steps, error " << distance(end, reference));
+    CHECK(distance(end, reference) < 1e-8);
+    CHECK(count.evaluations >= 17 * count.steps);
+}
+
+TEST_CASE("the symplectic peers keep the energy of Henon-Heiles without drift") {
+    check_energy_of_splitting<stoermer_verlet>(0.1, 1e-2);
+    check_energy_of_splitting<blanes_moan_11>(1, 1e-4);
+    check_energy_of_splitting<blanes_moan_14>(1, 1e-4);
+    check_energy_of_splitting<kahan_li_8>(1, 1e-2);
+    check_energy_of_splitting<sofroniou_spaletta_10>(1.5, 1e-2);
+    check_energy<HenonHeiles>({{0.18, 0.18}, {0.18, 0.18}}, 2.5, 1e-3,
+                              [](auto& s, double h, long m) { integrate_gauss<6, HenonHeiles>(s, h, m); });
+}
