@@ -129,6 +129,8 @@ struct Problem {
     std::string scene;  // file below bench/scenes/
     double until;       // T
     std::vector<double> q, p;
+    double longest_step;   // where the scan of steps begins
+    long reference_steps;  // of the reference solution
 };
 const std::vector<Problem>& problems();
 

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "bench/kernels.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <future>
+#include <thread>
+
+#include "cli/kernel_of.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto::bench {
+
+namespace {
+
+std::vector<Method> methods_in_race(bool few) {
+    std::vector<Method> methods;
+    for (int points = 3; points <= 12; ++points)
+        if (!few || points % 2 == 0) methods.push_back({Family::lobatto, points});
+    for (int stages = 2; stages <= 10; ++stages)
+        if (!few || stages == 6) methods.push_back({Family::gauss, stages});
+    return methods;
+}
+
+// Gradients of V, or of L, that a run took.
+long evaluations_of(const lobatto_kernel& kernel, const lobatto_advance& call) {
+    const bool lobatto_nodes = std::string(kernel.method).starts_with("Lobatto");
+    const bool ends_apart = kernel.form == LOBATTO_SEPARABLE && lobatto_nodes;
+    return static_cast<long>(call.iterations) * (kernel.nodes - (ends_apart ? 2 : 0)) +
+           (ends_apart ? static_cast<long>(call.steps_done) : 0);
+}
+
+Effort run_one(LoadedStepper<double>& stepper, std::int64_t steps, Trajectory& trajectory) {
+    if (stepper.start(0, trajectory.q, trajectory.p) != LOBATTO_OK) return {};
+    lobatto_advance call{};
+    call.steps = steps;
+    const lobatto_status status = stepper.advance(call);
+    double time;
+    stepper.state(time, trajectory.q, trajectory.p);
+    return {status == LOBATTO_OK && call.steps_done == steps, static_cast<long>(call.steps_done),
+            evaluations_of(stepper.kernel().table(), call)};
+}
+
+#if LOBATTO_ABI_VERSION >= 3
+// Side by side, `lanes` at a time; lanes left over in the last group stand still.
+Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std::vector<Trajectory>& trajectories) {
+    const std::size_t lanes = static_cast<std::size_t>(kernel.lanes), n = static_cast<std::size_t>(kernel.coordinates);
+    const std::size_t alignment = static_cast<std::size_t>(kernel.ensemble_alignment);
+    const std::size_t bytes = (static_cast<std::size_t>(kernel.ensemble_bytes) + alignment - 1) / alignment * alignment;
+    const std::unique_ptr<void, void (*)(void*)> ensemble(std::aligned_alloc(alignment, bytes), std::free);
+    const std::vector<double> step(lanes, h), time(lanes, 0);
+    std::vector<double> q(lanes * n), p(lanes * n);
+    std::vector<std::int64_t> steps_done(lanes), iterations(lanes);
+    Effort all{true, 0, 0};
+    for (std::size_t first = 0; first < trajectories.size(); first += lanes) {
+        const std::size_t used = std::min(lanes, trajectories.size() - first);
+        std::vector<std::int32_t> status(lanes, LOBATTO_OK);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            const Trajectory& start = trajectories[first + std::min(lane, used - 1)];
+            std::copy(start.q.begin(), start.q.end(), q.begin() + static_cast<std::ptrdiff_t>(lane * n));
+            std::copy(start.p.begin(), start.p.end(), p.begin() + static_cast<std::ptrdiff_t>(lane * n));
+            if (lane >= used) status[lane] = LOBATTO_UNSUPPORTED;
+        }
+        kernel.ensemble_prepare(ensemble.get(), nullptr, step.data(), status.data());
+        kernel.ensemble_start(ensemble.get(), time.data(), q.data(), p.data(), status.data());
+        kernel.ensemble_advance(ensemble.get(), steps, status.data(), steps_done.data(), iterations.data());
+        kernel.ensemble_state(ensemble.get(), q.data(), p.data());
+        for (std::size_t lane = 0; lane < used; ++lane) {
+            Trajectory& end = trajectories[first + lane];
+            std::copy_n(q.begin() + static_cast<std::ptrdiff_t>(lane * n), n, end.q.begin());
+            std::copy_n(p.begin() + static_cast<std::ptrdiff_t>(lane * n), n, end.p.begin());
+            lobatto_advance call{};
+            call.steps_done = steps_done[lane];
+            call.iterations = iterations[lane];
+            all.good = all.good && status[lane] == LOBATTO_OK && steps_done[lane] == steps;
+            all.steps += static_cast<long>(call.steps_done);
+            all.evaluations += evaluations_of(kernel, call);
+        }
+    }
+    return all;
+}
+#endif
+
+Contestant contestant_of(const Problem& problem, Method method, const Kernel& kernel) {
+    const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
+    const auto run = [stepper, until = problem.until](double setting, std::vector<Trajectory>& trajectories) -> Effort {
+        const double h = until / setting;
+        const auto steps = static_cast<std::int64_t>(setting);
+#if LOBATTO_ABI_VERSION >= 3
+        const lobatto_kernel& table = stepper->kernel().table();
+        if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, trajectories);
+#endif
+        if (stepper->prepare({}, h) != LOBATTO_OK) return {};
+        return one_by_one(trajectories, [&](Trajectory& trajectory) { return run_one(*stepper, steps, trajectory); });
+    };
+    Contestant contestant{method.name(), method.order(), true, true, Ladder::steps, run};
+    contestant.cold_start = [&problem, method] { return cold_start_seconds(problem, method); };
+    return contestant;
+}
+
+}  // namespace
+
+KernelSource source_of(const Problem& problem, Method method) {
+    Scene scene = read_scene(std::string(LOBATTO_SOURCE_DIR) + "/bench/scenes/" + problem.scene);
+    scene.method = method;
+    return emit(derive(scene));
+}
+
+Contestants kernel_contestants(const Problem& problem, bool few) {
+    const std::vector<Method> methods = methods_in_race(few);
+    std::vector<KernelSource> sources;
+    for (const Method& method : methods) sources.push_back(source_of(problem, method));
+    // Compilers side by side; the generator itself is for one thread.
+    std::atomic<std::size_t> next = 0;
+    std::vector<std::future<void>> workers;
+    for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+        workers.push_back(std::async(std::launch::async, [&] {
+            for (std::size_t j; (j = next++) < sources.size();) compile(translation_of(sources[j], Precision::double_));
+        }));
+    for (std::future<void>& worker : workers) worker.get();
+    Contestants contestants;
+    for (std::size_t i = 0; i < methods.size(); ++i)
+        contestants.push_back(contestant_of(problem, methods[i], kernel_of(sources[i], Precision::double_)));
+    return contestants;
+}
+
+double cold_start_seconds(const Problem& problem, Method method) {
+    std::string folder = (std::filesystem::temp_directory_path() / "lobatto-bench-XXXXXX").string();
+    if (mkdtemp(folder.data()) == nullptr) throw MachineError("cannot create a folder in the temporary folder");
+    const char* const variable = "LOBATTO_CACHE_DIR";
+    const char* const before = std::getenv(variable);
+    const std::string saved = before == nullptr ? "" : before;
+    setenv(variable, folder.c_str(), 1);
+    const auto start = std::chrono::steady_clock::now();
+    kernel_of(source_of(problem, method), Precision::double_);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (before == nullptr)
+        unsetenv(variable);
+    else
+        setenv(variable, saved.c_str(), 1);
+    std::filesystem::remove_all(folder);
+    return seconds;
+}
+
+}  // namespace lobatto::bench

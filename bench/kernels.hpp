@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Our own contestants: kernels derived from the scenes of bench/scenes/, compiled and loaded as `lobatto run` does.
+#pragma once
+
+#include "bench/contestant.hpp"
+#include "generator/emit.hpp"
+#include "generator/scene.hpp"
+
+namespace lobatto::bench {
+
+KernelSource source_of(const Problem& problem, Method method);
+
+// Of all methods in the race. `few`: of some.
+Contestants kernel_contestants(const Problem& problem, bool few);
+
+// Seconds from the scene to the loaded kernel, nothing cached.
+double cold_start_seconds(const Problem& problem, Method method);
+
+}  // namespace lobatto::bench

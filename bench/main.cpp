@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto_bench: our kernels against every peer, on the five problems of docs/benchmarks.md.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "bench/report.hpp"
+#include "runtime/error.hpp"
+
+namespace {
+
+using namespace lobatto;
+using namespace lobatto::bench;
+
+struct Options {
+    std::vector<std::string> problems;
+    std::string output = "out/bench";
+    bool ensemble = false;
+    RaceOptions race;
+};
+
+void run(const Options& options) {
+    std::filesystem::create_directories(options.output);
+    std::vector<Race> single, ensemble;
+    for (const Problem& problem : problems()) {
+        const auto& wanted = options.problems;
+        if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), problem.name) == wanted.end()) continue;
+        if (!options.ensemble) single.push_back(run_race(problem, 1, options.race));
+        ensemble.push_back(run_race(problem, ensemble_size, options.race));
+    }
+    fill_cold_starts(single);
+    print_machine();
+    print_tables(single);
+    print_tables(ensemble);
+    std::vector<Race> all = single;
+    all.insert(all.end(), ensemble.begin(), ensemble.end());
+    write_csv(options.output + "/measurements.csv", all);
+    for (const Race& race : all) draw_diagram(options.output, race);
+    fmt::print("\nAll measurements and the work-precision diagrams: {}/measurements.csv, {}/P1.svg …\n", options.output,
+               options.output);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App program("The race of Lobatto's kernels against other integrators (docs/benchmarks.md).", "lobatto bench");
+    Options options;
+    program.add_option("--problem", options.problems, "Only this problem, P1 to P5; may be given again")
+        ->check(CLI::IsMember({"P1", "P2", "P3", "P4", "P5"}));
+    program.add_option("--output", options.output, "Folder of the CSV file and the diagrams")->capture_default_str();
+    program.add_flag("--ensemble", options.ensemble, "Only the ensembles");
+    program.add_flag("--peers-only", options.race.peers_only, "Without our kernels");
+    program.add_flag("--quick", options.race.quick, "Fewer kernels, coarser steps and fewer repetitions");
+    try {
+        program.parse(argc, argv);
+        run(options);
+        return 0;
+    } catch (const CLI::ParseError& error) {
+        return program.exit(error) == 0 ? 0 : 2;
+    } catch (const MachineError& error) {
+        fmt::print(stderr, "lobatto bench: {}\n", error.what());
+        return 4;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "lobatto bench: {}\n", error.what());
+        return 3;
+    }
+}

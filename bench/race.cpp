@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "bench/race.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "bench/kernels.hpp"
+#include "bench/reference.hpp"
+
+namespace lobatto::bench {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+struct Course {
+    const Problem& problem;
+    std::vector<Trajectory> starts, ends;
+};
+
+// Trajectory i of an ensemble: the first coordinate times 1 + i/1000.
+Course course_of(const Problem& problem, int trajectories) {
+    Course course{problem, {}, {}};
+    for (int i = 0; i < trajectories; ++i) {
+        Trajectory start{problem.q, problem.p};
+        start.q[0] *= 1 + 1e-3 * i;
+        course.starts.push_back(start);
+        course.ends.push_back(i == 0 ? reference_end(problem, start) : quick_reference_end(problem, start));
+    }
+    return course;
+}
+
+double distance(const Trajectory& a, const Trajectory& b) {
+    double largest = 0;
+    for (std::size_t k = 0; k < a.q.size(); ++k)
+        for (const double difference : {a.q[k] - b.q[k], a.p[k] - b.p[k]})
+            largest = std::isfinite(difference) ? std::max(largest, std::fabs(difference)) : infinity;
+    return largest;
+}
+
+Measurement measure(const Course& course, const Contestant& contestant, double setting) {
+    std::vector<Trajectory> trajectories = course.starts;
+    const auto start = std::chrono::steady_clock::now();
+    const Effort effort = contestant.run(setting, trajectories);
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    const double count = static_cast<double>(trajectories.size());
+    Measurement result{setting, elapsed.count() / count, 0, 0, effort.steps, effort.evaluations};
+    result.steps /= static_cast<long>(trajectories.size());
+    result.evaluations /= static_cast<long>(trajectories.size());
+    for (std::size_t i = 0; i < trajectories.size(); ++i) {
+        result.error = std::max(result.error, distance(trajectories[i], course.ends[i]));
+        const double H0 = energy_of(course.problem, course.starts[i]), H = energy_of(course.problem, trajectories[i]);
+        result.energy_error = std::max(result.energy_error, std::fabs(H / H0 - 1));
+    }
+    if (!effort.good) result.error = infinity;
+    return result;
+}
+
+// Numbers of steps in ratios of about 2^(1/4); tolerances in ratios of 3, or of 30 where each must be compiled.
+std::vector<double> ladder_of(const Problem& problem, const Contestant& contestant, bool quick) {
+    std::vector<double> settings;
+    if (contestant.ladder == Ladder::tolerance) {
+        const double ratio = quick || contestant.prepare ? std::sqrt(1000) : std::sqrt(10);
+        for (double tolerance = 1e-3; tolerance > 1e-18; tolerance /= ratio) settings.push_back(tolerance);
+        return settings;
+    }
+    const double ratio = quick ? std::sqrt(2) : std::sqrt(std::sqrt(2)), longest = 1e8;
+    for (double steps = problem.until / problem.longest_step; steps < longest; steps *= ratio)
+        if (settings.empty() || std::round(steps) > settings.back()) settings.push_back(std::round(steps));
+    return settings;
+}
+
+// From coarse to fine until it is too slow, or a few settings beyond the first that reaches the finest target.
+void scan(const Course& course, Lane& lane, bool quick, double time_limit) {
+    const int beyond = 4;
+    int fine = 0;
+    for (const double setting : ladder_of(course.problem, lane.contestant, quick)) {
+        const double prepared = lane.contestant.prepare ? lane.contestant.prepare(setting, course.starts.size()) : 0;
+        Measurement best = measure(course, lane.contestant, setting);
+        for (int repetition = 0; repetition < 2 && best.seconds < 2e-3; ++repetition)
+            best.seconds = std::min(best.seconds, measure(course, lane.contestant, setting).seconds);
+        best.compile_seconds = prepared;
+        lane.scan.push_back(best);
+        if (best.error < targets.back()) ++fine;
+        if (fine > beyond || best.seconds > time_limit) break;
+    }
+}
+
+double fastest(const Lane& lane, double target) {
+    double seconds = infinity;
+    for (const Measurement& m : lane.scan)
+        if (m.error < target) seconds = std::min(seconds, m.seconds);
+    return seconds;
+}
+
+// Eight times what the best so far needs for the finest target that anyone reached.
+double time_limit_of(const std::vector<Lane>& lanes) {
+    for (std::size_t i = targets.size(); i-- > 0;) {
+        double best = infinity;
+        for (const Lane& lane : lanes) best = std::min(best, fastest(lane, targets[i]));
+        if (best < infinity) return 8 * best;
+    }
+    return 0.1;
+}
+
+// The few settings of a lane that may be its fastest for a target.
+std::vector<Measurement*> candidates(Lane& lane, double target) {
+    std::vector<Measurement*> reaching;
+    for (Measurement& m : lane.scan)
+        if (m.error < target) reaching.push_back(&m);
+    std::sort(reaching.begin(), reaching.end(), [](const auto* a, const auto* b) { return a->seconds < b->seconds; });
+    if (reaching.size() > 3) reaching.resize(3);
+    return reaching;
+}
+
+}  // namespace
+
+Race run_race(const Problem& problem, int trajectories, const RaceOptions& options) {
+    const auto say = [&](const std::string& what) {
+        fmt::print(stderr, "{}{}: {}\n", problem.name, trajectories > 1 ? ", ensemble" : "", what);
+    };
+    say("reference");
+    const Course course = course_of(problem, trajectories);
+    Race race{&problem, trajectories, {}};
+    Contestants contestants;
+    const auto enter = [&](Contestants more) { std::move(more.begin(), more.end(), std::back_inserter(contestants)); };
+    enter(own_peers(problem));
+    enter(odeint_peers(problem));
+    enter(gsl_peers(problem));
+    enter(sundials_peers(problem));
+#ifdef LOBATTO_BENCH_HEYOKA
+    enter(heyoka_peers(problem));
+#endif
+    if (!options.peers_only) {
+        say("kernels");
+        enter(kernel_contestants(problem, options.quick));
+    }
+    for (Contestant& contestant : contestants) {
+        say(contestant.method);
+        Lane lane{std::move(contestant), {}, {}};
+        scan(course, lane, options.quick, time_limit_of(race.lanes));
+        race.lanes.push_back(std::move(lane));
+    }
+
+    say("all in turn");
+    std::vector<std::pair<const Contestant*, Measurement*>> finalists;
+    for (Lane& lane : race.lanes)
+        for (const double target : targets)
+            for (Measurement* m : candidates(lane, target)) {
+                const auto known = [&](const auto& finalist) { return finalist.second == m; };
+                if (std::none_of(finalists.begin(), finalists.end(), known)) finalists.push_back({&lane.contestant, m});
+            }
+    for (int repetition = 0; repetition < (options.quick ? 5 : 9); ++repetition)
+        for (auto& [contestant, m] : finalists)
+            m->seconds = std::min(m->seconds, measure(course, *contestant, m->setting).seconds);
+    for (Lane& lane : race.lanes)
+        for (std::size_t i = 0; i < targets.size(); ++i)
+            if (const auto reaching = candidates(lane, targets[i]); !reaching.empty()) lane.best[i] = *reaching.front();
+    return race;
+}
+
+std::string setting_text(const Problem& problem, const Contestant& contestant, double setting) {
+    if (contestant.ladder == Ladder::tolerance) return fmt::format("tolerance = {:.2g}", setting);
+    return fmt::format("h = {:.4g}", problem.until / setting);
+}
+
+}  // namespace lobatto::bench
