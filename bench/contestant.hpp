@@ -20,6 +20,9 @@ struct Effort {
     long evaluations = 0;  // of accelerations or slopes; 0: not counted
 };
 
+// A solution that a coarse tolerance lets escape to infinity ends a run here.
+inline constexpr long most_steps = 200'000;
+
 enum class Ladder { steps, tolerance };  // what the setting is: the number of steps to T, or an error tolerance
 
 struct Contestant {

@@ -30,6 +30,7 @@ void run(const Options& options) {
         ensemble.push_back(run_race(problem, ensemble_size, options.race));
     }
     fill_cold_starts(single);
+    fill_cold_starts(ensemble);
     print_machine();
     print_tables(single);
     print_tables(ensemble);

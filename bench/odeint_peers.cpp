@@ -21,7 +21,7 @@ Contestant adaptive(const Problem& problem, const std::string& method, int order
             join(trajectory, y.data());
             long evaluations = 0;
             const auto slope = [&](const auto& state, auto& derivative, double) {
-                ++evaluations;
+                if (++evaluations > 20 * most_steps) throw odeint::no_progress_error("too many evaluations");
                 Type::slope(state.data(), derivative.data());
             };
             auto stepper = make(tolerance);

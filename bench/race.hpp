@@ -38,7 +38,22 @@ struct RaceOptions {
     bool peers_only = false;
 };
 
+double seconds(const Lane& lane, std::size_t target);  // of the best setting; infinity: it does not reach the target
+
+// The fastest lane of those chosen; null when none reaches the target.
+template <class Race, class Choice>
+auto fastest_of(Race& race, std::size_t target, const Choice& chosen) {
+    decltype(&race.lanes.front()) best = nullptr;
+    for (auto& lane : race.lanes)
+        if (chosen(lane) && lane.best[target] && (best == nullptr || seconds(lane, target) < seconds(*best, target)))
+            best = &lane;
+    return best;
+}
+
 Race run_race(const Problem& problem, int trajectories, const RaceOptions& options);
+
+// Measures the cold starts of our winners.
+void fill_cold_starts(std::vector<Race>& races);
 
 // "h = 0.25" or "tolerance = 1e-09".
 std::string setting_text(const Problem& problem, const Contestant& contestant, double setting);

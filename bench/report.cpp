@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <limits>
 
 #include "runtime/compiler.hpp"
 
@@ -14,29 +13,14 @@ namespace lobatto::bench {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-double seconds(const Lane& lane, std::size_t target) {
-    return lane.best[target] ? lane.best[target]->seconds : infinity;
+bool is_ours(const Lane& lane) {
+    return lane.contestant.ours;
 }
-
-// The fastest lane among those chosen; null when none reaches the target.
-template <class Choice>
-Lane* first(Race& race, std::size_t target, const Choice& chosen) {
-    Lane* best = nullptr;
-    for (Lane& lane : race.lanes)
-        if (chosen(lane.contestant) && seconds(lane, target) < (best == nullptr ? infinity : seconds(*best, target)))
-            best = &lane;
-    return best;
+bool is_peer(const Lane& lane) {
+    return !lane.contestant.ours;
 }
-bool is_ours(const Contestant& contestant) {
-    return contestant.ours;
-}
-bool is_peer(const Contestant& contestant) {
-    return !contestant.ours;
-}
-bool is_symplectic_peer(const Contestant& contestant) {
-    return !contestant.ours && contestant.symplectic;
+bool is_symplectic_peer(const Lane& lane) {
+    return !lane.contestant.ours && lane.contestant.symplectic;
 }
 
 std::string milliseconds(double time) {
@@ -45,9 +29,9 @@ std::string milliseconds(double time) {
 
 // One row of a table: "a / b / c" of each race, from cell(race, target) -> text.
 template <class Cell>
-void print_row(const std::string& label, std::vector<Race>& races, const Cell& cell) {
+void print_row(const std::string& label, const std::vector<Race>& races, const Cell& cell) {
     fmt::print("| {} |", label);
-    for (Race& race : races) {
+    for (const Race& race : races) {
         for (std::size_t i = 0; i < targets.size(); ++i) fmt::print("{}{}", i == 0 ? " " : " / ", cell(race, i));
         fmt::print(" |");
     }
@@ -56,11 +40,11 @@ void print_row(const std::string& label, std::vector<Race>& races, const Cell& c
 
 // Time of the best of `chosen` over ours, and the geometric mean of these ratios.
 template <class Choice>
-void print_ratios(const std::string& label, std::vector<Race>& races, const Choice& chosen) {
+void print_ratios(const std::string& label, const std::vector<Race>& races, const Choice& chosen) {
     double logarithms = 0, count = 0;
-    print_row(label, races, [&](Race& race, std::size_t i) -> std::string {
-        const Lane* peer = first(race, i, chosen);
-        const Lane* ours = first(race, i, is_ours);
+    print_row(label, races, [&](const Race& race, std::size_t i) -> std::string {
+        const Lane* peer = fastest_of(race, i, chosen);
+        const Lane* ours = fastest_of(race, i, is_ours);
         if (peer == nullptr || ours == nullptr) return "–";
         const double ratio = seconds(*peer, i) / seconds(*ours, i);
         logarithms += std::log(ratio);
@@ -75,8 +59,7 @@ std::vector<std::string> methods_of(const std::vector<Race>& races) {
     std::vector<std::string> names;
     for (const Race& race : races)
         for (const Lane& lane : race.lanes)
-            if (is_peer(lane.contestant) &&
-                std::find(names.begin(), names.end(), lane.contestant.method) == names.end())
+            if (is_peer(lane) && std::find(names.begin(), names.end(), lane.contestant.method) == names.end())
                 names.push_back(lane.contestant.method);
     return names;
 }
@@ -114,10 +97,10 @@ void print_machine() {
     fmt::print("Peers: " LOBATTO_BENCH_COMPILER ", " LOBATTO_BENCH_FLAGS ".\n");
 }
 
-void print_tables(std::vector<Race>& races) {
+void print_tables(const std::vector<Race>& races) {
     if (races.empty()) return;
     const int trajectories = races.front().trajectories;
-    const bool with_ours = first(races.front(), 0, is_ours) != nullptr;
+    const bool with_ours = std::any_of(races.front().lanes.begin(), races.front().lanes.end(), is_ours);
     if (trajectories == 1)
         fmt::print("\n## One trajectory, milliseconds\n\n| method (order) |");
     else
@@ -126,21 +109,21 @@ void print_tables(std::vector<Race>& races) {
     fmt::print("\n|---|");
     for (std::size_t i = 0; i < races.size(); ++i) fmt::print("---|");
     fmt::print("\n");
-    print_row("error below", races, [](Race&, std::size_t i) { return fmt::format("{:.0e}", targets[i]); });
+    print_row("error below", races, [](const Race&, std::size_t i) { return fmt::format("{:.0e}", targets[i]); });
     if (with_ours)
-        print_row("**Lobatto, ours**", races, [](Race& race, std::size_t i) {
-            const Lane* ours = first(race, i, is_ours);
+        print_row("**Lobatto, ours**", races, [](const Race& race, std::size_t i) {
+            const Lane* ours = fastest_of(race, i, is_ours);
             return ours == nullptr ? "–" : fmt::format("**{}**", milliseconds(seconds(*ours, i)));
         });
     for (const std::string& method : methods_of(races)) {
-        const auto named = [&](const Contestant& contestant) { return contestant.method == method; };
+        const auto named = [&](const Lane& lane) { return lane.contestant.method == method; };
         std::string label = method;
         for (const Race& race : races)
             for (const Lane& lane : race.lanes)
-                if (named(lane.contestant)) label = full_name(lane.contestant);
-        print_row(label, races, [&](Race& race, std::size_t i) {
-            const Lane* lane = first(race, i, named);
-            return milliseconds(lane == nullptr ? infinity : seconds(*lane, i));
+                if (named(lane)) label = full_name(lane.contestant);
+        print_row(label, races, [&](const Race& race, std::size_t i) {
+            const Lane* lane = fastest_of(race, i, named);
+            return lane == nullptr ? "–" : milliseconds(seconds(*lane, i));
         });
     }
     if (!with_ours) return;
@@ -150,31 +133,17 @@ void print_tables(std::vector<Race>& races) {
     fmt::print(
         "\n| ours | error below | method | h | error | energy error | ns a step | cold start, s | first of all |\n"
         "|---|---|---|---|---|---|---|---|---|\n");
-    for (Race& race : races)
+    for (const Race& race : races)
         for (std::size_t i = 0; i < targets.size(); ++i) {
-            Lane* ours = first(race, i, is_ours);
+            const Lane* ours = fastest_of(race, i, is_ours);
             if (ours == nullptr) continue;
             const Measurement& m = *ours->best[i];
-            const Lane* peer = first(race, i, is_peer);
+            const Lane* peer = fastest_of(race, i, is_peer);
             fmt::print("| {} | {:.0e} | {} | {:.4g} | {:.1e} | {:.1e} | {:.0f} | {:.2f} | {} |\n", race.problem->name,
                        targets[i], ours->contestant.method, race.problem->until / m.setting, m.error, m.energy_error,
                        m.seconds * 1e9 / static_cast<double>(m.steps), m.compile_seconds,
                        peer == nullptr || m.seconds < seconds(*peer, i) ? "yes" : "no: " + peer->contestant.method);
         }
-}
-
-void fill_cold_starts(std::vector<Race>& races) {
-    for (Race& race : races) {
-        fmt::print(stderr, "{}: cold starts\n", race.problem->name);
-        for (Lane& lane : race.lanes) {
-            double known = 0;
-            for (std::size_t i = 0; i < targets.size(); ++i) {
-                if (!lane.contestant.cold_start || first(race, i, is_ours) != &lane) continue;
-                if (known == 0) known = lane.contestant.cold_start();
-                lane.best[i]->compile_seconds = known;
-            }
-        }
-    }
 }
 
 void write_csv(const std::string& path, const std::vector<Race>& races) {

@@ -7,8 +7,7 @@
 namespace lobatto::bench {
 
 void print_machine();
-void fill_cold_starts(std::vector<Race>& races);  // of our winners
-void print_tables(std::vector<Race>& races);      // of the same number of trajectories
+void print_tables(const std::vector<Race>& races);  // of the same number of trajectories
 void write_csv(const std::string& path, const std::vector<Race>& races);
 void draw_diagram(const std::string& folder, const Race& race);
 

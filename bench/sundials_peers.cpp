@@ -7,8 +7,6 @@
 #include <sundials/sundials_context.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
-#include <limits>
-
 #include "bench/contestant.hpp"
 
 namespace lobatto::bench {
@@ -38,8 +36,6 @@ struct Workspace {
     Workspace& operator=(const Workspace&) = delete;
 };
 
-constexpr long any_number_of_steps = std::numeric_limits<long>::max();
-
 template <class Type>
 Effort run_arkode(double until, double tolerance, std::vector<Trajectory>& trajectories) {
     Workspace work(2 * Type::coordinates);
@@ -48,7 +44,8 @@ Effort run_arkode(double until, double tolerance, std::vector<Trajectory>& traje
     void* memory = ERKStepCreate(slope<Type>, 0, work.y, work.context);
     ERKStepSetTableNum(memory, ARKODE_FEHLBERG_13_7_8);
     ERKStepSStolerances(memory, tolerance, tolerance);
-    ERKStepSetMaxNumSteps(memory, any_number_of_steps);
+    ERKStepSetMaxNumSteps(memory, most_steps);
+    ERKStepSetErrFile(memory, nullptr);
     const Effort all = one_by_one(trajectories, [&](Trajectory& trajectory) {
         join(trajectory, y);
         ERKStepReInit(memory, slope<Type>, 0, work.y);
@@ -75,7 +72,8 @@ Effort run_cvode(double until, double tolerance, std::vector<Trajectory>& trajec
     const SUNNonlinearSolver solver = SUNNonlinSol_FixedPoint(work.y, 0, work.context);
     CVodeSetNonlinearSolver(memory, solver);
     CVodeSStolerances(memory, tolerance, tolerance);
-    CVodeSetMaxNumSteps(memory, any_number_of_steps);
+    CVodeSetMaxNumSteps(memory, most_steps);
+    CVodeSetErrFile(memory, nullptr);
     const Effort all = one_by_one(trajectories, [&](Trajectory& trajectory) {
         join(trajectory, y);
         CVodeReInit(memory, 0, work.y);
