@@ -6,9 +6,9 @@
 #include <string_view>
 
 extern "C" {  // of libquadmath
-__float128 sinq(__float128);
-__float128 cosq(__float128);
-__float128 sqrtq(__float128);
+__float128 sinq(__float128) noexcept;
+__float128 cosq(__float128) noexcept;
+__float128 sqrtq(__float128) noexcept;
 }
 
 namespace lobatto::bench {
