@@ -52,7 +52,7 @@ void draw_diagram(const std::string& folder, const Race& race) {
     if (curves.empty()) return;
     const std::string script = fmt::format(
         "{}set logscale xy\nset xrange [1e-1:1e-14]\nset format x \"10^{{%T}}\"\nset format y \"%g\"\n"
-        "set key outside right center vertical maxrows 20 Left reverse samplen 2\n"
+        "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
         "set title \"{} ({}){}\" noenhanced\nset xlabel \"error at the end, largest of q and p\"\n"
         "set ylabel \"milliseconds{}\"\n{}\n",
         data, race.problem->name, race.problem->title,

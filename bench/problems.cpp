@@ -15,7 +15,7 @@ const std::vector<Problem>& problems() {
             {"P2", "Henon-Heiles", "p2_henon_heiles.toml", 1000, {0.18, 0.18}, {0.18, 0.18}, 4, 2000},
             {"P3", "double pendulum", "p3_double_pendulum.toml", 100, {0.5, 0.3}, {0, 0}, 0.7, 2000},
             {"P4", "Kepler, e = 0.3", "p4_kepler.toml", 200 * pi, {0.7, 0}, {0, std::sqrt(13.0 / 7)}, 2, 4000},
-            {"P5", "FPUT chain, 32 masses", "p5_fput.toml", 1000, first_mode, std::vector<double>(32, 0), 4, 1000}};
+            {"P5", "FPUT chain, 32 masses", "p5_fput.toml", 1000, first_mode, std::vector<double>(32, 0), 8, 1000}};
     }();
     return all;
 }
