@@ -28,13 +28,9 @@ struct Stages {
                 for (int j = 0; j < s; ++j)
                     for (int i = 0; i < s; ++i) values[k * s + i] += matrix[j][i] * f.values[k * s + j];
         } else {
-            for (int i = 0; i < s; ++i) {
-                real sum[d];
-                for (int k = 0; k < d; ++k) sum[k] = values[i * d + k];
+            for (int i = 0; i < s; ++i)
                 for (int j = 0; j < s; ++j)
-                    for (int k = 0; k < d; ++k) sum[k] += matrix[j][i] * f.values[j * d + k];
-                for (int k = 0; k < d; ++k) values[i * d + k] = sum[k];
-            }
+                    for (int k = 0; k < d; ++k) values[i * d + k] += matrix[j][i] * f.values[j * d + k];
         }
     }
 
