@@ -115,7 +115,7 @@ inline void round_to_unit_determinant(real* E) {
                 for (const real d : candidates[3]) {
                     const real ad = a * d, bc = b * c;
                     // tr E + det E, the terms and their rounding, summed without loss (TwoSum).
-                    const real terms[6] = {a, d, ad, -bc, fused(a, d, -ad), -fused(b, c, -bc)};
+                    const real terms[6] = {a, d, ad, -bc, rounded_once(a, d, -ad), -rounded_once(b, c, -bc)};
                     real sum = real(0), lost = real(0);
                     for (const real term : terms) {
                         const real next = sum + term, back = next - sum;
