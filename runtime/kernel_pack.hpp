@@ -324,18 +324,6 @@ struct Pack {
         else
             return of([&](int i) { return registers::fused(a.part[i], b.part[i], c.part[i]); });
     }
-    LOBATTO_INLINE friend Pack sqrt(const Pack& a) {
-        if constexpr (lanes == 1)
-            return of([&](int i) { return lobatto::sqrt(a.part[i]); });
-        else
-            return of([&](int i) { return registers::square_root(a.part[i]); });
-    }
-    LOBATTO_INLINE friend Pack fabs(const Pack& a) {
-        if constexpr (lanes == 1)
-            return of([&](int i) { return lobatto::fabs(a.part[i]); });
-        else
-            return from_bits(bits(a) & ~bits(Pack(real(-0.0))));
-    }
     LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) { return select(a < b, a, b); }
     LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) { return select(a > b, a, b); }
 
@@ -523,6 +511,24 @@ private:
         return result;
     }
 };
+
+// Templates beside the class, so that lobatto::sqrt(x) finds them too.
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
+    return Pack<real, width>::of([&](int i) {
+        if constexpr (Pack<real, width>::lanes == 1)
+            return lobatto::sqrt(a.part[i]);
+        else
+            return registers::square_root(a.part[i]);
+    });
+}
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
+    if constexpr (Pack<real, width>::lanes == 1)
+        return Pack<real, width>::of([&](int i) { return lobatto::fabs(a.part[i]); });
+    else
+        return from_bits(bits(a) & ~bits(Pack<real, width>(real(-0.0))));
+}
 
 // How many lanes a type has, and of which number.
 template <class T>
