@@ -7,11 +7,13 @@
 #define LOBATTO_KERNEL_PACK_HPP
 
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 
 #include "kernel_numbers.hpp"
 
 #define LOBATTO_INLINE [[gnu::always_inline]] inline
+#define LOBATTO_EACH(i) [&](int i) __attribute__((always_inline))  // a function of the number of a register
 
 namespace lobatto {
 
@@ -39,24 +41,29 @@ struct Register {
     typedef real Values __attribute__((vector_size(lanes * sizeof(real))));
     using Truths = decltype(Values{} < Values{});
     using Integers = Truths;
+    using Natural = std::conditional_t<sizeof(real) == 8, std::uint64_t, std::uint32_t>;
+    typedef Natural Naturals __attribute__((vector_size(lanes * sizeof(real))));
 };
 template <class real>
 struct Register<real, 1> {
     using Values = real;
     using Truths = bool;
     using Integers = void;  // of numbers whose bits nobody asks for
+    using Naturals = void;
 };
 template <>
 struct Register<float, 1> {
     using Values = float;
     using Truths = bool;
     using Integers = std::int32_t;
+    using Naturals = std::uint32_t;
 };
 template <>
 struct Register<double, 1> {
     using Values = double;
     using Truths = bool;
     using Integers = std::int64_t;
+    using Naturals = std::uint64_t;
 };
 
 // a b + c, rounded once where the target has fused multiply-add (FMA) and twice elsewhere.
@@ -249,7 +256,7 @@ struct Pack {
     Part part[count];
 
     Pack() = default;
-    LOBATTO_INLINE Pack(real x) : Pack(of([&](int) { return x - Part{}; })) {}  // x - 0 keeps -0
+    LOBATTO_INLINE Pack(real x) : Pack(of(LOBATTO_EACH() { return x - Part{}; })) {}  // x - 0 keeps -0
 
     // The pack of the registers f(0), f(1), ...
     template <class F>
@@ -258,7 +265,7 @@ struct Pack {
     }
 
     LOBATTO_INLINE static Pack load(const real* from) {
-        return of([&](int i) {
+        return of(LOBATTO_EACH(i) {
             Part x;
             __builtin_memcpy(&x, from + i * lanes, sizeof x);
             return x;
@@ -280,7 +287,7 @@ struct Pack {
     }
 
     LOBATTO_INLINE Pack operator-() const {
-        return of([&](int i) { return -part[i]; });
+        return of(LOBATTO_EACH(i) { return -part[i]; });
     }
     LOBATTO_INLINE Pack& operator+=(const Pack& b) { return *this = *this + b; }
     LOBATTO_INLINE Pack& operator-=(const Pack& b) { return *this = *this - b; }
@@ -288,47 +295,47 @@ struct Pack {
     LOBATTO_INLINE Pack& operator/=(const Pack& b) { return *this = *this / b; }
 
     LOBATTO_INLINE friend Pack operator+(const Pack& a, const Pack& b) {
-        return of([&](int i) { return a.part[i] + b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] + b.part[i]; });
     }
     LOBATTO_INLINE friend Pack operator-(const Pack& a, const Pack& b) {
-        return of([&](int i) { return a.part[i] - b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] - b.part[i]; });
     }
     LOBATTO_INLINE friend Pack operator*(const Pack& a, const Pack& b) {
-        return of([&](int i) { return a.part[i] * b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] * b.part[i]; });
     }
     LOBATTO_INLINE friend Pack operator/(const Pack& a, const Pack& b) {
-        return of([&](int i) { return a.part[i] / b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] / b.part[i]; });
     }
     LOBATTO_INLINE friend Mask<real, width> operator<(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of([&](int i) { return a.part[i] < b.part[i]; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] < b.part[i]; });
     }
     LOBATTO_INLINE friend Mask<real, width> operator<=(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of([&](int i) { return a.part[i] <= b.part[i]; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] <= b.part[i]; });
     }
     LOBATTO_INLINE friend Mask<real, width> operator>(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of([&](int i) { return a.part[i] > b.part[i]; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] > b.part[i]; });
     }
     LOBATTO_INLINE friend Mask<real, width> operator>=(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of([&](int i) { return a.part[i] >= b.part[i]; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] >= b.part[i]; });
     }
     LOBATTO_INLINE friend Mask<real, width> operator==(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of([&](int i) { return a.part[i] == b.part[i]; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] == b.part[i]; });
     }
     LOBATTO_INLINE friend Mask<real, width> operator!=(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of([&](int i) { return a.part[i] != b.part[i]; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] != b.part[i]; });
     }
 
     LOBATTO_INLINE friend Pack fused(const Pack& a, const Pack& b, const Pack& c) {
         if constexpr (lanes == 1)
-            return of([&](int i) { return lobatto::fused(a.part[i], b.part[i], c.part[i]); });
+            return of(LOBATTO_EACH(i) { return lobatto::fused(a.part[i], b.part[i], c.part[i]); });
         else
-            return of([&](int i) { return registers::fused(a.part[i], b.part[i], c.part[i]); });
+            return of(LOBATTO_EACH(i) { return registers::fused(a.part[i], b.part[i], c.part[i]); });
     }
     LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) { return select(a < b, a, b); }
     LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) { return select(a > b, a, b); }
 
     LOBATTO_INLINE friend Bits<real, width> bits(const Pack& a) {
-        return Bits<real, width>::of([&](int i) {
+        return Bits<real, width>::of(LOBATTO_EACH(i) {
             typename Bits<real, width>::Part x;
             __builtin_memcpy(&x, &a.part[i], sizeof x);
             return x;
@@ -353,7 +360,7 @@ struct Pack {
     LOBATTO_INLINE Pack<real, (width > 1 ? width / 2 : 1)> half(int which) const {
         using Half = Pack<real, (width > 1 ? width / 2 : 1)>;
         if constexpr (count > 1) {
-            return Half::of([&](int i) { return part[which * Half::count + i]; });
+            return Half::of(LOBATTO_EACH(i) { return part[which * Half::count + i]; });
         } else {
             real all_lanes[width];
             store(all_lanes);
@@ -384,7 +391,7 @@ struct Mask {
 
     Mask() = default;
     LOBATTO_INLINE Mask(bool truth)
-        : Mask(of([&](int) {
+        : Mask(of(LOBATTO_EACH() {
               if constexpr (lanes == 1)
                   return truth;
               else
@@ -411,15 +418,15 @@ struct Mask {
 
     LOBATTO_INLINE Mask operator!() const {
         if constexpr (lanes == 1)
-            return of([&](int i) { return !part[i]; });
+            return of(LOBATTO_EACH(i) { return !part[i]; });
         else
-            return of([&](int i) { return ~part[i]; });
+            return of(LOBATTO_EACH(i) { return ~part[i]; });
     }
     LOBATTO_INLINE friend Mask operator&(const Mask& a, const Mask& b) {
-        return of([&](int i) { return Part(a.part[i] & b.part[i]); });
+        return of(LOBATTO_EACH(i) { return Part(a.part[i] & b.part[i]); });
     }
     LOBATTO_INLINE friend Mask operator|(const Mask& a, const Mask& b) {
-        return of([&](int i) { return Part(a.part[i] | b.part[i]); });
+        return of(LOBATTO_EACH(i) { return Part(a.part[i] | b.part[i]); });
     }
 
     LOBATTO_INLINE friend bool any(const Mask& a) {
@@ -434,7 +441,7 @@ struct Mask {
     // a where the mask holds, b elsewhere.
     LOBATTO_INLINE friend Pack<real, width> select(const Mask& mask, const Pack<real, width>& a,
                                                    const Pack<real, width>& b) {
-        return Pack<real, width>::of([&](int i) { return mask.part[i] ? a.part[i] : b.part[i]; });
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return mask.part[i] ? a.part[i] : b.part[i]; });
     }
 
 private:
@@ -455,12 +462,13 @@ struct Bits {
     static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
     using Each = typename Shape<real, width>::Each;
     using Part = typename Register<real, lanes>::Integers;
+    using Naturals = typename Register<real, lanes>::Naturals;
     using Integer = typename Register<real, 1>::Integers;
 
     Part part[count];
 
     Bits() = default;
-    LOBATTO_INLINE Bits(Integer x) : Bits(of([&](int) { return Part{} + x; })) {}
+    LOBATTO_INLINE Bits(Integer x) : Bits(of(LOBATTO_EACH() { return Part{} + x; })) {}
 
     template <class F>
     LOBATTO_INLINE static Bits of(F f) {
@@ -468,30 +476,34 @@ struct Bits {
     }
 
     LOBATTO_INLINE friend Bits operator+(const Bits& a, const Bits& b) {
-        return of([&](int i) { return a.part[i] + b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] + b.part[i]; });
     }
     LOBATTO_INLINE friend Bits operator-(const Bits& a, const Bits& b) {
-        return of([&](int i) { return a.part[i] - b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] - b.part[i]; });
     }
     LOBATTO_INLINE friend Bits operator&(const Bits& a, const Bits& b) {
-        return of([&](int i) { return a.part[i] & b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] & b.part[i]; });
     }
     LOBATTO_INLINE friend Bits operator|(const Bits& a, const Bits& b) {
-        return of([&](int i) { return a.part[i] | b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] | b.part[i]; });
     }
     LOBATTO_INLINE friend Bits operator^(const Bits& a, const Bits& b) {
-        return of([&](int i) { return a.part[i] ^ b.part[i]; });
+        return of(LOBATTO_EACH(i) { return a.part[i] ^ b.part[i]; });
     }
     LOBATTO_INLINE Bits operator~() const {
-        return of([&](int i) { return ~part[i]; });
+        return of(LOBATTO_EACH(i) { return ~part[i]; });
     }
     LOBATTO_INLINE friend Bits operator<<(const Bits& a, int places) {
-        return of([&](int i) { return a.part[i] << places; });
+        return of(LOBATTO_EACH(i) { return a.part[i] << places; });
+    }
+
+    LOBATTO_INLINE friend Bits operator>>(const Bits& a, int places) {  // zeros come in
+        return of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] >> places); });
     }
 
     // The numbers of these bits.
     LOBATTO_INLINE friend Pack<real, width> from_bits(const Bits& a) {
-        return Pack<real, width>::of([&](int i) {
+        return Pack<real, width>::of(LOBATTO_EACH(i) {
             typename Pack<real, width>::Part x;
             __builtin_memcpy(&x, &a.part[i], sizeof x);
             return x;
@@ -500,7 +512,7 @@ struct Bits {
     // Where the last bit is set.
     LOBATTO_INLINE friend Mask<real, width> is_odd(const Bits& a) {
         constexpr int top = 8 * sizeof(Integer) - 1;
-        return Mask<real, width>::of([&](int i) { return (a.part[i] << top) < 0; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return (a.part[i] << top) < 0; });
     }
 
 private:
@@ -512,20 +524,19 @@ private:
     }
 };
 
-// Templates beside the class, so that lobatto::sqrt(x) finds them too.
+// These two, like the functions of kernel_functions.hpp, are also found by their full names lobatto::sqrt,
+// lobatto::fabs.
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
-    return Pack<real, width>::of([&](int i) {
-        if constexpr (Pack<real, width>::lanes == 1)
-            return lobatto::sqrt(a.part[i]);
-        else
-            return registers::square_root(a.part[i]);
-    });
+    if constexpr (Pack<real, width>::lanes == 1)
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::sqrt(a.part[i]); });
+    else
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return registers::square_root(a.part[i]); });
 }
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
     if constexpr (Pack<real, width>::lanes == 1)
-        return Pack<real, width>::of([&](int i) { return lobatto::fabs(a.part[i]); });
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::fabs(a.part[i]); });
     else
         return from_bits(bits(a) & ~bits(Pack<real, width>(real(-0.0))));
 }
