@@ -174,7 +174,15 @@ struct Export {
                                              slopes,
                                              residual,
                                              jacobian,
-                                             tangent};
+                                             tangent,
+                                             0,  // lanes: none
+                                             0,
+                                             0,
+                                             nullptr,
+                                             nullptr,
+                                             nullptr,
+                                             nullptr,
+                                             nullptr};
 };
 
 }  // namespace lobatto
