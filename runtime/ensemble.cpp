@@ -140,6 +140,23 @@ struct Ended {
     double energy_start = 0, energy_error_largest = 0;
 };
 
+// Who works on what. Trajectories are handed over in groups: whole lanes, so that the number of threads does not decide
+// who stands beside whom; several groups for every thread.
+struct Plan {
+    std::int64_t threads, group_size, groups, window;  // window: groups in memory
+    Plan(const Kernel& kernel, const EnsembleRequest& request) {
+        threads =
+            request.threads > 0 ? request.threads : std::max<std::int64_t>(1, std::thread::hardware_concurrency());
+        const std::int64_t lanes = std::max(kernel->lanes, 1);
+        const std::int64_t wanted =
+            std::min({largest_group, rows_of_group / rows_kept(request), request.count / (8 * threads)});
+        group_size = std::max<std::int64_t>(wanted / lanes, 1) * lanes;
+        groups = (request.count + group_size - 1) / group_size;
+        threads = std::clamp<std::int64_t>(groups, 1, threads);
+        window = 2 * threads + 2;
+    }
+};
+
 struct Group {
     std::vector<Ended> trajectories;  // fewer than there should be when interrupted
     double processor_seconds = 0;
@@ -310,7 +327,7 @@ private:
 // Groups that are done, on their way to the caller. A group far ahead of the next one to be handed over has to wait.
 class Window {
 public:
-    Window(std::int64_t groups, int threads) : groups_(groups), slots_(static_cast<std::size_t>(2 * threads + 2)) {}
+    explicit Window(const Plan& plan) : groups_(plan.groups), slots_(static_cast<std::size_t>(plan.window)) {}
 
     // A worker's: the number of a group, once there is room for it; nothing when there is no more to do.
     std::optional<std::int64_t> take() {
@@ -404,12 +421,12 @@ public:
         ++result.count_of[static_cast<std::size_t>(trajectory.status)];
         result.steps_done += trajectory.steps_done;
         result.iterations += trajectory.iterations;
+        if (trajectory.status != LOBATTO_OK) return;
         const double error = trajectory.energy_error_largest;
         if (!std::isnan(error) && (result.energy_error_index < 0 || error > result.energy_error_largest)) {
             result.energy_error_largest = error;
             result.energy_error_index = trajectory.index;
         }
-        if (trajectory.status != LOBATTO_OK) return;
         const double* const state = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns + 1;
         for (std::size_t k = 0; k < n_; ++k) {
             q_[k].add(state[k]);
@@ -448,27 +465,28 @@ EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
 
 }  // namespace
 
+double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
+    const Plan plan(kernel, request);
+    const double rows = static_cast<double>(rows_kept(request)) * static_cast<double>(plan.group_size);
+    return sizeof(double) * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 1);
+}
+
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
     const auto start = std::chrono::steady_clock::now();
     EnsembleResult result;
     result.lanes = std::max(kernel->lanes, 1);
-    const std::int64_t threads =
-        request.threads > 0 ? request.threads : std::max<std::int64_t>(1, std::thread::hardware_concurrency());
-    // Some groups for every thread; whole lanes, so that the number of threads does not decide who stands beside whom.
-    const std::int64_t wanted =
-        std::min({largest_group, rows_of_group / rows_kept(request), request.count / (8 * threads)});
-    const std::int64_t size = std::max<std::int64_t>(wanted / result.lanes, 1) * result.lanes;
-    const std::int64_t groups = (request.count + size - 1) / size;
-    result.threads = static_cast<int>(std::min(threads, std::max<std::int64_t>(groups, 1)));
+    const Plan plan(kernel, request);
+    result.threads = static_cast<int>(plan.threads);
 
     Shared shared;
-    Window window(groups, result.threads);
+    Window window(plan);
     Reduction reduction(static_cast<std::size_t>(kernel->coordinates));
     const auto work = [&] {
         try {
             Worker worker(kernel, request, shared);
             while (const auto group = window.take())
-                window.put(*group, worker.run(*group * size, std::min((*group + 1) * size, request.count)));
+                window.put(*group, worker.run(*group * plan.group_size,
+                                              std::min((*group + 1) * plan.group_size, request.count)));
         } catch (...) {
             window.fail(std::current_exception());
         }
@@ -496,7 +514,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
         last_progress = now;
         request.progress(shared.steps_gone);
     };
-    for (std::int64_t number = 0; number < groups && !result.interrupted; ++number) {
+    for (std::int64_t number = 0; number < plan.groups && !result.interrupted; ++number) {
         const Group group = window.next(tell);
         result.processor_seconds += group.processor_seconds;
         for (const Ended& ended : group.trajectories) {
@@ -504,7 +522,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
             reduction.add(trajectory, result);
             if (request.sink) request.sink(trajectory);
         }
-        result.interrupted = result.trajectories < std::min((number + 1) * size, request.count);
+        result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);
         tell();
     }
     reduction.finish(result);

@@ -67,7 +67,7 @@ struct EnsembleResult {
     std::int64_t iterations = 0;
     std::vector<Spread> q, p;  // at the end, n each
     Spread energy_error{};     // H - H(0) at the end
-    // The largest of all |H - H(0)| of kept states, and whose it is; -1: no trajectory has an energy.
+    // Of those that reached the end, the largest |H - H(0)| of kept states and whose it is; -1: none has an energy.
     double energy_error_largest = 0;
     std::int64_t energy_error_index = -1;
     int threads = 0, lanes = 0;    // that computed; lanes 1: one trajectory at a time
@@ -75,8 +75,10 @@ struct EnsembleResult {
     double seconds = 0;            // that passed meanwhile
 };
 
-// In memory at any time: the kept states of at most 2 threads + 2 groups of trajectories, each as many as there are
-// lanes, or up to 64 when they keep few. Rethrows what `start` and `sink` throw.
+// The most bytes of kept states in memory at any time.
+double memory_of(const Kernel& kernel, const EnsembleRequest& request);
+
+// Rethrows what `start` and `sink` throw; MachineError when no threads can be had.
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request);
 
 }  // namespace lobatto
