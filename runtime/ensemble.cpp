@@ -193,7 +193,7 @@ public:
     // Trajectories first, first + 1, ..., last - 1; without those that an interruption cut short.
     Group run(std::int64_t first, std::int64_t last) {
         Group group;
-        for (; first < last; first += lanes_->width()) {
+        for (; first < last && !shared_.halted; first += lanes_->width()) {
             std::vector<Ended> side_by_side(
                 static_cast<std::size_t>(std::min<std::int64_t>(lanes_->width(), last - first)));
             if (!run_together(first, side_by_side, group.processor_seconds)) break;
@@ -203,11 +203,6 @@ public:
     }
 
 private:
-    bool halted() const {
-        return shared_.halted.load(std::memory_order_relaxed) ||
-               (request_.interrupted != nullptr && *request_.interrupted != 0);
-    }
-
     void place(std::size_t lane) {
         const auto put = [&](const std::vector<double>& from, std::vector<double>& to) {
             std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(lane * from.size()));
@@ -271,7 +266,7 @@ private:
         const auto side_by_side = static_cast<std::int64_t>(ended.size());
         std::int64_t done = 0;
         while (done < request_.steps && going()) {
-            if (halted()) return false;
+            if (shared_.halted.load(std::memory_order_relaxed)) return false;
             const double start = processor_seconds();
             const std::int64_t from = done, target = done + std::min(chunk_, request_.steps - done);
             while (done < target && going()) {
@@ -508,14 +503,15 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
     }
 
     auto last_progress = std::chrono::steady_clock::now();
-    const auto tell = [&] {
+    const auto meanwhile = [&] {
+        if (request.interrupted != nullptr && *request.interrupted != 0) shared.halted = true;
         const auto now = std::chrono::steady_clock::now();
         if (!request.progress || now - last_progress < std::chrono::duration<double>(progress_seconds)) return;
         last_progress = now;
         request.progress(shared.steps_gone);
     };
     for (std::int64_t number = 0; number < plan.groups && !result.interrupted; ++number) {
-        const Group group = window.next(tell);
+        const Group group = window.next(meanwhile);
         result.processor_seconds += group.processor_seconds;
         for (const Ended& ended : group.trajectories) {
             const EnsembleTrajectory trajectory = view(result.trajectories, ended);
@@ -523,7 +519,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
             if (request.sink) request.sink(trajectory);
         }
         result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);
-        tell();
+        meanwhile();
     }
     reduction.finish(result);
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
