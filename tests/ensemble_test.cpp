@@ -43,6 +43,7 @@ void advance(void* ensemble, int64_t steps, int32_t* status, int64_t* steps_done
     for (int l = 0; l < 4; ++l) {
         lobatto_advance call{};
         call.steps = steps;
+        call.steps_done = call.iterations = 12345;  // nothing, for a lane that is left alone
         if (status[l] == LOBATTO_OK) status[l] = E::advance(lane(ensemble, l), &call);
         steps_done[l] = call.steps_done;
         iterations[l] = call.iterations;
@@ -102,10 +103,11 @@ const Kernel& pendulum_in_four_lanes() {
     return kernel;
 }
 
-// How far a trajectory of the generator's kernel may be from the one that runs alone, relative to its size. Lanes round
-// in another order; the error of a step is about 1e-16 and grows with time.
+// How far a trajectory of the kernel may be from the one that runs alone, relative to its size. Lanes may round in
+// another order; in the 1000 steps of `some` an error of the start grows up to 200 times (measured), so that 1000
+// roundings of 1e-16 make some 6e-13.
 double tolerance(const Kernel& kernel) {
-    return kernel->lanes == 0 ? 0 : 1e-12;
+    return kernel->lanes == 0 ? 0 : 1e-11;
 }
 
 struct Kept {
