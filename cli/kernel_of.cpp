@@ -18,14 +18,20 @@ void append_part(std::string& whole, const std::string& text) {
     }
 }
 
+Kernel built(const KernelSource& source, const Translation& translation, Compiled* compiled) {
+    const Compiled object = compile(translation);
+    if (compiled != nullptr) *compiled = object;
+    return Kernel::load(object.object, source.digest);
+}
+
 }  // namespace
 
-Translation translation_of(const KernelSource& source, Precision precision) {
+Translation translation_of(const KernelSource& source, Precision precision, bool side_by_side) {
     Translation translation;
     translation.name = source.name;
-    translation.optimisation = source.unrolled ? 3 : 2;
     translation.quadruple = precision == Precision::quadruple;
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
+    if (side_by_side) translation.text += "#define LOBATTO_ENSEMBLES\n";
     for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text})
         append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
@@ -33,9 +39,11 @@ Translation translation_of(const KernelSource& source, Precision precision) {
 }
 
 Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled) {
-    const Compiled built = compile(translation_of(source, precision));
-    if (compiled != nullptr) *compiled = built;
-    return Kernel::load(built.object, source.digest);
+    return built(source, translation_of(source, precision), compiled);
+}
+
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, Compiled* compiled) {
+    return built(source, translation_of(source, precision, true), compiled);
 }
 
 }  // namespace lobatto

@@ -8,11 +8,14 @@ void MethodOption::add_to(CLI::App& command) {
     CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
     lobatto->check(CLI::Range(2, 12));
     gauss->check(CLI::Range(1, 10))->excludes(lobatto);
+    command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
+        ->check(CLI::Range(1e-300, 1e-3));
 }
 
 void MethodOption::apply(Scene& scene) const {
-    if (points) scene.method = {Family::lobatto, *points};
-    if (stages) scene.method = {Family::gauss, *stages};
+    if (points) scene.method = {Family::lobatto, *points, scene.method.tolerance};
+    if (stages) scene.method = {Family::gauss, *stages, scene.method.tolerance};
+    if (tolerance) scene.method.tolerance = *tolerance;
 }
 
 }  // namespace lobatto

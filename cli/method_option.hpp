@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The method on the command line, instead of the scene's: --points or --stages.
+// The method on the command line, instead of the scene's: --points or --stages, --tolerance.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,6 +11,7 @@ namespace lobatto {
 
 struct MethodOption {
     std::optional<int> points, stages;
+    std::optional<double> tolerance;
 
     void add_to(CLI::App& command);
     void apply(Scene& scene) const;

@@ -12,18 +12,6 @@ namespace lobatto {
 
 namespace {
 
-// The part of an argument from byte `begin` on, each byte with its column.
-Text text_from(const std::string& argument, std::size_t begin) {
-    Text text{argument.substr(begin), {}};
-    int column = 0;
-    for (std::size_t i = 0; i <= argument.size(); ++i) {
-        const bool starts_character = i == argument.size() || (static_cast<unsigned char>(argument[i]) & 0xC0) != 0x80;
-        if (starts_character) ++column;
-        if (i >= begin) text.at.push_back({1, column});
-    }
-    return text;
-}
-
 [[noreturn]] void fail_unknown(const Source& source, const Scene& scene, const std::string& name) {
     for (const Parameter& constant : scene.constants) {
         if (constant.written == name)
@@ -50,7 +38,7 @@ void set_parameter(const std::string& argument, Scene& scene) {
                                         [&](const Parameter& p) { return p.written == name; });
     if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
     const Scope scope{nullptr, fmt::format("the value of {}", name), false, {}};
-    const Text text = text_from(argument, equals + 1);
+    const Text text = text_of(argument, equals + 1);
     parameter->value = parse_expression(source, text, scope);
     value_in_range(source, text.at.front(), parameter->value, scope.formula);
 }
@@ -62,12 +50,24 @@ GiNaC::ex in_parameters(const std::string& option, const std::string& argument, 
     GiNaC::exmap values;
     for (const Parameter& parameter : scene.parameters) values[parameter.symbol] = parameter.value;
     const Source source(option, argument);
-    const GiNaC::ex expression = parse_expression(source, text_from(argument, 0), scope);
+    const GiNaC::ex expression = parse_expression(source, text_of(argument, 0), scope);
     value_in_range(source, {1, 1}, expression, what, values);
     return expression;
 }
 
 }  // namespace
+
+Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
+    end = std::min(end, argument.size());
+    Text text{argument.substr(begin, end - begin), {}};
+    int column = 0;
+    for (std::size_t i = 0; i <= end; ++i) {
+        const bool starts_character = i == argument.size() || (static_cast<unsigned char>(argument[i]) & 0xC0) != 0x80;
+        if (starts_character) ++column;
+        if (i >= begin) text.at.push_back({1, column});
+    }
+    return text;
+}
 
 void apply(const Overrides& overrides, Scene& scene) {
     for (const std::string& argument : overrides.set) set_parameter(argument, scene);

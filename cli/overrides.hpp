@@ -2,6 +2,7 @@
 // Values of a scene that the command line replaces.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@ struct Overrides {
     std::string step, until;       // expressions in the parameters; empty: as in the scene
     std::optional<long> every;
 };
+
+// The bytes of an argument from `begin` on, to before `end`, each with its column.
+Text text_of(const std::string& argument, std::size_t begin, std::size_t end = std::string::npos);
 
 // Throws InputError with the place in the argument.
 void apply(const Overrides& overrides, Scene& scene);

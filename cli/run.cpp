@@ -5,15 +5,17 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 
 #include "cli/commands.hpp"
+#include "cli/interruption.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/method_option.hpp"
 #include "cli/motion.hpp"
+#include "cli/output_path.hpp"
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
+#include "cli/summary.hpp"
 #include "cli/watch.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/diagnostics.hpp"
@@ -24,8 +26,6 @@ namespace lobatto {
 
 namespace {
 
-constexpr int interrupted_exit = 130;  // as shells count an interruption
-
 struct RunOptions {
     std::string scene;
     std::string output;  // empty: out/NAME.csv
@@ -33,32 +33,6 @@ struct RunOptions {
     bool general = false;
     Overrides overrides;
     bool quiet = false;
-};
-
-// While it lives, the first SIGINT or SIGTERM only raises a flag; a second one ends the process.
-class Interruption {
-public:
-    Interruption() {
-        raised_ = 0;
-        struct sigaction action {};
-        action.sa_handler = [](int) { raised_ = 1; };
-        action.sa_flags = SA_RESETHAND;
-        for (std::size_t i = 0; i < 2; ++i) {
-            sigaction(signals[i], nullptr, &before_[i]);
-            if (before_[i].sa_handler != SIG_IGN) sigaction(signals[i], &action, nullptr);
-        }
-    }
-    ~Interruption() {
-        for (std::size_t i = 0; i < 2; ++i) sigaction(signals[i], &before_[i], nullptr);
-    }
-    Interruption(const Interruption&) = delete;
-    Interruption& operator=(const Interruption&) = delete;
-    static const volatile int* flag() { return &raised_; }
-
-private:
-    static constexpr int signals[2] = {SIGINT, SIGTERM};
-    static inline volatile std::sig_atomic_t raised_ = 0;
-    struct sigaction before_[2]{};
 };
 
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
@@ -87,24 +61,8 @@ TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
     return header;
 }
 
-// Three digits and a unit.
-std::string duration(double seconds) {
-    if (seconds < 1e-6) return fmt::format("{:.3g} ns", seconds * 1e9);
-    if (seconds < 1e-3) return fmt::format("{:.3g} us", seconds * 1e6);
-    return seconds < 1 ? fmt::format("{:.3g} ms", seconds * 1e3) : fmt::format("{:.3g} s", seconds);
-}
-
-void print_row(const std::string& label, const std::string& value) {
-    fmt::print("  {:<24}{}\n", label, value);
-}
-
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-bool has_forces(const Derivation& derivation) {
-    const auto& forces = derivation.system.outer_force;
-    return std::any_of(forces.begin(), forces.end(), [](const GiNaC::ex& force) { return !force.is_zero(); });
 }
 
 std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult& result) {
@@ -155,24 +113,12 @@ void print_events(const std::vector<Event>& events, const std::vector<std::int64
                   fmt::format("{} of '{}'{}", counts[i], events[i].text, i + 1 < events.size() ? "" : ", in " + path));
 }
 
-std::string output_path(const RunOptions& options, const Scene& scene) {
-    if (!options.output.empty()) return options.output;
-    std::error_code error;
-    std::filesystem::create_directory("out", error);
-    if (error)
-        throw MachineError(
-            fmt::format("cannot create the folder out here: {}. Choose another place with -o", error.message()));
-    return "out/" + scene.name + ".csv";
-}
-
 // Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
 std::string event_path(const RunOptions& options, const Scene& scene) {
     std::error_code ignored;
     const bool beside = options.output.empty() || !std::filesystem::exists(options.output, ignored) ||
                         std::filesystem::is_regular_file(options.output, ignored);
-    RunOptions without = options;
-    if (!beside) without.output.clear();
-    std::string path = output_path(without, scene);
+    std::string path = output_path(beside ? options.output : "", scene.name + ".csv");
     if (path.ends_with(".csv")) path.resize(path.size() - 4);
     return path + ".events.csv";
 }
@@ -190,7 +136,7 @@ void run(const RunOptions& options) {
     const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
     LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(scene, steps.count, stepper);
-    const std::string path = output_path(options, scene);
+    const std::string path = output_path(options.output, scene.name + ".csv");
     if (!options.quiet) {
         fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, source.digest, derivation_seconds,
                    compiled.from_cache ? "found compiled in the cache"

@@ -21,12 +21,14 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "475265599860c790";
+    static constexpr const char* digest = "1de808deeaa4cdcc";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 0;          // of the equations of a step; 0: none to solve
+    static constexpr real tolerance = 0;        // of the last increment of a step; 0: rounding
+    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers
     static constexpr bool linear = true;        // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene
@@ -60,14 +62,16 @@ struct harmonic_oscillator {
     }
 
     // What depends on parameters and step size only, computed once by prepare().
-    struct Coefficients {
-        real m;
-        real omega_squared;  // omega*omega
-        real k1;             // m*omega_squared/2
-        real inverse_m;      // 1/m
-        real k2;             // inverse_m/2
-        real Phi_minus_I[6];  // what a step adds: rows q1, p1; columns q, p, shift
+    template <class number>
+    struct CoefficientsOf {
+        number m;
+        number omega_squared;  // omega*omega
+        number k1;             // m*omega_squared/2
+        number inverse_m;      // 1/m
+        number k2;             // inverse_m/2
+        number Phi_minus_I[6];  // what a step adds: rows q1, p1; columns q, p, shift
     };
+    using Coefficients = CoefficientsOf<real>;
 
     // Values of stage parameter and step size.
     static Status prepare(const Parameters& p, real h, Coefficients& k) {
@@ -98,33 +102,39 @@ struct harmonic_oscillator {
     }
 
     // (D3) Hamiltonian H(q, p) = p^T M^-1 p / 2 + V(q); q, p: n.
-    static real energy(const Coefficients& k, const real* q, const real* p) {
+    template <class given, class number>
+    static number energy(const CoefficientsOf<given>& k, const number* q, const number* p) {
         return k.k1 * (q[0] * q[0]) + p[0] * (k.k2 * p[0]);
     }
 
     // (D2) p = dL/dq' = M q'; n each.
-    static void momentum(const Coefficients& k, const real* velocity, real* p) {
+    template <class given, class number>
+    static void momentum(const CoefficientsOf<given>& k, const number* velocity, number* p) {
         p[0] = k.m * velocity[0];
     }
 
     // (D2) q' = M^-1 p; n each.
-    static void velocity(const Coefficients& k, const real* p, real* velocity) {
+    template <class given, class number>
+    static void velocity(const CoefficientsOf<given>& k, const number* p, number* velocity) {
         velocity[0] = k.inverse_m * p[0];
     }
 
     // (D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, entry_column.
-    static void node(const Coefficients& k, const real* q, real* W, real* S) {
+    template <class given, class number>
+    static void node(const CoefficientsOf<given>& k, const number* q, number* W, number* S) {
         W[0] = k.omega_squared * q[0];
         S[0] = k.omega_squared;
     }
 
     // (D1) W = M^-1 grad V(q) alone; n.
-    static void acceleration(const Coefficients& k, const real* q, real* W) {
+    template <class given, class number>
+    static void acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
         W[0] = k.omega_squared * q[0];
     }
 
     // (D20) The whole step: (q1, p1) = Phi (q, p) + shift, as (q, p) + (Phi - I) (q, p) + shift.
-    static void propagate(const Coefficients& k, const real* q, const real* p, real* q1, real* p1) {
+    template <class given, class number>
+    static void propagate(const CoefficientsOf<given>& k, const number* q, const number* p, number* q1, number* p1) {
         q1[0] = q[0] + (q[0] * k.Phi_minus_I[0] + p[0] * k.Phi_minus_I[1]);
         p1[0] = p[0] + (q[0] * k.Phi_minus_I[3] + p[0] * k.Phi_minus_I[4]);
     }

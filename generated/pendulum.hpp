@@ -6,7 +6,7 @@
 // Method       Lobatto, 4 points: order 6, symplectic, symmetric
 // Coordinates  q[0] = q [rad]
 // Structure    constant mass matrix: the masses are the same everywhere, so the end of a step needs no equations
-// Structure    small enough to write out: 2 unknowns a step, at most 24: every formula is written out, no loops
+// Structure    small enough to write out: 2 unknowns a step, at most 4: every formula is written out, no loops
 // Structure    no explicit time: nothing depends on the time itself: no formula takes it
 // Structure    no forces: all forces come from L, so every step is symplectic
 // Structure    solution in closed form: q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2
@@ -21,12 +21,14 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "fa0539b19e7078a5";
+    static constexpr const char* digest = "896f538c7cace065";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 2;          // of the equations of a step; 0: none to solve
+    static constexpr real tolerance = 0;        // of the last increment of a step; 0: rounding
+    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers
     static constexpr bool linear = false;       // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene
@@ -36,7 +38,8 @@ struct pendulum {
     static constexpr int event_direction[1] = {};
     static constexpr int points = 4;            // nodes of a step, both ends included
     static constexpr bool unrolled = true;      // every node and coordinate is written out
-    static constexpr bool absorbed = false;     // Newton's iteration
+    static constexpr bool diagonal_part = false;  // nothing is taken into the stage map
+    static constexpr bool absorbed = false;     // Newton's iteration has its own Jacobians
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};
@@ -48,6 +51,10 @@ struct pendulum {
     // stage map A_ij over the interior nodes, row-major: 1/60; 11/120 - sqrt(5)/24; sqrt(5)/24 + 11/120; 1/60
     static constexpr real A[4] = {0.016666666666666666, -0.0015028323958245708, 0.1848361657291579,
         0.016666666666666666};
+    // extrapolation from the nodes of one step to the interior nodes of the next, row-major: sqrt(5) - 3; 5*sqrt(5) -
+    //     9; 5 - 4*sqrt(5); 8 - 2*sqrt(5); -sqrt(5) - 3; 4*sqrt(5) + 5; -5*sqrt(5) - 9; 2*sqrt(5) + 8
+    static constexpr real E[8] = {-0.7639320225002103, 2.1803398874989486, -3.9442719099991588, 3.5278640450004204,
+        -5.23606797749979, 13.94427190999916, -20.18033988749895, 12.47213595499958};
 
     // Values of the scene; change them before prepare().
     struct Parameters {
@@ -62,34 +69,36 @@ struct pendulum {
     }
 
     // What depends on parameters and step size only, computed once by prepare().
-    struct Coefficients {
-        real m;
-        real h;
-        real omega_squared;  // omega*omega
-        real k1;             // m*omega_squared
-        real inverse_m;      // 1/m
-        real k2;             // inverse_m/2
-        real h_b1;           // h/12
-        real h_c2;           // (1/2 - sqrt(5)/10)*h
-        real h_c3;           // (sqrt(5)/10 + 1/2)*h
-        real h2_A2;          // (13/120 - sqrt(5)/24)*(h*h)
-        real h2_A3;          // (sqrt(5)/24 + 13/120)*(h*h)
-        real k3;             // (-(sqrt(5)/20 - 7/60))*(h*h)
-        real h2_AE22;        // (29*sqrt(5)/120 - 21/40)*(h*h)
-        real k4;             // (-(3/10 - 3*sqrt(5)/20))*(h*h)
-        real h2_AE24;        // (9/20 - 11*sqrt(5)/60)*(h*h)
-        real k5;             // (-(-sqrt(5)/20 - 7/60))*(h*h)
-        real h2_AE32;        // (3*sqrt(5)/20 + 3/10)*(h*h)
-        real k6;             // (-(-29*sqrt(5)/120 - 21/40))*(h*h)
-        real h2_AE34;        // (11*sqrt(5)/60 + 9/20)*(h*h)
-        real h2_A22;         // (h*h)/60
-        real h2_A23;         // (11/120 - sqrt(5)/24)*(h*h)
-        real h2_A32;         // (sqrt(5)/24 + 11/120)*(h*h)
-        real k7;             // (-(11/120 - sqrt(5)/24)*(sqrt(5)/24 + 11/120))*((h*h)*(h*h))
-        real h2_d2;          // (sqrt(5)/24 + 5/24)*(h*h)
-        real h2_d3;          // (5/24 - sqrt(5)/24)*(h*h)
-        real h_b2;           // 5*h/12
+    template <class number>
+    struct CoefficientsOf {
+        number m;
+        number h;
+        number omega_squared;  // omega*omega
+        number k1;             // m*omega_squared
+        number inverse_m;      // 1/m
+        number k2;             // inverse_m/2
+        number h_b1;           // h/12
+        number h_c2;           // (1/2 - sqrt(5)/10)*h
+        number h_c3;           // (sqrt(5)/10 + 1/2)*h
+        number h2_A2;          // (13/120 - sqrt(5)/24)*(h*h)
+        number h2_A3;          // (sqrt(5)/24 + 13/120)*(h*h)
+        number k3;             // (-(sqrt(5)/20 - 7/60))*(h*h)
+        number h2_AE22;        // (29*sqrt(5)/120 - 21/40)*(h*h)
+        number k4;             // (-(3/10 - 3*sqrt(5)/20))*(h*h)
+        number h2_AE24;        // (9/20 - 11*sqrt(5)/60)*(h*h)
+        number k5;             // (-(-sqrt(5)/20 - 7/60))*(h*h)
+        number h2_AE32;        // (3*sqrt(5)/20 + 3/10)*(h*h)
+        number k6;             // (-(-29*sqrt(5)/120 - 21/40))*(h*h)
+        number h2_AE34;        // (11*sqrt(5)/60 + 9/20)*(h*h)
+        number h2_A22;         // (h*h)/60
+        number h2_A23;         // (11/120 - sqrt(5)/24)*(h*h)
+        number h2_A32;         // (sqrt(5)/24 + 11/120)*(h*h)
+        number k7;             // (-(11/120 - sqrt(5)/24)*(sqrt(5)/24 + 11/120))*((h*h)*(h*h))
+        number h2_d2;          // (sqrt(5)/24 + 5/24)*(h*h)
+        number h2_d3;          // (5/24 - sqrt(5)/24)*(h*h)
+        number h_b2;           // 5*h/12
     };
+    using Coefficients = CoefficientsOf<real>;
 
     // Values of stage parameter and step size.
     static Status prepare(const Parameters& p, real h, Coefficients& k) {
@@ -129,30 +138,35 @@ struct pendulum {
     }
 
     // (D3) Hamiltonian H(q, p) = p^T M^-1 p / 2 + V(q); q, p: n.
-    static real energy(const Coefficients& k, const real* q, const real* p) {
+    template <class given, class number>
+    static number energy(const CoefficientsOf<given>& k, const number* q, const number* p) {
         return k.k1 * (1.0 - lobatto::cos(q[0])) + p[0] * (k.k2 * p[0]);
     }
 
     // (D2) p = dL/dq' = M q'; n each.
-    static void momentum(const Coefficients& k, const real* velocity, real* p) {
+    template <class given, class number>
+    static void momentum(const CoefficientsOf<given>& k, const number* velocity, number* p) {
         p[0] = k.m * velocity[0];
     }
 
     // (D2) q' = M^-1 p; n each.
-    static void velocity(const Coefficients& k, const real* p, real* velocity) {
+    template <class given, class number>
+    static void velocity(const CoefficientsOf<given>& k, const number* p, number* velocity) {
         velocity[0] = k.inverse_m * p[0];
     }
 
     // (D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, entry_column.
-    static void node(const Coefficients& k, const real* q, real* W, real* S) {
-        real sin_q, cos_q;
+    template <class given, class number>
+    static void node(const CoefficientsOf<given>& k, const number* q, number* W, number* S) {
+        number sin_q, cos_q;
         lobatto::sincos(q[0], sin_q, cos_q);
         W[0] = k.omega_squared * sin_q;
         S[0] = k.omega_squared * cos_q;
     }
 
     // (D1) W = M^-1 grad V(q) alone; n.
-    static void acceleration(const Coefficients& k, const real* q, real* W) {
+    template <class given, class number>
+    static void acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
         W[0] = k.omega_squared * lobatto::sin(q[0]);
     }
 

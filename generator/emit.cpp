@@ -58,7 +58,10 @@ public:
         if (is_map() && n_ > 1)
             text +=
                 "\n    // (D20) The whole step: (q1, p1) = Phi (q, p) + shift.\n"
-                "    static void propagate(const Coefficients& k, const real* q, const real* p, real* q1, real* p1) {\n"
+                "    template <class given, class number>\n"
+                "    static void propagate(const CoefficientsOf<given>& k, const number* q, const number* p, number* "
+                "q1, "
+                "number* p1) {\n"
                 "        lobatto::apply_map<coordinates>(k.Phi_minus_I, q, p, q1, p1);\n    }\n";
         text += "};\n\n}  // namespace lobatto::kernels\n";
         return text;
@@ -129,13 +132,13 @@ private:
 
     std::string coefficients() const {
         std::string text =
-            "\n    // What depends on parameters and step size only, computed once by prepare().\n    struct "
-            "Coefficients {\n";
+            "\n    // What depends on parameters and step size only, computed once by prepare().\n    template <class "
+            "number>\n    struct CoefficientsOf {\n";
         std::size_t widest = 0;
         for (const Id id : hoisted_.order) widest = std::max(widest, hoisted_.names.at(id).size());
         widest = std::min<std::size_t>(widest, 20);
         for (const Id id : hoisted_.order) {
-            const std::string line = fmt::format("        {:<{}}", "real " + hoisted_.names.at(id) + ";", widest + 6);
+            const std::string line = fmt::format("        {:<{}}", "number " + hoisted_.names.at(id) + ";", widest + 8);
             const Op op = p_.graph[id].op;
             text +=
                 op == Op::input
@@ -147,9 +150,9 @@ private:
         if (d_.structure.looped) text += looped_.fields();
         if (is_map())
             text +=
-                fmt::format("        real Phi_minus_I[{}];  // what a step adds: rows q1, p1; columns q, p, shift\n",
+                fmt::format("        number Phi_minus_I[{}];  // what a step adds: rows q1, p1; columns q, p, shift\n",
                             2 * n_ * (2 * n_ + 1));
-        return text + "    };\n";
+        return text + "    };\n    using Coefficients = CoefficientsOf<real>;\n";
     }
 
     std::string field_name(Id id) const {
@@ -207,11 +210,11 @@ private:
 
     // A parameter that the body does not use is left without a name.
     static std::string signature(const std::string& result, const std::string& name,
-                                 const std::vector<std::pair<const char*, const char*>>& parameters,
+                                 const std::vector<std::pair<std::string, const char*>>& parameters,
                                  const std::string& body) {
         std::string text;
         for (const auto& [type, parameter] : parameters) {
-            text += (text.empty() ? "" : ", ") + std::string(type);
+            text += (text.empty() ? "" : ", ") + type;
             if (mentions(body, parameter)) text += std::string(" ") + parameter;
         }
         return wrapped(fmt::format("    static {} {}({}) {{", result, name, text),
@@ -234,18 +237,27 @@ private:
         std::vector<Statement> statements;
         for (const Output& output : program->outputs) statements.push_back({output.target, output.value});
         const auto names = [this](Id id) { return name_of(id); };
-        const std::string text = FunctionText(p_, statements, names, options_.precision, Stage::step_size).lines();
+        const std::string text =
+            FunctionText(p_, statements, names, options_.precision, Stage::step_size, declaration.any_number).lines();
         return name == "correction" ? with_solves(text) : text;
     }
 
     std::string function(const Declaration& declaration) const {
         const std::string text = body(declaration);
         if (text.empty()) return "";
-        std::vector<std::pair<const char*, const char*>> parameters{{"const Coefficients&", "k"}};
-        if (declaration.takes_time && !d_.system.autonomous) parameters.emplace_back("real", "time");
-        parameters.insert(parameters.end(), declaration.parameters.begin(), declaration.parameters.end());
+        const bool any = declaration.any_number;
+        const auto type = [any](const std::string& of) {
+            return any && of.find("real") != std::string::npos
+                       ? of.substr(0, of.find("real")) + "number" + of.substr(of.find("real") + 4)
+                       : of;
+        };
+        std::vector<std::pair<std::string, const char*>> parameters{
+            {any ? "const CoefficientsOf<given>&" : "const Coefficients&", "k"}};
+        if (declaration.takes_time && !d_.system.autonomous) parameters.emplace_back(type("real"), "time");
+        for (const auto& [of, parameter] : declaration.parameters) parameters.emplace_back(type(of), parameter);
         return "\n" + wrapped(std::string("    // ") + declaration.comment, "    //     ") +
-               signature(declaration.result, declaration.program, parameters, text) + text + "    }\n";
+               (any ? "    template <class given, class number>\n" : "") +
+               signature(type(declaration.result), declaration.program, parameters, text) + text + "    }\n";
     }
 
     // The eliminations that the closed forms leave, after the statements that fill them.
@@ -282,7 +294,6 @@ KernelSource emit_kernel(const Derivation& derivation, Programs programs, const 
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
     source.report = optimise(programs);
-    source.unrolled = derivation.structure.form != Form::general && derivation.structure.unrolled;
     const Emitter emitter(derivation, programs, options);
     // The digest of the text with the digest left out, put in its place.
     source.header = emitter.header(source.name, "", source.report);

@@ -23,7 +23,6 @@ struct KernelSource {
     std::string header;              // the whole text of NAME.hpp
     std::string digest;              // 16 hexadecimal digits of the header's formulas
     std::vector<PassReport> report;  // first row: as derived
-    bool unrolled = true;            // everything written out; else loops that the support header runs
 };
 
 // Optimises the programs and writes them out. Throws DomainError when the formulas are real nowhere.

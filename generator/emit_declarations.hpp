@@ -15,8 +15,9 @@ struct Declaration {
     const char* program;
     const char* comment;
     const char* result;
-    std::vector<std::pair<const char*, const char*>> parameters;  // type, name
+    std::vector<std::pair<const char*, const char*>> parameters;  // type, name; `real` is any number in a template
     bool takes_time = false;
+    bool any_number = false;  // a template on the type of its values: one state, or many side by side
 };
 
 const std::vector<Declaration>& declarations(Form form);

@@ -81,12 +81,12 @@ std::string LoopedText::tables() const {
 
 std::string LoopedText::fields() const {
     std::string text;
-    if (!general_) text += "        real mass[coordinates], inverse_mass[coordinates];\n";
+    if (!general_) text += "        number mass[coordinates], inverse_mass[coordinates];\n";
     for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
         const Element& element = d_.structure.elements.repeated[number];
         if (!element.a.empty() && has_parameters(element))
             text +=
-                fmt::format("        real {}_a[{}];\n", element_name(number), element.rows.size() * element.a.size());
+                fmt::format("        number {}_a[{}];\n", element_name(number), element.rows.size() * element.a.size());
     }
     return text;
 }
@@ -122,7 +122,7 @@ std::string LoopedText::after_prepare() const {
 std::string LoopedText::statements(const std::string& name, const std::string& indent) const {
     std::vector<Statement> list;
     for (const Output& output : program(name).outputs) list.push_back({output.target, output.value});
-    const std::string lines = FunctionText(p_, list, names_, precision_, Stage::step_size).lines();
+    const std::string lines = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
     return indent.empty() ? lines : indented(lines);
 }
 
@@ -142,13 +142,13 @@ std::string LoopedText::loops(const std::string& part, const char* variables) co
             const std::string place = fmt::format("{}_x[r * {} + {}]", name, element.x.size(), j);
             if (mentions(inside, index)) begin += fmt::format("            const int {} = {};\n", index, place);
             if (mentions(inside, value))
-                begin += fmt::format("            const real {} = {}[{}];\n", value, variables,
+                begin += fmt::format("            const auto {} = {}[{}];\n", value, variables,
                                      mentions(inside, index) ? index : place);
         }
         for (std::size_t j = 0; j < element.a.size(); ++j) {
             const std::string value = fmt::format("a{}", j);
             if (mentions(inside, value))
-                begin += fmt::format("            const real {} = {}{}_a[r * {} + {}];\n", value,
+                begin += fmt::format("            const auto {} = {}{}_a[r * {} + {}];\n", value,
                                      has_parameters(element) ? "k." : "", name, element.a.size(), j);
         }
         text += fmt::format("        for (int r = 0; r < {}; ++r) {{  // {}\n{}{}        }}\n", element.rows.size(),
@@ -162,40 +162,40 @@ std::string LoopedText::body(const std::string& function) const {
     const std::string clear_entries = "        for (int e = 0; e < entries; ++e) ";
     const std::string time = d_.system.autonomous ? "" : "time, ";
     if (!general_) {
-        const std::string clear = coordinates + "W[i] = real(0);\n",
+        const std::string clear = coordinates + "W[i] = number(0);\n",
                           scale = coordinates + "W[i] *= k.inverse_mass[i];\n";
         if (function == "node")
-            return clear + clear_entries + "S[e] = real(0);\n" + statements("rest_node", "") + loops("node", "q") +
+            return clear + clear_entries + "S[e] = number(0);\n" + statements("rest_node", "") + loops("node", "q") +
                    scale + clear_entries + "S[e] *= k.inverse_mass[entry_row[e]];\n";
         if (function == "acceleration") return clear + statements("rest_slope", "") + loops("slope", "q") + scale;
         if (function == "quadratic_part")
-            return !d_.structure.absorbed
+            return !d_.structure.absorbed && !d_.structure.diagonal_part
                        ? ""
                        : clear_entries + "S0[e] = real(0);\n" + statements("rest_quadratic", "") +
                              loops("quadratic", "q") + clear_entries + "S0[e] *= k.inverse_mass[entry_row[e]];\n";
         if (function == "energy" && d_.scene.outputs.energy)
-            return "        real sum = real(0);\n" + coordinates +
+            return "        number sum = number(0);\n" + coordinates +
                    "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + statements("rest_energy", "") +
                    loops("energy", "q") + "        return sum;\n";
         if (function == "momentum") return coordinates + "p[i] = k.mass[i] * velocity[i];\n";
         if (function == "velocity") return coordinates + "velocity[i] = k.inverse_mass[i] * p[i];\n";
         return "";
     }
-    const std::string clear = "        for (int i = 0; i < 2 * coordinates; ++i) g[i] = real(0);\n";
-    const std::string join = "        real z[2 * coordinates];\n" + coordinates + "z[i] = velocity[i];\n" +
+    const std::string clear = "        for (int i = 0; i < 2 * coordinates; ++i) g[i] = number(0);\n";
+    const std::string join = "        number z[2 * coordinates];\n" + coordinates + "z[i] = velocity[i];\n" +
                              coordinates + "z[coordinates + i] = q[i];\n";
-    const std::string slope = join + "        real g[2 * coordinates];\n        slope(k, " + time + "z, g);\n";
+    const std::string slope = join + "        number g[2 * coordinates];\n        slope(k, " + time + "z, g);\n";
     if (function == "node")
-        return clear + clear_entries + "H[e] = real(0);\n" + statements("rest_node", "") + loops("node", "z");
+        return clear + clear_entries + "H[e] = number(0);\n" + statements("rest_node", "") + loops("node", "z");
     if (function == "slope") return clear + statements("rest_slope", "") + loops("slope", "z");
     if (function == "slopes")
         return slope + coordinates + "Lv[i] = g[i];\n" + coordinates + "Lq[i] = g[coordinates + i];\n";
     if (function == "momentum") return slope + coordinates + "p[i] = g[i];\n";
     if (function == "legendre")
-        return join + "        real g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
+        return join + "        number g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
                coordinates + "p[i] = g[i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
     if (function == "energy" && d_.scene.outputs.energy)
-        return join + "        real sum = real(0);\n" + statements("rest_energy", "") + loops("energy", "z") +
+        return join + "        number sum = number(0);\n" + statements("rest_energy", "") + loops("energy", "z") +
                "        return sum;\n";
     return "";
 }

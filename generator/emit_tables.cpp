@@ -39,8 +39,12 @@ std::string separable_shapes(const Structure& structure, int nodes) {
     if (structure.form == Form::separable) {
         line(text, fmt::format("bool unrolled = {}", structure.unrolled),
              structure.unrolled ? "every node and coordinate is written out" : "loops over nodes and coordinates");
+        line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part),
+             structure.diagonal_part ? "taken into the stage map: the constant part of M^-1 V''"
+                                     : "nothing is taken into the stage map");
         line(text, fmt::format("bool absorbed = {}", structure.absorbed),
-             structure.absorbed ? "iterated with the Jacobian of V's quadratic part" : "Newton's iteration");
+             structure.absorbed ? "Newton's iteration has the Jacobian of V's quadratic part"
+                                : "Newton's iteration has its own Jacobians");
     }
     line(text, fmt::format("int entries = {}", structure.entries.size()), "of M^-1 V'' that are not identically zero");
     return text + places("entry", structure.entries);
@@ -166,6 +170,9 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int coordinates = {}", d.system.n), "n");
     line(text, fmt::format("int order = {}", d.quadrature.order()), "of accuracy in h");
     line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
+    line(text, fmt::format("real tolerance = {:.17g}", d.scene.method.tolerance),
+         "of the last increment of a step; 0: rounding");
+    line(text, "bool any_number = true", "formulas of a state are templates on the type of its numbers");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");
@@ -191,7 +198,7 @@ std::string tables(const Derivation& d, Precision precision) {
         std::string text = "\n" + table.vector("c", rule.c, "nodes on [0, 1]") +
                            table.vector("b", rule.b, "their weights") +
                            table.matrix("A", rule.A, "stage map A_ij over the interior nodes");
-        if (d.structure.form == Form::separable && !d.structure.unrolled)
+        if (d.structure.form == Form::separable)
             text +=
                 table.matrix("E", rule.E, "extrapolation from the nodes of one step to the interior nodes of the next");
         return text;

@@ -84,8 +84,9 @@ Hoisted::Hoisted(const Programs& programs) {
 }
 
 FunctionText::FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                           Precision precision, Stage given) {
+                           Precision precision, Stage given, bool any_number) {
     const Graph& graph = programs.graph;
+    const char* const type = any_number ? "auto" : "real";
     std::vector<Id> roots;
     for (const Statement& statement : statements) roots.push_back(statement.value);
     // What this function computes: everything below the roots that is not given.
@@ -130,7 +131,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         const std::string name = identifier(input.name);
         if (!take(name)) continue;
         local[id] = name;
-        aliases += fmt::format("        const real {} = {};\n", name, input.code);
+        aliases += fmt::format("        const {} {} = {};\n", type, name, input.code);
     }
     std::map<Id, std::string> suggested;
     for (const auto& [id, name] : programs.names) suggested.emplace(id, name);
@@ -186,7 +187,8 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
                 }
                 const Id sine = graph[both[0]].op == Op::pair_sine ? both[0] : both[1];
                 const Id cosine = graph[both[0]].op == Op::pair_sine ? both[1] : both[0];
-                text_ += fmt::format("        real {}, {};\n", local[sine], local[cosine]);
+                text_ +=
+                    fmt::format("        {} {}, {};\n", any_number ? "number" : "real", local[sine], local[cosine]);
                 text_ += wrapped(fmt::format("        lobatto::sincos({}, {}, {});", text, local[sine], local[cosine]),
                                  "            ");
                 return;
@@ -196,9 +198,9 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         if (uses[id] > 1) {
             const auto wish = suggested.find(id);
             const std::string name = fresh(wish == suggested.end() ? "" : wish->second);
-            text_ += wrapped(
-                fmt::format("        const real {} = {};", name, formula(graph, id, Notation::cpp, naming, precision)),
-                "            ");
+            text_ += wrapped(fmt::format("        const {} {} = {};", type, name,
+                                         formula(graph, id, Notation::cpp, naming, precision)),
+                             "            ");
             local[id] = name;
         }
     };

@@ -101,7 +101,7 @@ private:
             const auto known = entry_.find(place);
             if (known == entry_.end()) continue;  // zero after all
             node.outputs.push_back({add_to(at(second(), known->second)), convert(value)});
-            if (!d_.structure.absorbed) continue;
+            if (!d_.structure.absorbed && !d_.structure.diagonal_part) continue;
             const ex constant = constant_part.of(value);
             if (!constant.is_zero()) quadratic.outputs.push_back({add_to(at("S0", known->second)), convert(constant)});
         }
@@ -149,7 +149,7 @@ private:
                 {add_to(fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column)),
                  convert(value)});
             const ex constant = constant_part.of(value);
-            if (d_.structure.absorbed && !constant.is_zero())
+            if ((d_.structure.absorbed || d_.structure.diagonal_part) && !constant.is_zero())
                 quadratic.outputs.push_back(
                     {add_to(fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column)),
                      convert(constant)});

@@ -57,10 +57,9 @@ public:
         mechanics();
         if (d_.structure.form == Form::linear_map) {
             if (n_ == 1) propagation_of_one();
-        } else if (d_.structure.unrolled) {
-            step();
-        } else if (d_.structure.absorbed) {
-            quadratic_part();
+        } else {
+            if (d_.structure.unrolled) step();
+            if (d_.structure.diagonal_part || d_.structure.absorbed) quadratic_part();
         }
         velocities_as_inputs();
         events();

@@ -74,7 +74,7 @@ private:
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
-                          "[method]", {"family", "points", "stages"});
+                          "[method]", {"family", "points", "stages", "tolerance"});
         const Entry *family = table.find("family"), *points = table.find("points"), *stages = table.find("stages");
         if (family != nullptr) {
             const Value& value = family->value;
@@ -93,6 +93,15 @@ private:
         if (stages != nullptr)
             scene_.method.points =
                 static_cast<int>(integer_of(source_, *stages, 1, 10, "there is Gauss with 1 to 10 stages"));
+        if (const Entry* tolerance = table.find("tolerance")) {
+            GiNaC::numeric value = 0;
+            system_.read_formula(*tolerance, system_.scope_of("the tolerance", false), &value);
+            scene_.method.tolerance = value.to_double();
+            if (!(scene_.method.tolerance > 0 && scene_.method.tolerance <= 0.001))
+                fail(tolerance->value.at, fmt::format("the tolerance is {}; it must be above 0 and at most 0.001; "
+                                                      "leave it out to iterate to rounding",
+                                                      shown(value)));
+        }
     }
 
     void read_run() {

@@ -37,6 +37,7 @@ enum class Family { lobatto, gauss };
 struct Method {
     Family family = Family::lobatto;
     int points = 4;
+    double tolerance = 0;  // of the last increment, relative to the displacement in a step; 0: to rounding
 
     int order() const { return family == Family::lobatto ? 2 * points - 2 : 2 * points; }
     std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage"

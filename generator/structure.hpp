@@ -60,8 +60,10 @@ struct Structure {
     bool unrolled = true;        // separable: every node and coordinate written out; else loops over both
     bool looped = false;         // terms of L that repeat are written once, in loops over tables
     Elements elements;           // looped: of V in q, or of L in z
-    bool absorbed = false;       // separable, in loops: iterated with the Jacobian of V's quadratic part (D31)
-    SparseMatrix constant_hessian;             // absorbed: the part of V'' that does not depend on q
+    bool diagonal_part =
+        false;              // separable: the constant part of M^-1 V'' is diagonal, and taken into the stage map (D31)
+    bool absorbed = false;  // separable, in loops: Newton's iteration has the Jacobian of V's quadratic part (D31)
+    SparseMatrix constant_hessian;             // the part of V'' that does not depend on q
     std::vector<std::pair<int, int>> entries;  // separable: where M^-1 V'' is not identically zero, row by row
     Routhian routhian;                         // general
     std::vector<Group> groups;
@@ -70,7 +72,7 @@ struct Structure {
 };
 
 // Largest sizes of what is written out: coordinates of a linear map, unknowns of a separable step.
-constexpr int linear_map_limit = 16, unrolled_limit = 24;
+constexpr int linear_map_limit = 16, unrolled_limit = 4;
 // Terms of L from which on loops are looked for.
 constexpr int looped_from = 32;
 // The additive part of a second derivative that does not depend on some variables.

@@ -13,8 +13,6 @@ struct Translation {
     std::string text;        // the whole C++ source: kernel_abi.h, kernel.hpp, the emitted header, kernel_export.hpp,
                              // LOBATTO_EXPORT_KERNEL
     bool quadruple = false;  // links libquadmath (g++ only)
-    // 3, or 2 for kernels that loop: half the compile time at the same speed (docs/architecture.md).
-    int optimisation = 3;
 };
 
 struct Compiled {

@@ -104,15 +104,14 @@ Compiler find_compiler(bool quadruple) {
 }
 
 std::vector<std::string> compile_arguments(const Compiler& compiler, const std::string& source,
-                                           const std::string& object, bool quadruple, int optimisation) {
+                                           const std::string& object, bool quadruple) {
     std::vector<std::string> arguments = compiler.words;
     // -ffp-contract=off: without fused multiply-add g++, clang++ and every processor give the same bits; with it each
     // fuses different products, and the error-free sums of a kernel would lose their proof. Measured cost: below 5 %.
     // -ffast-math is never among the flags: it would let the compiler simplify x - x, and so the checks for finite
     // numbers, away.
-    arguments.push_back("-O" + std::to_string(optimisation));
     for (const char* flag :
-         {"-march=native", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden"})
+         {"-O2", "-march=native", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden"})
         arguments.push_back(flag);
     if (quadruple) {
         for (const char* flag : {"-std=gnu++17", "-fext-numeric-literals", "-DLOBATTO_USE_FLOAT128="})

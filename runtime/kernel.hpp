@@ -4,11 +4,15 @@
 #define LOBATTO_KERNEL_HPP
 
 #include "kernel_contract.hpp"
+#include "kernel_ensemble.hpp"
 #include "kernel_events.hpp"
+#include "kernel_functions.hpp"
 #include "kernel_general.hpp"
 #include "kernel_linear.hpp"
 #include "kernel_numbers.hpp"
+#include "kernel_pack.hpp"
 #include "kernel_separable.hpp"
 #include "kernel_solve.hpp"
+#include "kernel_sweeps.hpp"
 
 #endif

@@ -22,7 +22,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 2u
+#define LOBATTO_ABI_VERSION 3u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -118,6 +118,20 @@ typedef struct lobatto_kernel {
     int32_t (*tangent)(const void* stepper, const void* time, const void* q, const void* p, void* q1, void* p1,
                        void* T); /* one step from (q, p)
 and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
+
+    /* Ensembles: `lanes` trajectories side by side, with one step size and one time. Memory of ensemble_bytes bytes
+     * that the caller owns, with this alignment. All arrays are lane-major: lane l has parameters[l * parameters ...],
+     * q[l * n ...], p[l * n ...]. status: one lobatto_status a lane, which each function sets; a lane whose status is
+     * not LOBATTO_OK on entry of start or advance is left alone. No lane's results depend on its neighbours. */
+    int32_t lanes; /* 0: none, and the functions are null */
+    int32_t ensemble_bytes;
+    int32_t ensemble_alignment;
+    void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);
+    void (*ensemble_start)(void* ensemble, const void* time, const void* q, const void* p, int32_t* status);
+    /* steps_done and iterations: one a lane, of this call. A lane that fails keeps its last good state. */
+    void (*ensemble_advance)(void* ensemble, int64_t steps, int32_t* status, int64_t* steps_done, int64_t* iterations);
+    void (*ensemble_state)(const void* ensemble, void* q, void* p);
+    void (*ensemble_energy)(const void* ensemble, void* energy); /* H, one a lane; null without energy */
 } lobatto_kernel;
 
 const lobatto_kernel* lobatto_kernel_table(void);

@@ -43,60 +43,57 @@ enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
 // K's functions with a time for all of them: it is passed on where the kernel depends on it.
 template <class K>
 struct Formulas {
-    using real = typename K::real;
-    using Coefficients = typename K::Coefficients;
-
-    template <class... Rest>
-    static void node(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static void node(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::node(k, rest...);
         else
             K::node(k, time, rest...);
     }
-    template <class... Rest>
-    static void acceleration(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static void acceleration(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::acceleration(k, rest...);
         else
             K::acceleration(k, time, rest...);
     }
-    template <class... Rest>
-    static void slope(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static void slope(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::slope(k, rest...);
         else
             K::slope(k, time, rest...);
     }
-    template <class... Rest>
-    static void slopes(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static void slopes(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::slopes(k, rest...);
         else
             K::slopes(k, time, rest...);
     }
-    template <class... Rest>
-    static void legendre(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static void legendre(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::legendre(k, rest...);
         else
             K::legendre(k, time, rest...);
     }
-    template <class... Rest>
-    static void momentum(const Coefficients& k, real time, Rest... rest) {  // of Form::general
+    template <class Given, class Time, class... Rest>
+    static void momentum(const Given& k, Time time, Rest... rest) {  // of Form::general
         if constexpr (K::autonomous)
             K::momentum(k, rest...);
         else
             K::momentum(k, time, rest...);
     }
-    template <class... Rest>
-    static void event(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static void event(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::event(k, rest...);
         else
             K::event(k, time, rest...);
     }
-    template <class... Rest>
-    static real energy(const Coefficients& k, real time, Rest... rest) {
+    template <class Given, class Time, class... Rest>
+    static auto energy(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             return K::energy(k, rest...);
         else

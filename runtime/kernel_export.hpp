@@ -9,6 +9,73 @@
 
 namespace lobatto {
 
+template <class K, int lanes>
+struct EnsembleType {
+    using type = Ensemble<K, lanes>;
+};
+struct NothingType {
+    struct type {};
+};
+
+// The functions of an ensemble, with LOBATTO_ENSEMBLES defined; none for number types without vector registers.
+template <class K>
+struct ExportEnsemble {
+    using real = typename K::real;
+#ifdef LOBATTO_ENSEMBLES
+    static constexpr int lanes = ensemble_lanes<K>();
+#else
+    static constexpr int lanes = 0;
+#endif
+    using Side = typename std::conditional_t<(lanes > 0), EnsembleType<K, (lanes > 0 ? lanes : 1)>, NothingType>::type;
+    static constexpr std::int32_t bytes = lanes > 0 ? sizeof(Side) : 0, alignment = lanes > 0 ? alignof(Side) : 0;
+
+    static const real* in(const void* numbers) {
+        return static_cast<const real*>(numbers);
+    }
+    static real* out(void* numbers) {
+        return static_cast<real*>(numbers);
+    }
+
+    // `use` with the statuses of the lanes.
+    template <class Use>
+    static void with(std::int32_t* codes, const Use& use) {
+        if constexpr (lanes > 0) {
+            Status status[lanes > 0 ? lanes : 1];
+            for (int lane = 0; lane < lanes; ++lane) status[lane] = static_cast<Status>(codes[lane]);
+            use(+status);
+            for (int lane = 0; lane < lanes; ++lane) codes[lane] = static_cast<std::int32_t>(status[lane]);
+        }
+    }
+    static void make(void* ensemble, const void* parameters, const void* step, std::int32_t* codes) {
+        with(codes, [&](Status* status) {
+            if constexpr (lanes > 0) (new (ensemble) Side)->prepare(in(parameters), *in(step), status);
+        });
+    }
+    static void begin(void* ensemble, const void* time, const void* q, const void* p, std::int32_t* codes) {
+        with(codes, [&](Status* status) {
+            if constexpr (lanes > 0) static_cast<Side*>(ensemble)->start(*in(time), in(q), in(p), status);
+        });
+    }
+    static void go(void* ensemble, std::int64_t steps, std::int32_t* codes, std::int64_t* done,
+                   std::int64_t* iterations) {
+        with(codes, [&](Status* status) {
+            if constexpr (lanes > 0) static_cast<Side*>(ensemble)->advance(steps, status, done, iterations);
+        });
+    }
+    static void read(const void* ensemble, void* q, void* p) {
+        if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->state(out(q), out(p));
+    }
+    static void measure(const void* ensemble, void* energy) {
+        if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->energy(out(energy));
+    }
+
+    static constexpr auto prepare = lanes > 0 ? make : nullptr;
+    static constexpr auto start = lanes > 0 ? begin : nullptr;
+    static constexpr auto advance = lanes > 0 ? go : nullptr;
+    static constexpr auto state = lanes > 0 ? read : nullptr;
+    static constexpr auto energy = lanes > 0 ? measure : nullptr;
+};
+
 template <class K>
 struct Export {
     using real = typename K::real;
@@ -141,6 +208,7 @@ struct Export {
             return 0;
     }
 
+    using E = ExportEnsemble<K>;
     static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
                                              sizeof(lobatto_kernel),
                                              K::name,
@@ -174,7 +242,15 @@ struct Export {
                                              slopes,
                                              residual,
                                              jacobian,
-                                             tangent};
+                                             tangent,
+                                             E::lanes,
+                                             E::bytes,
+                                             E::alignment,
+                                             E::prepare,
+                                             E::start,
+                                             E::advance,
+                                             E::state,
+                                             K::has_energy ? E::energy : nullptr};
 };
 
 }  // namespace lobatto

@@ -115,7 +115,7 @@ inline void round_to_unit_determinant(real* E) {
                 for (const real d : candidates[3]) {
                     const real ad = a * d, bc = b * c;
                     // tr E + det E, the terms and their rounding, summed without loss (TwoSum).
-                    const real terms[6] = {a, d, ad, -bc, fused(a, d, -ad), -fused(b, c, -bc)};
+                    const real terms[6] = {a, d, ad, -bc, rounded_once(a, d, -ad), -rounded_once(b, c, -bc)};
                     real sum = real(0), lost = real(0);
                     for (const real term : terms) {
                         const real next = sum + term, back = next - sum;
@@ -151,11 +151,11 @@ inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
 }
 
 // (q1, p1) = (q, p) + E (q, p) + shift, E = Phi - I; E: 2n x (2n + 1), the shift its last column.
-template <int n, class real>
-inline void apply_map(const real* E, const real* q, const real* p, real* q1, real* p1) {
+template <int n, class given, class number>
+inline void apply_map(const given* E, const number* q, const number* p, number* q1, number* p1) {
     for (int r = 0; r < 2 * n; ++r) {
-        const real* const row = E + r * (2 * n + 1);
-        real sum = row[2 * n];
+        const given* const row = E + r * (2 * n + 1);
+        number sum = row[2 * n];
         for (int k = 0; k < n; ++k) sum += row[k] * q[k];
         for (int k = 0; k < n; ++k) sum += row[n + k] * p[k];
         (r < n ? q1[r] : p1[r - n]) = (r < n ? q[r] : p[r - n]) + sum;
@@ -189,7 +189,7 @@ struct Stepper<K, Form::linear_map> : Motion<K> {
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
         real q1[n], p1[n];
-        K::propagate(coefficients, q, p, q1, p1);
+        K::propagate(coefficients, +q, +p, +q1, +p1);
         real sum = real(0);
         for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (p1[k] - p1[k]);
         if (!(sum == real(0))) return Status::not_finite;

@@ -168,17 +168,18 @@ inline bool is_finite(reals... x) {
     return ((x - x == reals(0)) && ...);
 }
 
-inline float fused(float a, float b, float c) {
+// a b + c rounded once on every target, for error-free products; slow where the target has no FMA.
+inline float rounded_once(float a, float b, float c) {
     return std::fma(a, b, c);
 }
-inline double fused(double a, double b, double c) {
+inline double rounded_once(double a, double b, double c) {
     return std::fma(a, b, c);
 }
-inline long double fused(long double a, long double b, long double c) {
+inline long double rounded_once(long double a, long double b, long double c) {
     return std::fma(a, b, c);
 }
 #ifdef LOBATTO_USE_FLOAT128
-inline __float128 fused(__float128 a, __float128 b, __float128 c) {
+inline __float128 rounded_once(__float128 a, __float128 b, __float128 c) {
     return fmaq(a, b, c);
 }
 #endif

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Steps of systems with constant mass and forces without velocities: only the interior nodes are implicit.
 //
-// Formula numbers (D..) refer to docs/derivation.md. W = M^-1 (grad V - F) may depend on time: node i is at t + c_i h.
+// Sweeps (kernel_sweeps.hpp) solve the stage equations where they contract; Newton's iteration, here, where they do
+// not. Formula numbers (D..) refer to docs/derivation.md. W = M^-1 (grad V - F) may depend on time: node i is at t +
+// c_i h.
 #ifndef LOBATTO_KERNEL_SEPARABLE_HPP
 #define LOBATTO_KERNEL_SEPARABLE_HPP
 
@@ -11,6 +13,7 @@
 #include "kernel_linear.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_solve.hpp"
+#include "kernel_sweeps.hpp"
 
 namespace lobatto {
 
@@ -199,6 +202,7 @@ struct Stepper<K, Form::separable> : Motion<K> {
             return K::absorbed;
     }
     static constexpr bool is_frozen = N > 0 && !K::unrolled && (K::linear || absorbs());
+    static constexpr bool is_swept = N > 0 && K::any_number && !K::linear;
 
     struct Nothing {};
     struct Arrays {
@@ -207,11 +211,18 @@ struct Stepper<K, Form::separable> : Motion<K> {
         std::conditional_t<K::unrolled || N == 0, Nothing, LoopArrays<K>> loop;
     };
 
-    real u[n]{};         // M^-1 p
-    real q_before[n]{};  // before the last step
-    real W[s * n]{};     // M^-1 grad V at the nodes of the last step; the last n at q
-    bool has_history{};  // W holds a whole step
-    real Q[room]{};      // interior positions of the last step
+    struct Swept {
+        Sweeps<K, real> sweeps;
+        std::int32_t pause{};   // steps that are left to Newton's iteration
+        std::int32_t pauses{};  // how many, the next time that sweeps fail
+    };
+
+    real u[n]{};                        // M^-1 p
+    real q_before[n]{}, u_before[n]{};  // before the last step
+    real W[s * n]{};                    // M^-1 grad V at the nodes of the last step; the last n at q
+    bool has_history{};                 // W holds a whole step
+    bool is_current{};                  // W is that of the last step; else the sweeps' memory is
+    std::conditional_t<is_swept, Swept, Nothing> swept{};
     std::conditional_t<is_frozen, FrozenJacobian<K>, Nothing> frozen{};
     Workspace<Arrays> workspace;
 
@@ -219,10 +230,10 @@ struct Stepper<K, Form::separable> : Motion<K> {
         step_size = h;
         has_history = false;
         const Status status = K::prepare(parameters, h, coefficients);
-        if constexpr (is_frozen) {
-            if (status == Status::ok) return freeze(frozen);
-        }
-        return status;
+        if (status != Status::ok) return status;
+        if constexpr (is_swept) swept.sweeps.prepare(coefficients, h);
+        if constexpr (is_frozen) return freeze(frozen);
+        return Status::ok;
     }
 
     Status start(real time, const real* position, const real* momentum) {
@@ -238,6 +249,8 @@ struct Stepper<K, Form::separable> : Motion<K> {
         Formulas<K>::acceleration(coefficients, time, q, W + (s - 1) * n);
         sum += not_finite_part(W + (s - 1) * n, n);
         if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
+        is_current = true;
+        if constexpr (is_swept) begin_sweeps(swept);
         return is_finite(sum) ? Status::ok : Status::not_finite;
     }
 
@@ -245,6 +258,9 @@ struct Stepper<K, Form::separable> : Motion<K> {
 
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
+        if constexpr (is_swept) {
+            if (sweep(swept)) return Status::ok;
+        }
         return workspace.with([this](Arrays& arrays) { return step_in(arrays); });
     }
 
@@ -255,8 +271,9 @@ struct Stepper<K, Form::separable> : Motion<K> {
         for (int k = 0; k < n; ++k) {
             real moved = value[s - 1] * (q[k] - q_before[k]), rate = slope[s - 1] * (q[k] - q_before[k]);
             for (int i = 0; i < m; ++i) {
-                moved += value[i + 1] * (Q[i * n + k] - q_before[k]);
-                rate += slope[i + 1] * (Q[i * n + k] - q_before[k]);
+                const real displacement = displacement_of(i, k);
+                moved += value[i + 1] * displacement;
+                rate += slope[i + 1] * displacement;
             }
             position[k] = q_before[k] + moved;
             velocity[k] = rate / step_size;
@@ -319,6 +336,23 @@ struct Stepper<K, Form::separable> : Motion<K> {
         return Status::ok;
     }
 
+    // W at node i of the last step; node s - 1 is where the motion is now.
+    real node_acceleration(int i, int k) const {
+        if constexpr (is_swept) {
+            if (!is_current) return swept.sweeps.w[k * s + i];
+        }
+        return W[i * n + k];
+    }
+    // (D12) Q_i - q of the last step's interior node i.
+    real displacement_of(int i, int k) const {
+        real moved = K::c[i + 1] * (u_before[k] - step_size * K::b[0] * node_acceleration(0, k));
+        for (int j = 0; j < m; ++j) moved -= step_size * K::A[i * m + j] * node_acceleration(j + 1, k);
+        return step_size * moved;
+    }
+    real node_position(int i, int k) const {
+        return i == s - 1 ? q[k] : q_before[k] + (i > 0 ? displacement_of(i - 1, k) : real(0));
+    }
+
     // One step from (q, p) at `time` and d(q1, p1)/d(q, p) (D24), 2n x 2n.
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {
@@ -329,13 +363,11 @@ struct Stepper<K, Form::separable> : Motion<K> {
             for (int k = 0; k < n; ++k) q1[k] = local.q[k];
             local.momentum(p1);
             constexpr int columns = 2 * n + 1;
-            real full[2 * n * columns], second[s * n * n], ignored[n], entries[entry_room], none[n] = {};
+            real full[2 * n * columns], second[s * n * n], at[n], ignored[n], entries[entry_room], none[n] = {};
             for (int i = 0; i < s; ++i) {
-                Formulas<K>::node(coefficients, time + K::c[i] * step_size,
-                                  i == 0       ? position
-                                  : i == s - 1 ? local.q
-                                               : local.Q + (i - 1) * n,
-                                  ignored, entries);
+                for (int k = 0; k < n; ++k) at[k] = local.node_position(i, k);
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +ignored,
+                                  +entries);
                 expand_entries<K>(entries, second + i * n * n);
             }
             if (!increment_of_step<K>(step_size, second, none, full)) return Status::singular_jacobian;
@@ -350,6 +382,53 @@ struct Stepper<K, Form::separable> : Motion<K> {
     }
 
 private:
+    template <class AnySwept>
+    void begin_sweeps(AnySwept& any) {
+        any.pause = 0;
+        any.pauses = 1;
+        any.sweeps.begin(q, W + (s - 1) * n);
+    }
+
+    // A step by sweeps; where they fail, all is made ready for Newton's iteration.
+    template <class AnySwept>
+    bool sweep(AnySwept& any) {
+        if (any.pause > 0) {
+            --any.pause;
+            if (any.pause == 0)
+                any.sweeps.recall([this](int i, int k) { return node_acceleration(i, k); },
+                                  [this](int i, int k) { return node_position(i, k); });
+        }
+        if (any.pause == 0) {
+            real q1[n], u1[n];
+            for (int k = 0; k < n; ++k) {
+                q1[k] = q[k];
+                u1[k] = u[k];
+            }
+            if (any.sweeps.step(coefficients, this->time(), q1, u1, true)) {
+                for (int k = 0; k < n; ++k) {
+                    q_before[k] = q[k];
+                    u_before[k] = u[k];
+                    q[k] = q1[k];
+                    u[k] = u1[k];
+                }
+                iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
+                increment = any.sweeps.increment;
+                any.pauses = 1;
+                is_current = false;
+                has_history = true;
+                ++this->steps;
+                return true;
+            }
+            if (!is_current)
+                for (int i = 0; i < s; ++i)
+                    for (int k = 0; k < n; ++k) W[i * n + k] = any.sweeps.w[k * s + i];
+            is_current = true;
+            any.pause = any.pauses;
+            any.pauses = any.pauses < 64 ? 2 * any.pauses : 64;
+        }
+        return false;
+    }
+
     Status step_in(Arrays& a) {
         const Stages stages(coefficients, step_size);
         const real* const W0 = W + (s - 1) * n;
@@ -374,14 +453,12 @@ private:
         if (!(sum == real(0))) return Status::not_finite;
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
+            u_before[k] = u[k];
             q[k] = a.q1[k];
             u[k] = a.u1[k];
             W[k] = W0[k];
         }
-        for (int i = 0; i < N; ++i) {
-            W[n + i] = a.W_nodes[i];
-            Q[i] = a.nodes[i];
-        }
+        for (int i = 0; i < N; ++i) W[n + i] = a.W_nodes[i];
         for (int k = 0; k < n; ++k) W[(s - 1) * n + k] = a.W1[k];
         has_history = true;
         ++this->steps;

@@ -1,67 +1,22 @@
 // SPDX-License-Identifier: MIT
-// Writes rows in whole blocks with write(2), so that nothing waits in a buffer when the process is killed.
+// Rows as text, in whole blocks, and back.
 #include "runtime/output.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <memory>
 
 #include "runtime/error.hpp"
 
 namespace lobatto {
 
-namespace {
-
-[[noreturn]] void fail(const std::string& path, int error) {
-    const char* advice = error == ENOSPC || error == EDQUOT ? ". Free some space, or choose another place with -o"
-                         : error == ENOENT ? ". Create its folder first, or choose another place with -o"
-                         : error == EACCES || error == EROFS || error == EPERM || error == ENOTDIR || error == EISDIR
-                             ? ". Choose another place with -o"
-                             : "";
-    throw MachineError(fmt::format("cannot write the trajectory to {}: {}{}", path, std::strerror(error), advice));
-}
-
 void append_number(std::string& text, double value) {
     char digits[32];
     text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
-
-// A file that is ours alone: opened, locked, emptied.
-int open_locked(const std::string& path) {
-    while (true) {
-        const int descriptor = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-        if (descriptor < 0) fail(path, errno);
-        if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-            const int error = errno;
-            close(descriptor);
-            if (error != EWOULDBLOCK) fail(path, error);
-            throw MachineError(
-                fmt::format("cannot write the trajectory to {}: another run is writing it. Wait for it, or choose "
-                            "another place with -o",
-                            path));
-        }
-        struct stat ours {
-        }, named{};
-        const bool same = fstat(descriptor, &ours) == 0 && stat(path.c_str(), &named) == 0 &&
-                          ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
-        if (same && ftruncate(descriptor, 0) == 0) return descriptor;
-        const int error = errno;
-        close(descriptor);
-        if (same) fail(path, error);  // else another run has just finished it under its final name: open a new one
-    }
-}
-
-}  // namespace
 
 std::string exact_text(double value) {
     std::string text;
@@ -70,19 +25,7 @@ std::string exact_text(double value) {
 }
 
 TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header)
-    : path_(path), energy_(header.energy), columns_(header.columns.size() - (header.energy ? 1 : 0)) {
-    struct stat status {};
-    if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
-        partial_ = path_;
-        descriptor_ = open(path.c_str(), O_WRONLY | O_CLOEXEC);
-        if (descriptor_ < 0) fail(path_, errno);
-    } else {
-        const std::unique_ptr<char, void (*)(void*)> target(realpath(path.c_str(), nullptr),
-                                                            std::free);  // through symbolic links
-        if (target) path_ = target.get();
-        partial_ = path_ + ".partial";
-        descriptor_ = open_locked(partial_);
-    }
+    : file_(path, "the trajectory"), energy_(header.energy), columns_(header.columns.size() - (header.energy ? 1 : 0)) {
     text_ = fmt::format("# lobatto {}\n# scene: {}\n# method: {}\n# kernel: {}\n",
                         header.events.empty() ? "trajectory" : "events", header.scene, header.method, header.kernel);
     const char* separator = "# parameters: ";
@@ -105,10 +48,6 @@ TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& 
     }
     text_ += '\n';
     flush();
-}
-
-TrajectoryFile::~TrajectoryFile() {
-    if (descriptor_ >= 0) close(descriptor_);
 }
 
 void TrajectoryFile::write(const Records& records) {
@@ -141,24 +80,8 @@ void TrajectoryFile::append(const double* row, std::size_t count) {
     }
 }
 
-void TrajectoryFile::finish() {
-    if (partial_ != path_ && std::rename(partial_.c_str(), path_.c_str()) != 0) fail(path_, errno);
-    const int descriptor = std::exchange(descriptor_, -1);
-    if (close(descriptor) != 0) fail(path_, errno);
-}
-
 void TrajectoryFile::flush() {
-    const char* begin = text_.data();
-    std::size_t left = text_.size();
-    while (left > 0) {
-        const ssize_t written = ::write(descriptor_, begin, left);
-        if (written < 0) {
-            if (errno == EINTR) continue;
-            fail(partial_, errno);
-        }
-        begin += written;
-        left -= static_cast<std::size_t>(written);
-    }
+    file_.write(text_);
     text_.clear();
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/partial_file.hpp"
 #include "runtime/trajectory.hpp"
 
 namespace lobatto {
@@ -22,30 +23,22 @@ struct TrajectoryHeader {
     std::vector<std::string> events;  // of a file of events, whose first column counts them from 1: what they are
 };
 
-// The file appears under its name only when `finish` is called. Until then its rows stand in NAME.partial beside it,
-// whole lines written block by block, so that a killed run leaves a readable NAME.partial and an earlier NAME
-// untouched. Two runs cannot write the same file at once. A destination that exists and is no regular file (a pipe, a
-// device) is written to directly.
+// Rows go into a PartialFile as whole lines, block by block, so that a killed run leaves readable rows.
 class TrajectoryFile {
 public:
     // All functions throw MachineError, which names the path, when the machine refuses.
     TrajectoryFile(const std::string& path, const TrajectoryHeader& header);
-    ~TrajectoryFile();  // without `finish`: NAME.partial stays
-    TrajectoryFile(const TrajectoryFile&) = delete;
-    TrajectoryFile& operator=(const TrajectoryFile&) = delete;
 
     // Rows may be longer than the file's: the momenta, which come last, are not kept then.
     void write(const Records& records);
     void write(const EventRecords& records);
-    void finish();
+    void finish() { file_.finish(); }
 
 private:
     void append(const double* row, std::size_t count);
     void flush();
 
-    std::string path_;     // the destination
-    std::string partial_;  // what is being written; the same as path_ for a pipe or device
-    int descriptor_ = -1;
+    PartialFile file_;
     bool energy_ = true;
     std::size_t columns_ = 0;  // of a row, without H
     std::string text_;
@@ -61,5 +54,6 @@ TrajectoryTable read_trajectory(const std::string& path);
 
 // The shortest text that reads back to the same double.
 std::string exact_text(double value);
+void append_number(std::string& text, double value);
 
 }  // namespace lobatto

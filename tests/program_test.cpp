@@ -31,14 +31,14 @@ const std::string program = "'" LOBATTO_PROGRAM "'";
 TEST_CASE("the help names every command, an example, and is what no arguments show") {
     const Answer help = shell(program + " --help");
     CHECK(help.code == 0);
-    for (const char* words : {"derive", "emit", "run", "verify", "paper", "lobatto run scenes/pendulum.toml"})
+    for (const char* words : {"derive", "emit", "run", "sweep", "verify", "paper", "lobatto run scenes/pendulum.toml"})
         CHECK(help.text.find(words) != std::string::npos);
     CHECK(shell(program).text == help.text);
     CHECK(shell(program).code == 0);
 }
 
 TEST_CASE("the help of each command ends with an example of that command") {
-    for (const std::string command : {"derive", "emit", "run", "verify", "paper"}) {
+    for (const std::string command : {"derive", "emit", "run", "sweep", "verify", "paper"}) {
         INFO(command);
         const Answer help = shell(program + " " + command + " --help");
         CHECK(help.code == 0);
@@ -51,12 +51,13 @@ TEST_CASE("a word that is no command is refused with exit code 2, the commands, 
     const Answer unknown = shell(program + " nonsense");
     CHECK(unknown.code == 2);
     CHECK(unknown.text ==
-          "lobatto: unknown command 'nonsense'; the commands are: check, derive, emit, run, verify, gallery, paper.\n");
+          "lobatto: unknown command 'nonsense'; the commands are: check, derive, emit, run, sweep, verify, gallery, "
+          "paper.\n");
     const Answer scene = shell(program + " scenes/pendulum.toml");
     CHECK(scene.code == 2);
     CHECK(scene.text ==
-          "lobatto: unknown command 'scenes/pendulum.toml'; the commands are: check, derive, emit, run, verify, "
-          "gallery, paper. "
+          "lobatto: unknown command 'scenes/pendulum.toml'; the commands are: check, derive, emit, run, sweep, "
+          "verify, gallery, paper. "
           "Did you mean `lobatto run scenes/pendulum.toml`?\n");
 }
 

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+// Trajectories side by side: each in its lane, with its own parameters and state, one step size and time for all.
+//
+// What a lane computes depends on no other lane. Where the sweeps of one fail, a Stepper of its own takes that step, by
+// Newton's iteration if need be; a lane that no way leads on keeps its last good state and its status.
+#ifndef LOBATTO_KERNEL_ENSEMBLE_HPP
+#define LOBATTO_KERNEL_ENSEMBLE_HPP
+
+#include <cstdint>
+
+#include "kernel_contract.hpp"
+#include "kernel_linear.hpp"
+#include "kernel_pack.hpp"
+#include "kernel_separable.hpp"
+#include "kernel_sweeps.hpp"
+
+namespace lobatto {
+
+// Lane `lane` of coefficients side by side; both structures hold nothing but their number type.
+template <class K, class T>
+inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int lane,
+                             const typename K::Coefficients& one) {
+    using real = typename K::real;
+    constexpr int size = sizeof(one) / sizeof(real);
+    static_assert(sizeof(all) == size * sizeof(T));
+    const real* const from = reinterpret_cast<const real*>(&one);
+    T* const to = reinterpret_cast<T*>(&all);
+    for (int i = 0; i < size; ++i) set_lane(to[i], lane, from[i]);
+}
+
+// How the lanes of each form move by one step: start(q, p, lane), step(k, time, going), and the state of a lane.
+template <class K, class T, Form form = K::form>
+struct Lanes;
+
+template <class K, class T>
+struct Lanes<K, T, Form::linear_map> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], p[n], evaluations = T(real(0));
+
+    void prepare(const Stepper<K>&, int) {}
+    void start(const Stepper<K>& single, const real* momentum, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, momentum[c]);
+        }
+    }
+    void momentum(const Stepper<K>&, int lane, real* momentum) const {
+        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
+    }
+    template <class Given>
+    Going step(const Given& k, real, Going going) {
+        T q1[n], p1[n], not_finite = T(real(0));
+        K::propagate(k, +q, +p, +q1, +p1);
+        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
+        going = going & (not_finite == T(real(0)));
+        for (int c = 0; c < n; ++c) {
+            q[c] = select(going, q1[c], q[c]);
+            p[c] = select(going, p1[c], p[c]);
+        }
+        return going;
+    }
+    void follow(const Stepper<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, single.p[c]);
+        }
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::separable> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], u[n], evaluations = T(real(0));
+    Sweeps<K, T> sweeps;
+
+    void prepare(const Stepper<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
+    void start(const Stepper<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        sweeps.begin(single.q, single.W + (K::points - 1) * n, lane);
+    }
+    void momentum(const Stepper<K>& single, int lane, real* momentum) const {
+        real velocity[n];
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
+        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const Going moved = sweeps.step(k, time, q, u, going);
+        evaluations = sweeps.evaluations;
+        return moved;
+    }
+    // Takes over the state and the memory of the step that `single` has taken.
+    void follow(const Stepper<K>& single, int lane) {
+        follow_state(single, lane);
+        sweeps.recall([&](int i, int c) { return single.node_acceleration(i, c); },
+                      [&](int i, int c) { return single.node_position(i, c); }, lane);
+    }
+
+private:
+    void follow_state(const Stepper<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(u[c], lane, single.u[c]);
+        }
+    }
+};
+
+// Lanes side by side: few coordinates leave registers for two packs at once, which hide each other's latency.
+template <class K>
+constexpr int ensemble_lanes() {
+    if (native_lanes<typename K::real> == 1 || !K::any_number || K::form == Form::general) return 0;
+    return native_lanes<typename K::real> * (K::coordinates <= 4 ? 2 : 1);
+}
+
+template <class K, int width>
+struct Ensemble {
+    using real = typename K::real;
+    using T = Pack<real, width>;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates, lanes = width;
+
+    typename K::template CoefficientsOf<T> coefficients;
+    Lanes<K, T> motion;
+    typename K::Parameters parameters[width];
+    typename K::Coefficients coefficients_of[width];
+    mutable Stepper<K> single;  // takes the steps of a lane that has left the others
+    real step_size{}, start_time{};
+    std::int64_t steps{};
+
+    void prepare(const real* values, real h, Status* status) {
+        step_size = h;
+        for (int lane = 0; lane < width; ++lane) {
+            for (int i = 0; i < K::parameter_count; ++i)
+                K::parameter(parameters[lane], i) = values[lane * K::parameter_count + i];
+            status[lane] = single.prepare(parameters[lane], h);
+            coefficients_of[lane] = single.coefficients;
+            set_coefficients<K>(coefficients, lane, single.coefficients);
+            motion.prepare(single, lane);
+        }
+    }
+
+    void start(real time, const real* q, const real* p, Status* status) {
+        start_time = time;
+        steps = 0;
+        for (int lane = 0; lane < width; ++lane) {
+            if (status[lane] != Status::ok) continue;
+            status[lane] = begin_alone(lane, time, q + lane * n, p + lane * n);
+            motion.start(single, p + lane * n, lane);
+        }
+    }
+
+    // At most `count` steps of the lanes whose status is ok; `done` and `iterations` of each.
+    void advance(std::int64_t count, Status* status, std::int64_t* done, std::int64_t* iterations) {
+        Going going = Going(false);
+        for (int lane = 0; lane < width; ++lane) {
+            going.set(lane, status[lane] == Status::ok);
+            done[lane] = 0;
+        }
+        T evaluations = T(real(0));
+        std::int64_t taken = 0;
+        const auto leave = [&](int lane, Status why) {
+            status[lane] = why;
+            done[lane] = taken;
+            going.set(lane, false);
+        };
+        for (; taken < count && any(going); ++taken, ++steps) {
+            const real time = time_of(steps);
+            if (time_of(steps + 1) == time) {
+                for (int lane = 0; lane < width; ++lane)
+                    if (going[lane]) leave(lane, Status::time_stands_still);
+                break;
+            }
+            const Going moved = motion.step(coefficients, time, going);
+            evaluations += motion.evaluations;
+            if (any(going & !moved)) {
+                for (int lane = 0; lane < width; ++lane) {
+                    if (!going[lane] || moved[lane]) continue;
+                    const Status alone = step_alone(lane, time);
+                    if (alone != Status::ok) leave(lane, alone);
+                }
+            }
+        }
+        for (int lane = 0; lane < width; ++lane) {
+            if (status[lane] == Status::ok) done[lane] = taken;
+            iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
+        }
+    }
+
+    void state(real* q, real* p) const {
+        for (int lane = 0; lane < width; ++lane) state_of(lane, q + lane * n, p + lane * n);
+    }
+
+    void energy(real* energy) const {
+        real q[n], p[n];
+        for (int lane = 0; lane < width; ++lane) {
+            state_of(lane, q, p);
+            energy[lane] = real(0);
+            single.energy(time_of(steps), q, p, energy + lane);
+        }
+    }
+
+private:
+    real time_of(std::int64_t step) const { return start_time + real(step) * step_size; }
+
+    // The state of a lane; `single` has its coefficients from then on.
+    void state_of(int lane, real* q, real* p) const {
+        single.coefficients = coefficients_of[lane];
+        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.q[c], lane);
+        motion.momentum(single, lane, p);
+    }
+
+    Status begin_alone(int lane, real time, const real* q, const real* p) {
+        const Status status = single.prepare(parameters[lane], step_size);
+        return status == Status::ok ? single.start(time, q, p) : status;
+    }
+
+    Status step_alone(int lane, real time) {
+        real q[n], p[n];
+        state_of(lane, q, p);
+        Status status = begin_alone(lane, time, q, p);
+        if (status == Status::ok) status = single.step();
+        if (status == Status::ok) motion.follow(single, lane);
+        return status;
+    }
+};
+
+}  // namespace lobatto
+
+#endif
