@@ -44,14 +44,13 @@ Effort run_one(LoadedStepper<double>& stepper, std::int64_t steps, Trajectory& t
             evaluations_of(stepper.kernel().table(), call)};
 }
 
-#if LOBATTO_ABI_VERSION >= 3
 // Side by side, `lanes` at a time; lanes left over in the last group stand still.
 Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std::vector<Trajectory>& trajectories) {
     const std::size_t lanes = static_cast<std::size_t>(kernel.lanes), n = static_cast<std::size_t>(kernel.coordinates);
     const std::size_t alignment = static_cast<std::size_t>(kernel.ensemble_alignment);
     const std::size_t bytes = (static_cast<std::size_t>(kernel.ensemble_bytes) + alignment - 1) / alignment * alignment;
     const std::unique_ptr<void, void (*)(void*)> ensemble(std::aligned_alloc(alignment, bytes), std::free);
-    const std::vector<double> step(lanes, h), time(lanes, 0);
+    const double time = 0;
     std::vector<double> q(lanes * n), p(lanes * n);
     std::vector<std::int64_t> steps_done(lanes), iterations(lanes);
     Effort all{true, 0, 0};
@@ -62,10 +61,10 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std
             const Trajectory& start = trajectories[first + std::min(lane, used - 1)];
             std::copy(start.q.begin(), start.q.end(), q.begin() + static_cast<std::ptrdiff_t>(lane * n));
             std::copy(start.p.begin(), start.p.end(), p.begin() + static_cast<std::ptrdiff_t>(lane * n));
-            if (lane >= used) status[lane] = LOBATTO_UNSUPPORTED;
         }
-        kernel.ensemble_prepare(ensemble.get(), nullptr, step.data(), status.data());
-        kernel.ensemble_start(ensemble.get(), time.data(), q.data(), p.data(), status.data());
+        kernel.ensemble_prepare(ensemble.get(), nullptr, &h, status.data());
+        std::fill(status.begin() + static_cast<std::ptrdiff_t>(used), status.end(), LOBATTO_UNSUPPORTED);
+        kernel.ensemble_start(ensemble.get(), &time, q.data(), p.data(), status.data());
         kernel.ensemble_advance(ensemble.get(), steps, status.data(), steps_done.data(), iterations.data());
         kernel.ensemble_state(ensemble.get(), q.data(), p.data());
         for (std::size_t lane = 0; lane < used; ++lane) {
@@ -82,17 +81,14 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std
     }
     return all;
 }
-#endif
 
 Contestant contestant_of(const Problem& problem, Method method, const Kernel& kernel) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
     const auto run = [stepper, until = problem.until](double setting, std::vector<Trajectory>& trajectories) -> Effort {
         const double h = until / setting;
         const auto steps = static_cast<std::int64_t>(setting);
-#if LOBATTO_ABI_VERSION >= 3
         const lobatto_kernel& table = stepper->kernel().table();
         if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, trajectories);
-#endif
         if (stepper->prepare({}, h) != LOBATTO_OK) return {};
         return one_by_one(trajectories, [&](Trajectory& trajectory) { return run_one(*stepper, steps, trajectory); });
     };
