@@ -83,7 +83,7 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
     if (result.steps_done == 0) return;
     const lobatto_kernel& kernel = stepper.kernel().table();
     print_row("time per step", duration(result.seconds / static_cast<double>(result.steps_done)));
-    print_row(derivation.structure.absorbed ? "iterations" : "Newton iterations", iterations_text(kernel, result));
+    print_row("iterations", iterations_text(kernel, result));
     const bool conserves = derivation.system.autonomous && !has_forces(derivation);
     if (kernel.has_energy != 0) {
         const double H0 = std::fabs(result.energy_start);

@@ -194,6 +194,10 @@ std::string LoopedText::body(const std::string& function) const {
     if (function == "legendre")
         return join + "        number g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
                coordinates + "p[i] = g[i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
+    if (function == "stage")
+        return join + "        number g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
+               coordinates + "Lv[i] = g[i];\n" + coordinates +
+               "Lq[i] = g[coordinates + i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
     if (function == "energy" && d_.scene.outputs.energy)
         return join + "        number sum = number(0);\n" + statements("rest_energy", "") + loops("energy", "z") +
                "        return sum;\n";

@@ -208,7 +208,10 @@ std::string tables(const Derivation& d, Precision precision) {
            table.matrix("B", rule.B, "basis polynomials at the nodes, nodes x controls") +
            table.matrix("D", rule.D, "their slopes, nodes x controls") +
            table.matrix("extrapolation", rule.extrapolation, "basis polynomials at 1 + control points") +
-           table.vector("legendre_polynomial", rule.legendre, "the Legendre polynomial orthogonal to all slopes");
+           table.vector("legendre_polynomial", rule.legendre, "the Legendre polynomial orthogonal to all slopes") +
+           table.matrix("integration", rule.integration, "from 0 to the nodes, over the polynomials on the nodes") +
+           table.matrix("reach", rule.reach, "the same to the control points after the first") +
+           table.matrix("ahead", rule.ahead, "the polynomials on the nodes at 1 + nodes");
 }
 
 }  // namespace lobatto

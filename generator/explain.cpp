@@ -158,9 +158,13 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    std::string text = derivation.structure.linear     ? "once a step, without iteration; "
-                       : derivation.structure.absorbed ? "by iterations with one matrix for all steps; "
-                                                       : "by Newton's iteration; ";
+    const char* const swept = "by sweeps over all points at once; where they do not contract, ";
+    std::string text = derivation.structure.linear                    ? "once a step, without iteration; "
+                       : derivation.structure.form == Form::separable ? swept
+                                                                      : "";
+    if (!derivation.structure.linear)
+        text +=
+            derivation.structure.absorbed ? "by iterations with one matrix for all steps; " : "by Newton's iteration; ";
     if (solves.size() == 1) return text + kinds.front().first;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
         const auto& [how, list] = kinds[i];

@@ -55,16 +55,20 @@ private:
         Ids momentum, force;
         for (const ex& value : d_.system.momentum) momentum.push_back(convert(value));
         for (const ex& value : d_.system.force) force.push_back(convert(value));
-        Program slopes{"slopes", {}}, legendre{"legendre", {}};
+        Program slopes{"slopes", {}}, legendre{"legendre", {}}, stage{"stage", {}};
         for (std::size_t k = 0; k < n_; ++k) slopes.outputs.push_back({at("Lv", k), momentum[k]});
         for (std::size_t k = 0; k < n_; ++k) slopes.outputs.push_back({at("Lq", k), force[k]});
+        stage.outputs = slopes.outputs;
         p_.programs.push_back(std::move(slopes));
         program("momentum", "p", momentum);
         for (std::size_t k = 0; k < n_; ++k) legendre.outputs.push_back({at("p", k), momentum[k]});
         std::size_t e = 0;
-        for (const auto& [place, value] : d_.system.momentum_v.entries())
-            legendre.outputs.push_back({at("M", e++), convert(value)});
+        for (const auto& [place, value] : d_.system.momentum_v.entries()) {
+            legendre.outputs.push_back({at("M", e), convert(value)});
+            stage.outputs.push_back({at("M", e++), convert(value)});
+        }
         p_.programs.push_back(std::move(legendre));
+        p_.programs.push_back(std::move(stage));
         if (d_.scene.outputs.energy) p_.programs.push_back({"energy", {{"return", energy()}}});
     }
 

@@ -254,6 +254,9 @@ Quadrature tables(const Method& method) {
     result.G = matrix_of(G, controls - 2);
     result.extrapolation = matrix_of(values(basis, plus_one(control)), controls);
     result.legendre = expressions(highest_values);
+    result.integration = matrix_of(values(node_integrals, nodes), r);
+    result.reach = matrix_of(values(node_integrals, std::vector<Number>(control.begin() + 1, control.end())), r);
+    result.ahead = matrix_of(values(node_basis, plus_one(nodes)), r);
     return result;
 }
 

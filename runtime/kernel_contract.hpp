@@ -72,6 +72,13 @@ struct Formulas {
             K::slopes(k, time, rest...);
     }
     template <class Given, class Time, class... Rest>
+    static void stage(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::stage(k, rest...);
+        else
+            K::stage(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
     static void legendre(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::legendre(k, rest...);

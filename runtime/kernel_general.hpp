@@ -25,6 +25,7 @@
 #include <type_traits>
 
 #include "kernel_contract.hpp"
+#include "kernel_galerkin.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_solve.hpp"
 
@@ -130,11 +131,21 @@ struct Stepper<K, Form::general> : Motion<K> {
         real H[entry_room];
     };
 
-    real p[n]{};         // momentum
-    real q_before[n]{};  // before the last step
-    bool has_history{};  // Y is that of the last step
-    real Y[room]{};      // displacements at the control points, then kappa, in the order of the solver
-    real cyclic_rates[r * cyclic_room]{};                                  // -g_P at the nodes
+    // Sweeps need the mass matrix of a node alone, which is full for them.
+    static constexpr bool is_swept = K::any_number && !K::linear && N > 0 && n <= 16;
+    struct Swept {
+        GalerkinSweeps<K, real> sweeps;
+        std::int32_t pause{};   // steps that are left to Newton's iteration
+        std::int32_t pauses{};  // how many, the next time that sweeps fail
+    };
+
+    real p[n]{};                // momentum
+    real q_before[n]{};         // before the last step
+    bool has_history{};         // there is a last step
+    mutable bool is_current{};  // what follows is of the last step; else the sweeps' memory is
+    mutable real Y[room]{};     // displacements at the control points, then kappa, in the order of the solver
+    mutable real cyclic_rates[r * cyclic_room]{};  // -g_P at the nodes
+    std::conditional_t<is_swept, Swept, Nothing> swept{};
     std::conditional_t<(cyclic > 0), real[m * m], Nothing> integration{};  // inverse of D at the first m nodes
     std::conditional_t<K::linear, Frozen, Nothing> frozen{};
     Workspace<Arrays> workspace;
@@ -154,6 +165,7 @@ struct Stepper<K, Form::general> : Motion<K> {
                 }
             lobatto::solve<m, m>(D, integration);
         }
+        if constexpr (is_swept) swept.sweeps.prepare(h);
         if constexpr (K::linear) return freeze(frozen);
         return Status::ok;
     }
@@ -169,6 +181,8 @@ struct Stepper<K, Form::general> : Motion<K> {
         if (!is_finite(time + not_finite_part(q, n) + not_finite_part(p, n))) return Status::not_finite;
         real v[n];
         const Status status = velocity(time, q, p, v);
+        is_current = true;
+        if constexpr (is_swept) begin_sweeps(swept, v);
         if constexpr (K::events > 0) {
             if (status == Status::ok) Formulas<K>::event(coefficients, time, q, v, this->event_values);
         }
@@ -181,6 +195,9 @@ struct Stepper<K, Form::general> : Motion<K> {
 
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
+        if constexpr (is_swept) {
+            if (sweep(swept)) return Status::ok;
+        }
         return workspace.with([this](Arrays& arrays) { return step_in(arrays); });
     }
 
@@ -188,6 +205,7 @@ struct Stepper<K, Form::general> : Motion<K> {
     void polynomial(real theta, real* position, real* velocity) const {
         real value[m + 1], slope[m + 1];
         lagrange<m + 1>(K::control, theta, value, slope);
+        refresh();
         for (int a = 0; a < active; ++a) {
             const int k = K::active_index[a];
             real moved = real(0), rate = real(0);
@@ -305,6 +323,7 @@ struct Stepper<K, Form::general> : Motion<K> {
                 q1[k] = local.q[k];
                 p1[k] = local.p[k];
             }
+            local.refresh();
             return workspace.with([&](Arrays& a) {
                 evaluate_nodes(time, position, momentum, local.Y, a);
                 a.matrix.clear();
@@ -325,7 +344,71 @@ struct Stepper<K, Form::general> : Motion<K> {
         }
     }
 
+    // Velocity of coordinate c at node i of the last step.
+    real node_velocity(int c, int i) const {
+        refresh();
+        for (int j = 0; j < cyclic; ++j)
+            if (K::cyclic_index[j] == c) return cyclic_rates[i * cyclic + j];
+        real sum = real(0);
+        for (int b = 0; b < active; ++b)
+            if (K::active_index[b] == c)
+                for (int j = 0; j < m; ++j) sum += K::D[i * (m + 1) + j + 1] * Y[Layout::index(b, j)];
+        return sum / step_size;
+    }
+
 private:
+    // Y, kappa and the cyclic rates of a step that sweeps have taken.
+    void refresh() const {
+        if constexpr (is_swept) {
+            if (is_current || !has_history) return;
+            const auto& sweeps = swept.sweeps;
+            for (int b = 0; b < active; ++b)
+                for (int j = 0; j < m; ++j) Y[Layout::index(b, j)] = sweeps.displacement(K::active_index[b], j);
+            for (int c = 0; c < cyclic; ++c) {
+                if (kappas > 0) Y[active * m + c] = sweeps.kappa[K::cyclic_index[c]];
+                for (int i = 0; i < r; ++i) cyclic_rates[i * cyclic + c] = sweeps.v[K::cyclic_index[c] * r + i];
+            }
+            is_current = true;
+        }
+    }
+
+    template <class AnySwept>
+    void begin_sweeps(AnySwept& any, const real* v) {
+        any.pause = 0;
+        any.pauses = 1;
+        any.sweeps.begin(v);
+    }
+
+    // A step by sweeps; where they fail, all is made ready for Newton's iteration.
+    template <class AnySwept>
+    bool sweep(AnySwept& any) {
+        if (any.pause > 0 && --any.pause == 0) any.sweeps.recall([this](int c, int i) { return node_velocity(c, i); });
+        if (any.pause > 0) return false;
+        real q1[n], p1[n];
+        for (int k = 0; k < n; ++k) {
+            q1[k] = q[k];
+            p1[k] = p[k];
+        }
+        if (any.sweeps.step(coefficients, this->time(), +q1, +p1, true)) {
+            for (int k = 0; k < n; ++k) {
+                q_before[k] = q[k];
+                q[k] = q1[k];
+                p[k] = p1[k];
+            }
+            iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
+            increment = any.sweeps.increment;
+            any.pauses = 1;
+            is_current = false;
+            has_history = true;
+            ++this->steps;
+            return true;
+        }
+        refresh();
+        any.pause = any.pauses;
+        any.pauses = any.pauses < 64 ? 2 * any.pauses : 64;
+        return false;
+    }
+
     // Whether |p - dL/dv| is within a tolerance of what it is computed from.
     bool is_near(const MassArrays& a, const real* momentum, const real* v, real tolerance) const {
         real size[n];
@@ -563,6 +646,7 @@ private:
             p[k] = a.p1[k];
         }
         for (int i = 0; i < N; ++i) Y[i] = a.Y[i];
+        is_current = true;
         for (int i = 0; i < r; ++i)
             for (int c = 0; c < cyclic; ++c) cyclic_rates[i * cyclic + c] = -a.g[i * Z + 2 * active + c];
         has_history = true;

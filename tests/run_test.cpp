@@ -87,7 +87,7 @@ TEST_CASE("a run says how good it is and where its trajectory is") {
         "compiled in the cache)\n"
         "  steps                   2400, h = 0.05, to t = 120\n"
         "  time per step           \\S+ [nu]s\n"
-        "  Newton iterations       \\d\\.\\d\\d per step, at most \\d\n"
+        "  iterations              \\d\\.\\d\\d per step, at most \\d\n"
         "  energy error            \\S+ at most, relative \\S+\n"
         "  symplectic defect       \\S+\n"
         "  position error          \\S+ rad at most, against the exact elliptic solution\n"
@@ -125,7 +125,7 @@ TEST_CASE("a linear system needs no iteration and conserves its discrete energy"
     const Place place;
     const test::Finished done = place.run({oscillator, "--until", "50", "-o", place.file()});
     CHECK(done.exit_code == 0);
-    CHECK(contains(done.out, "  Newton iterations       none: the step is a linear map\n"));
+    CHECK(contains(done.out, "  iterations              none: the step is a linear map\n"));
     CHECK(contains(done.out, " at most, against the exact solution\n"));
     std::smatch found;
     REQUIRE(std::regex_search(done.out, found, std::regex("discrete energy error   relative (\\S+) at most\n")));
@@ -147,7 +147,7 @@ TEST_CASE("the command line replaces values of the scene, with one kernel for al
     CHECK(table.rows.size() == 9);
     CHECK(table.rows.front()[3] == doctest::Approx(0.25 * 4));  // H = m omega^2 (1 - cos(pi/2))
     const test::Finished explicit_one = place.run({pendulum, "-o", place.file(), "--points", "2", "--until", "1"});
-    CHECK(contains(explicit_one.out, "  Newton iterations       none: the step is explicit\n"));
+    CHECK(contains(explicit_one.out, "  iterations              none: the step is explicit\n"));
     CHECK(read_trajectory(place.file()).comments[2] == "method: Lobatto, 2 points, h = 0.05");
 }
 

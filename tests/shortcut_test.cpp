@@ -123,7 +123,7 @@ TEST_CASE("independent groups are solved by themselves, with fewer operations") 
     CHECK(emit(derive(joined)).header.find("lobatto::solve<4, 1>") != std::string::npos);
 }
 
-TEST_CASE("large independent groups are eliminated apart") {
+TEST_CASE("large independent groups are solved apart") {
     std::string lagrangian, coordinates = "[coordinates]\n";
     for (int k = 1; k <= 6; ++k) {
         const std::string x = "x" + std::to_string(k);
@@ -136,9 +136,7 @@ TEST_CASE("large independent groups are eliminated apart") {
     const Derivation derivation = derive(two);
     REQUIRE(derivation.structure.groups.size() == 2);
     CHECK(distance(motion(derivation, 100), motion(derive(two, true), 100)) < 1e-13);
-    const std::string text = emit(derivation).header;
-    CHECK(text.find("lobatto::solve<6, 1>(J_1, delta_1)") != std::string::npos);
-    CHECK(text.find("lobatto::solve<6, 1>(J_2, delta_2)") != std::string::npos);
+    CHECK(emit(derivation).header.find("group_first[3] = {0, 3, 6}") != std::string::npos);
 }
 
 TEST_CASE("cyclic coordinates leave the solve, their momenta stay to the last bit") {
@@ -229,9 +227,9 @@ TEST_CASE("emitted text grows linearly with the length of a chain") {
 TEST_CASE("formulas without time are not given it, and those with it are") {
     const std::string coordinates = "[coordinates]\nq = { position = 1, velocity = 0 }\n";
     const std::string still = header(scene("lagrangian = \"q'^2/2 + cos(q)\"\n" + coordinates + run));
-    CHECK(still.find("real time") == std::string::npos);
+    CHECK(still.find("number time") == std::string::npos);
     const Scene driven = scene("time = \"t\"\nlagrangian = \"q'^2/2 + (1 + sin(t)/5)*cos(q)\"\n" + coordinates + run);
-    CHECK(header(driven).find("real time") != std::string::npos);
+    CHECK(header(driven).find("number time") != std::string::npos);
     CHECK(distance(motion(derive(driven), 100), motion(derive(driven, true), 100)) < 1e-11);  // measured 3e-13
 }
 
@@ -244,7 +242,7 @@ TEST_CASE("constant parameters are folded: fewer fields, no more operations") {
     };
     const Derivation open = with("2"), folded = with("{ value = 2, constant = true }");
     CHECK(operations(folded) < operations(open));
-    CHECK(emit(folded).header.find("real m") == std::string::npos);
+    CHECK(emit(folded).header.find("number m") == std::string::npos);
     CHECK(distance(motion(open, 100), motion(folded, 100)) < 1e-14);
 }
 
@@ -257,8 +255,8 @@ TEST_CASE("a kernel with fewer outputs is shorter") {
                       least = text("energy = false\ntangent = false\n");
     CHECK(least.size() < plain.size());
     CHECK(plain.size() < all.size());
-    CHECK(plain.find("real energy(") != std::string::npos);
-    CHECK(least.find("real energy(") == std::string::npos);
+    CHECK(plain.find("number energy(") != std::string::npos);
+    CHECK(least.find("number energy(") == std::string::npos);
     CHECK(all.find("void event(") != std::string::npos);
     CHECK(plain.find("void event(") == std::string::npos);
 }
