@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "bench/kernels.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
@@ -18,10 +21,10 @@ namespace {
 
 std::vector<Method> methods_in_race(bool few) {
     std::vector<Method> methods;
-    for (int points = 3; points <= 12; ++points)
-        if (!few || points % 2 == 0) methods.push_back({Family::lobatto, points});
-    for (int stages = 2; stages <= 10; ++stages)
-        if (!few || stages == 6) methods.push_back({Family::gauss, stages});
+    for (const int points : {4, 5, 6, 7, 8, 9, 10, 12})
+        if (!few || points % 4 == 1) methods.push_back({Family::lobatto, points});
+    for (const int stages : {3, 4, 6, 8, 10})
+        if (!few || stages == 8) methods.push_back({Family::gauss, stages});
     return methods;
 }
 
@@ -33,10 +36,11 @@ long evaluations_of(const lobatto_kernel& kernel, const lobatto_advance& call) {
            (ends_apart ? static_cast<long>(call.steps_done) : 0);
 }
 
-Effort run_one(LoadedStepper<double>& stepper, std::int64_t steps, Trajectory& trajectory) {
+Effort run_one(LoadedStepper<double>& stepper, std::int64_t steps, double tolerance, Trajectory& trajectory) {
     if (stepper.start(0, trajectory.q, trajectory.p) != LOBATTO_OK) return {};
     lobatto_advance call{};
     call.steps = steps;
+    call.tolerance = tolerance;
     const lobatto_status status = stepper.advance(call);
     double time;
     stepper.state(time, trajectory.q, trajectory.p);
@@ -45,7 +49,8 @@ Effort run_one(LoadedStepper<double>& stepper, std::int64_t steps, Trajectory& t
 }
 
 // Side by side, `lanes` at a time; lanes left over in the last group stand still.
-Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std::vector<Trajectory>& trajectories) {
+Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, double tolerance,
+                 std::vector<Trajectory>& trajectories) {
     const std::size_t lanes = static_cast<std::size_t>(kernel.lanes), n = static_cast<std::size_t>(kernel.coordinates);
     const std::size_t alignment = static_cast<std::size_t>(kernel.ensemble_alignment);
     const std::size_t bytes = (static_cast<std::size_t>(kernel.ensemble_bytes) + alignment - 1) / alignment * alignment;
@@ -65,7 +70,7 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std
         kernel.ensemble_prepare(ensemble.get(), nullptr, &h, status.data());
         std::fill(status.begin() + static_cast<std::ptrdiff_t>(used), status.end(), LOBATTO_UNSUPPORTED);
         kernel.ensemble_start(ensemble.get(), &time, q.data(), p.data(), status.data());
-        kernel.ensemble_advance(ensemble.get(), steps, status.data(), steps_done.data(), iterations.data());
+        kernel.ensemble_advance(ensemble.get(), steps, tolerance, status.data(), steps_done.data(), iterations.data());
         kernel.ensemble_state(ensemble.get(), q.data(), p.data());
         for (std::size_t lane = 0; lane < used; ++lane) {
             Trajectory& end = trajectories[first + lane];
@@ -82,17 +87,23 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, std
     return all;
 }
 
-Contestant contestant_of(const Problem& problem, Method method, const Kernel& kernel) {
+// Where the iteration of a step ends, relative to the displacement in it; 0: at rounding.
+constexpr std::array tolerances = {0.0, 1e-12, 1e-9};
+
+Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
-    const auto run = [stepper, until = problem.until](double setting, std::vector<Trajectory>& trajectories) -> Effort {
+    const auto run = [stepper, tolerance, until = problem.until](double setting,
+                                                                 std::vector<Trajectory>& trajectories) -> Effort {
         const double h = until / setting;
         const auto steps = static_cast<std::int64_t>(setting);
         const lobatto_kernel& table = stepper->kernel().table();
-        if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, trajectories);
+        if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, tolerance, trajectories);
         if (stepper->prepare({}, h) != LOBATTO_OK) return {};
-        return one_by_one(trajectories, [&](Trajectory& trajectory) { return run_one(*stepper, steps, trajectory); });
+        return one_by_one(trajectories,
+                          [&](Trajectory& trajectory) { return run_one(*stepper, steps, tolerance, trajectory); });
     };
-    Contestant contestant{method.name(), method.order(), true, true, Ladder::steps, run};
+    const std::string name = method.name() + (tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
+    Contestant contestant{name, method.order(), true, true, Ladder::steps, run};
     contestant.cold_start = [&problem, method] { return cold_start_seconds(problem, method); };
     return contestant;
 }
@@ -105,7 +116,7 @@ KernelSource source_of(const Problem& problem, Method method) {
     return emit(derive(scene));
 }
 
-Contestants kernel_contestants(const Problem& problem, bool few) {
+Contestants kernel_contestants(const Problem& problem, bool few, bool side_by_side) {
     const std::vector<Method> methods = methods_in_race(few);
     std::vector<KernelSource> sources;
     for (const Method& method : methods) sources.push_back(source_of(problem, method));
@@ -114,12 +125,17 @@ Contestants kernel_contestants(const Problem& problem, bool few) {
     std::vector<std::future<void>> workers;
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
         workers.push_back(std::async(std::launch::async, [&] {
-            for (std::size_t j; (j = next++) < sources.size();) compile(translation_of(sources[j], Precision::double_));
+            for (std::size_t j; (j = next++) < sources.size();)
+                compile(translation_of(sources[j], Precision::double_, side_by_side));
         }));
     for (std::future<void>& worker : workers) worker.get();
     Contestants contestants;
-    for (std::size_t i = 0; i < methods.size(); ++i)
-        contestants.push_back(contestant_of(problem, methods[i], kernel_of(sources[i], Precision::double_)));
+    for (std::size_t i = 0; i < methods.size(); ++i) {
+        const Kernel kernel = side_by_side ? ensemble_kernel_of(sources[i], Precision::double_)
+                                           : kernel_of(sources[i], Precision::double_);
+        for (const double tolerance : tolerances)
+            contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel));
+    }
     return contestants;
 }
 

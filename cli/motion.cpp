@@ -49,6 +49,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
         request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps;
+    request.tolerance = scene.method.tolerance;
     request.every = scene.outputs.every;
     request.dense = scene.outputs.dense;
     const bool from_velocity = scene.start == Start::velocity;

@@ -238,6 +238,7 @@ void sweep(const SweepOptions& options) {
     request.from_velocities = scene.start == Start::velocity;
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps.count;
+    request.tolerance = scene.method.tolerance;
     request.every = options.overrides.every.value_or(0);
     request.threads = options.threads;
     refuse_too_much(grid, kernel, request);

@@ -14,6 +14,7 @@
 #include "generator/function_text.hpp"
 #include "generator/identifier.hpp"
 #include "generator/looped.hpp"
+#include "generator/optimise.hpp"
 #include "generator/pipeline.hpp"
 #include "generator/programs.hpp"
 
@@ -52,7 +53,7 @@ public:
         if (options_.precision == Precision::quadruple) text += "#define LOBATTO_USE_FLOAT128\n";
         text += options_.standalone_support.empty() ? "#include \"kernel.hpp\"\n" : options_.standalone_support;
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
-        text += shapes(d_, options_.precision, name, digest) + tables(d_, options_.precision) +
+        text += shapes(d_, options_.precision, name, digest) + costs() + tables(d_, options_.precision) +
                 (d_.structure.looped ? looped_.tables() : "") + parameters() + coefficients() + prepare(name);
         for (const Declaration& declaration : declarations(d_.structure.form)) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -96,6 +97,20 @@ private:
             now.total(), report.front().after.total(), now.additions, now.multiplications, now.divisions,
             now.functions);
         return text;
+    }
+
+    // Whether forces hold elementary functions: then second derivatives are worth more than evaluations.
+    std::string costs() const {
+        if (d_.structure.form != Form::separable) return "";
+        std::vector<Id> values;
+        for (const Program& program : p_.programs)
+            if (program.name == "acceleration" || program.name.ends_with("_slope"))
+                for (const Output& output : program.outputs) values.push_back(output.value);
+        const Operations operations = count(p_.graph, p_.graph.topological(values));
+        const bool is_costly = operations.functions + operations.divisions > 0;
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", is_costly),
+                           is_costly ? "forces hold functions or divisions: second derivatives save evaluations"
+                                     : "forces are sums of products: evaluated rather than carried");
     }
 
     std::string parameters() const {

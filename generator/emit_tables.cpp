@@ -170,8 +170,6 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int coordinates = {}", d.system.n), "n");
     line(text, fmt::format("int order = {}", d.quadrature.order()), "of accuracy in h");
     line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
-    line(text, fmt::format("real tolerance = {:.17g}", d.scene.method.tolerance),
-         "of the last increment of a step; 0: rounding");
     line(text, "bool any_number = true", "formulas of a state are templates on the type of its numbers");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");

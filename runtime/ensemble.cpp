@@ -47,7 +47,7 @@ public:
     virtual void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) = 0;
     virtual void start(double time, const std::vector<double>& q, const std::vector<double>& p,
                        std::int32_t* status) = 0;
-    virtual void advance(std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
+    virtual void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
                          std::int64_t* iterations) = 0;
     virtual void state(std::vector<double>& q, std::vector<double>& p) = 0;
     // Of (q, p), the start or the state just read; not numbers without one.
@@ -66,10 +66,11 @@ public:
         time_ = time;
         if (*status == LOBATTO_OK) *status = stepper_.start(time, q, p);
     }
-    void advance(std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
+    void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
                  std::int64_t* iterations) override {
         lobatto_advance call{};
         call.steps = steps;
+        call.tolerance = tolerance;
         *status = stepper_.advance(call);
         *steps_done = call.steps_done;
         *iterations = call.iterations;
@@ -100,9 +101,9 @@ public:
     void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override {
         kernel_->ensemble_start(memory_.get(), &time, q.data(), p.data(), status);
     }
-    void advance(std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
+    void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
                  std::int64_t* iterations) override {
-        kernel_->ensemble_advance(memory_.get(), steps, status, steps_done, iterations);
+        kernel_->ensemble_advance(memory_.get(), steps, tolerance, status, steps_done, iterations);
     }
     void state(std::vector<double>& q, std::vector<double>& p) override {
         kernel_->ensemble_state(memory_.get(), q.data(), p.data());
@@ -288,7 +289,7 @@ private:
 
     // To step number `next`; keeps what is to be kept there, and the last good state of a trajectory that fails.
     void advance(std::int64_t next, std::int64_t steps, std::vector<Ended>& ended) {
-        lanes_->advance(steps, status_.data(), steps_done_.data(), iterations_.data());
+        lanes_->advance(steps, request_.tolerance, status_.data(), steps_done_.data(), iterations_.data());
         const bool kept_here = next == request_.steps || (request_.every != 0 && next % request_.every == 0);
         bool reads = kept_here;
         for (std::size_t lane = 0; lane < ended.size(); ++lane) reads = reads || status_[lane] != ended[lane].status;

@@ -56,6 +56,7 @@ typedef struct lobatto_advance {
     int64_t capacity;     /* rows that fit, at least dense + 1; when full, `advance` returns early with LOBATTO_OK */
     void* events; /* room for events: rows of 2 + 2n reals, event number, t, q[n], p[n]; null: none are sought */
     int64_t event_capacity; /* rows that fit, at least events_of_step; when fewer are left, `advance` returns early */
+    double tolerance;       /* of increments, relative: where the iteration of a step may end; 0: rounding */
     int32_t dense;          /* rows between two steps before each record, equally spaced; needs record_every = 1 */
     /* out */
     int32_t status;           /* the same value that `advance` returns */
@@ -129,7 +130,7 @@ and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
     void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);
     void (*ensemble_start)(void* ensemble, const void* time, const void* q, const void* p, int32_t* status);
     /* steps_done and iterations: one a lane, of this call. A lane that fails keeps its last good state. */
-    void (*ensemble_advance)(void* ensemble, int64_t steps, int32_t* status, int64_t* steps_done, int64_t* iterations);
+    void (*ensemble_advance)(void* ensemble, int64_t steps, double tolerance, int32_t* status, int64_t* steps_done, int64_t* iterations);
     void (*ensemble_state)(const void* ensemble, void* q, void* p);
     void (*ensemble_energy)(const void* ensemble, void* energy); /* H, one a lane; null without energy */
 } lobatto_kernel;

@@ -119,6 +119,7 @@ struct Motion {
     real step_size{};                         // h
     real start_time{};
     std::int64_t steps{};             // since start: the time is start_time + steps * h
+    real tolerance{};                 // of increments, relative; the iteration of a step ends there, or at rounding
     real q[n]{};                      // position
     std::int32_t iterations{};        // of the last step
     real increment{};                 // last increment of the last step, relative to its displacement

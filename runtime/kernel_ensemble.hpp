@@ -7,8 +7,11 @@
 #define LOBATTO_KERNEL_ENSEMBLE_HPP
 
 #include <cstdint>
+#include <type_traits>
 
 #include "kernel_contract.hpp"
+#include "kernel_galerkin.hpp"
+#include "kernel_general.hpp"
 #include "kernel_linear.hpp"
 #include "kernel_pack.hpp"
 #include "kernel_separable.hpp"
@@ -21,11 +24,13 @@ template <class K, class T>
 inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int lane,
                              const typename K::Coefficients& one) {
     using real = typename K::real;
-    constexpr int size = sizeof(one) / sizeof(real);
-    static_assert(sizeof(all) == size * sizeof(T));
-    const real* const from = reinterpret_cast<const real*>(&one);
-    T* const to = reinterpret_cast<T*>(&all);
-    for (int i = 0; i < size; ++i) set_lane(to[i], lane, from[i]);
+    if constexpr (!std::is_empty_v<typename K::Coefficients>) {
+        constexpr int size = sizeof(one) / sizeof(real);
+        static_assert(sizeof(all) == size * sizeof(T));
+        const real* const from = reinterpret_cast<const real*>(&one);
+        T* const to = reinterpret_cast<T*>(&all);
+        for (int i = 0; i < size; ++i) set_lane(to[i], lane, from[i]);
+    }
 }
 
 // How the lanes of each form move by one step: start(q, p, lane), step(k, time, going), and the state of a lane.
@@ -40,6 +45,7 @@ struct Lanes<K, T, Form::linear_map> {
     T q[n], p[n], evaluations = T(real(0));
 
     void prepare(const Stepper<K>&, int) {}
+    void set_tolerance(real) {}
     void start(const Stepper<K>& single, const real* momentum, int lane) {
         for (int c = 0; c < n; ++c) {
             set_lane(q[c], lane, single.q[c]);
@@ -78,6 +84,7 @@ struct Lanes<K, T, Form::separable> {
     Sweeps<K, T> sweeps;
 
     void prepare(const Stepper<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
+    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
     void start(const Stepper<K>& single, const real*, int lane) {
         follow_state(single, lane);
         sweeps.begin(single.q, single.W + (K::points - 1) * n, lane);
@@ -112,9 +119,49 @@ private:
 // Lanes side by side: few coordinates leave registers for two packs at once, which hide each other's latency.
 template <class K>
 constexpr int ensemble_lanes() {
-    if (native_lanes<typename K::real> == 1 || !K::any_number || K::form == Form::general) return 0;
+    if (native_lanes<typename K::real> == 1 || !K::any_number) return 0;
+    if (K::form == Form::general && K::coordinates > most_full) return 0;
     return native_lanes<typename K::real> * (K::coordinates <= 4 ? 2 : 1);
 }
+
+template <class K, class T>
+struct Lanes<K, T, Form::general> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], p[n], evaluations = T(real(0));
+    GalerkinSweeps<K, T> sweeps;
+
+    void prepare(const Stepper<K>& single, int) { sweeps.prepare(single.step_size); }
+    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
+    void start(const Stepper<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        real velocity[n] = {};
+        single.velocity(single.time(), single.q, single.p, velocity);
+        sweeps.begin(velocity, lane);
+    }
+    void momentum(const Stepper<K>&, int lane, real* momentum) const {
+        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const Going moved = sweeps.step(k, time, q, p, going);
+        evaluations = sweeps.evaluations;
+        return moved;
+    }
+    void follow(const Stepper<K>& single, int lane) {
+        follow_state(single, lane);
+        sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
+    }
+
+private:
+    void follow_state(const Stepper<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, single.p[c]);
+        }
+    }
+};
 
 template <class K, int width>
 struct Ensemble {
@@ -154,7 +201,9 @@ struct Ensemble {
     }
 
     // At most `count` steps of the lanes whose status is ok; `done` and `iterations` of each.
-    void advance(std::int64_t count, Status* status, std::int64_t* done, std::int64_t* iterations) {
+    void advance(std::int64_t count, real tolerance, Status* status, std::int64_t* done, std::int64_t* iterations) {
+        motion.set_tolerance(tolerance);
+        single.tolerance = tolerance;
         Going going = Going(false);
         for (int lane = 0; lane < width; ++lane) {
             going.set(lane, status[lane] == Status::ok);

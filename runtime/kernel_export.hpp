@@ -56,10 +56,11 @@ struct ExportEnsemble {
             if constexpr (lanes > 0) static_cast<Side*>(ensemble)->start(*in(time), in(q), in(p), status);
         });
     }
-    static void go(void* ensemble, std::int64_t steps, std::int32_t* codes, std::int64_t* done,
+    static void go(void* ensemble, std::int64_t steps, double tolerance, std::int32_t* codes, std::int64_t* done,
                    std::int64_t* iterations) {
         with(codes, [&](Status* status) {
-            if constexpr (lanes > 0) static_cast<Side*>(ensemble)->advance(steps, status, done, iterations);
+            if constexpr (lanes > 0)
+                static_cast<Side*>(ensemble)->advance(steps, static_cast<real>(tolerance), status, done, iterations);
         });
     }
     static void read(const void* ensemble, void* q, void* p) {
@@ -115,6 +116,7 @@ struct Export {
     }
 
     static Status advance_in(S& stepper, lobatto_advance& call) {
+        stepper.tolerance = static_cast<real>(call.tolerance);
         std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
         for (std::int64_t i = 0; i < call.steps; ++i) {
             if (until_record == 1 && call.records_written + call.dense >= call.capacity) break;

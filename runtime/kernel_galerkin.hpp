@@ -21,15 +21,21 @@
 
 namespace lobatto {
 
+// The most coordinates whose mass matrix is treated as a full one.
+constexpr int most_full = 16;
+
 // M = L D L^T of a symmetric matrix, in place: L below the diagonal, 1/D on it. No pivoting: a mass matrix is positive
 // definite as a rule, and where it is not, what fails shows as not finite or not converging.
 template <int n, class V>
 LOBATTO_INLINE void factor_symmetric(V* M) {
+#pragma GCC unroll 8
     for (int k = 0; k < n; ++k) {
         V row[n];  // L_kj D_j
         V pivot = M[k * n + k];
+#pragma GCC unroll 8
         for (int j = 0; j < k; ++j) {
             row[j] = M[k * n + j];
+#pragma GCC unroll 8
             for (int l = 0; l < j; ++l) row[j] = fused(-row[l], M[j * n + l], row[j]);
             M[k * n + j] = row[j] * M[j * n + j];
             pivot = fused(-row[j], M[k * n + j], pivot);
@@ -39,10 +45,13 @@ LOBATTO_INLINE void factor_symmetric(V* M) {
 }
 template <int n, class V>
 LOBATTO_INLINE void solve_symmetric(const V* M, V* x) {
+#pragma GCC unroll 8
     for (int k = 1; k < n; ++k)
+#pragma GCC unroll 8
         for (int j = 0; j < k; ++j) x[k] = fused(-M[k * n + j], x[j], x[k]);
     for (int k = n - 1; k >= 0; --k) {
         x[k] *= M[k * n + k];
+#pragma GCC unroll 8
         for (int j = k + 1; j < n; ++j) x[k] = fused(-M[j * n + k], x[j], x[k]);
     }
 }
@@ -73,6 +82,7 @@ struct GalerkinSweeps {
     V weight[parts], legendre[parts];                  // h b and pi; zero in lanes to spare
     V ahead[r][parts], node_time[parts];
     real h{};
+    real tolerance{};  // of increments, relative; 0: to rounding
     bool has_history{};
     T v[n * r];     // velocities at the nodes of the last step
     T kappa[n];     // of the last step
@@ -100,6 +110,7 @@ struct GalerkinSweeps {
     // Begins with this velocity.
     void begin(const real* velocity, int lane = 0) {
         has_history = false;
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity[c]);
             set_lane(kappa[c], lane, real(0));
@@ -122,6 +133,7 @@ struct GalerkinSweeps {
     template <class Velocity>
     void recall(const Velocity& velocity, int lane = 0) {
         has_history = true;
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c)
             for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity(c, i));
     }
@@ -158,15 +170,18 @@ private:
     Going step_in(const Given& k, real time, T* q, T* p, Going going, Arrays& a) {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
         T rounding = T(real(0)), kappa_now[n];
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             T* const flat = a.flat + c * parts * width;
             V fastest = V(real(0));
+#pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
                 V& v_part = a.v[part * n + c];
                 v_part = sum_of(V(real(0)), ahead, part, v + c * r);
                 lay_flat<1>(&v_part, 1, flat + part * width);
                 fastest = maximum(fastest, fabs(v_part));
             }
+#pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) a.Q[part * n + c] = sum_of(V(q[c]), position_map, part, flat);
             T speed;
             if constexpr (in_lanes)
@@ -178,17 +193,17 @@ private:
             rounding = maximum(rounding, select(scale > T(Limits<real>::smallest), fabs(q[c]) / scale, T(real(0))));
             kappa_now[c] = kappa[c];
         }
-        const T tolerance = maximum(T(K::tolerance), T(Limits<real>::epsilon) * (rounding + T(real(1))));
+        const T small = maximum(T(tolerance), T(Limits<real>::epsilon) * (rounding + T(real(1))));
         Going solved = going & !going;
         T e_before = T(Limits<real>::largest);
         evaluations = T(real(0));
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
             evaluations = select(going, evaluations + T(real(1)), evaluations);
             const T e = sweep(k, time, q, p, kappa_now, going, a);
-            if (evaluation > 4) going = going & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * tolerance));
+            if (evaluation > 4) going = going & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * small));
             // Or no longer shrinking: the rounding of what it is computed from.
-            const Going done = going & ((e <= T(real(2)) * tolerance) |
-                                        ((e <= T(real(64)) * tolerance) & (e >= T(real(0.5)) * e_before)));
+            const Going done =
+                going & ((e <= T(real(2)) * small) | ((e <= T(real(64)) * small) & (e >= T(real(0.5)) * e_before)));
             if (any(done)) {
                 increment = select(done, e, increment);
                 solved = solved | finish(q, p, kappa_now, done, a);
@@ -204,19 +219,23 @@ private:
     // One sweep; the largest change of a velocity, relative.
     template <class Given>
     LOBATTO_INLINE T sweep(const Given& k, real time, const T* q, const T* p, T* kappa_now, Going going, Arrays& a) {
+#pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V packed[entries];
             V* const M = a.M + part * n * n;
             Formulas<K>::stage(k, V(time) + node_time[part], static_cast<const V*>(a.Q + part * n),
                                static_cast<const V*>(a.v + part * n), a.Lv + part * n, a.F + part * n, +packed);
+#pragma GCC unroll 8
             for (int i = 0; i < n * n; ++i) M[i] = V(real(0));
             for (int e = 0; e < entries; ++e) M[K::mass_row[e] * n + K::mass_column[e]] = packed[e];
             factor_symmetric<n>(M);
         }
         // P - L_v
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             T* const flat = a.flat + c * parts * width;
             lay_flat<parts>(a.F + c, n, flat);
+#pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
                 V& residual = a.Lv[part * n + c];
                 V target = sum_of(V(p[c]) - residual, momentum_map, part, flat);
@@ -224,21 +243,26 @@ private:
                 residual = target;
             }
         }
+#pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V* const x = a.Lv + part * n;
             solve_symmetric<n>(a.M + part * n * n, x);
+#pragma GCC unroll 8
             for (int c = 0; c < n; ++c) x[c] += a.v[part * n + c];  // the new velocities
         }
         if constexpr (has_kappa()) correct(kappa_now, a);
         V worst = V(real(0));
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             T* const flat = a.flat_v + c * parts * width;
+#pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
                 V &next = a.Lv[part * n + c], &now = a.v[part * n + c];
                 worst = maximum(worst, fabs(next - now) * V(a.inverse_scale[c]));
                 now = next;
                 lay_flat<1>(&now, 1, flat + part * width);
             }
+#pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) a.Q[part * n + c] = sum_of(V(q[c]), position_map, part, flat);
         }
         (void)going;
@@ -251,31 +275,42 @@ private:
     // kappa <- kappa + d, V <- V + M^-1 pi d with sum b pi V = 0.
     LOBATTO_INLINE void correct(T* kappa_now, Arrays& a) {
         V weighted[parts];  // h b pi
+#pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
         T S[n * n], d[n];
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) d[c] = -over_nodes(weighted, a.Lv + c, n);
-        // S = sum h b pi^2 M^-1, column by column.
+            // S = sum h b pi^2 M^-1, column by column.
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             V columns[parts * n];
+#pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
+#pragma GCC unroll 8
                 for (int i = 0; i < n; ++i) columns[part * n + i] = i == c ? legendre[part] : V(real(0));
                 solve_symmetric<n>(a.M + part * n * n, columns + part * n);
             }
+#pragma GCC unroll 8
             for (int i = c; i < n; ++i) S[i * n + c] = over_nodes(weighted, columns + i, n);
         }
         factor_symmetric<n>(S);
         solve_symmetric<n>(S, d);
+#pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V x[n];
+#pragma GCC unroll 8
             for (int c = 0; c < n; ++c) x[c] = legendre[part] * V(d[c]);
             solve_symmetric<n>(a.M + part * n * n, x);
+#pragma GCC unroll 8
             for (int c = 0; c < n; ++c) a.Lv[part * n + c] += x[c];
         }
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
     }
 
     Going finish(T* q, T* p, const T* kappa_now, Going done, Arrays& a) {
         T q1[n], p1[n], not_finite = T(real(0));
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             q1[c] = q[c] + over_nodes(weight, a.v + c, n);
             p1[c] = p[c] + over_nodes(weight, a.F + c, n);
@@ -283,6 +318,7 @@ private:
         }
         done = done & (not_finite == T(real(0)));
         if (!any(done)) return done;
+#pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             const T* const flat = a.flat_v + c * parts * width;
             for (int i = 0; i < r; ++i) v[c * r + i] = select(done, flat[i], v[c * r + i]);

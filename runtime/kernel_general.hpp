@@ -132,7 +132,7 @@ struct Stepper<K, Form::general> : Motion<K> {
     };
 
     // Sweeps need the mass matrix of a node alone, which is full for them.
-    static constexpr bool is_swept = K::any_number && !K::linear && N > 0 && n <= 16;
+    static constexpr bool is_swept = K::any_number && !K::linear && N > 0 && n <= most_full;
     struct Swept {
         GalerkinSweeps<K, real> sweeps;
         std::int32_t pause{};   // steps that are left to Newton's iteration
@@ -389,6 +389,7 @@ private:
             q1[k] = q[k];
             p1[k] = p[k];
         }
+        any.sweeps.tolerance = this->tolerance;
         if (any.sweeps.step(coefficients, this->time(), +q1, +p1, true)) {
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];

@@ -404,6 +404,7 @@ private:
                 q1[k] = q[k];
                 u1[k] = u[k];
             }
+            any.sweeps.tolerance = this->tolerance;
             if (any.sweeps.step(coefficients, this->time(), q1, u1, true)) {
                 for (int k = 0; k < n; ++k) {
                     q_before[k] = q[k];

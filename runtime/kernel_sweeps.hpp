@@ -105,6 +105,7 @@ struct Sweeps {
     V weight[parts], arrival[parts];  // -h b and -h^2 b (1 - c), for a trajectory's Packs; zero in lanes to spare
     std::conditional_t<absorbs, T[n], Unit> diagonal{};
     real h{};
+    real tolerance{};       // of increments, relative; 0: to rounding
     real twentieth_norm{};  // h^2 |A| / 20
     Going usable{};
     bool has_history{};
@@ -286,7 +287,11 @@ private:
     template <class Given>
     LOBATTO_INLINE void evaluate(const Given& k, real time, Arrays& a) const {
         for (int p = 0; p < parts; ++p)
-            Formulas<K>::node(k, V(time) + node_time[p], a.X + p * n, a.W + p * n, a.S + p * entries);
+            if constexpr (K::costly)
+                Formulas<K>::node(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n,
+                                  a.S + p * entries);
+            else
+                Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
     }
 
     // A twentieth of h^2 |A| |S - D|, largest row sums. Sweeps contract by more than the norm says, but the first ratio
@@ -320,8 +325,7 @@ private:
             const T W0 = w[c * s + s - 1];
             a.rate[c] = fused(T(-h * K::b[0]), W0, u[c]);
             const T scale = fabs(T(h) * a.rate[c]) + fabs(T(h) * (T(h) * W0)) + T(floor) * fabs(q[c]);
-            a.inverse_scale[c] =
-                select(scale > T(Limits<real>::smallest), T(real(1)) / scale, T(Limits<real>::largest));
+            a.inverse_scale[c] = T(real(1)) / maximum(scale, T(Limits<real>::smallest));
             rounding = maximum(rounding, fabs(q[c]) * a.inverse_scale[c]);
         }
         for (int c = 0; c < n; ++c)
@@ -341,23 +345,36 @@ private:
             evaluations = T(real(0));
             return going;
         }
-        const T tolerance = maximum(T(K::tolerance), T(Limits<real>::epsilon) * (rounding + T(real(1))));
-        const T linear = maximum(T(Limits<real>::root_epsilon), T(sqrt(K::tolerance)));  // where e^2 is no matter
+        const T small = maximum(T(tolerance), T(Limits<real>::epsilon) * (rounding + T(real(1))));
+        [[maybe_unused]] const T linear =
+            maximum(T(Limits<real>::root_epsilon), T(sqrt(tolerance)));  // where e^2 is no matter
         Going solved = going & !going;
         going = going & usable;
-        T e_before = T(Limits<real>::largest), least = T(real(0));
+        T e_before = T(K::costly ? Limits<real>::largest : real(0));
+        [[maybe_unused]] T least = T(real(0));
         evaluations = T(real(0));
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
             evaluate(k, time, a);
             evaluations = select(going, evaluations + T(real(1)), evaluations);
             const T e = sweep<false>(going, a);
-            if (evaluation == 1) least = least_rate(a);
-            if (evaluation > 3) going = going & (e < T(real(0.8)) * e_before);
-            const Going ready = going & (e <= linear);
-            if (any(ready)) {
-                const Going good = carry(ready, e, e_before, least, tolerance, a);
-                solved = solved | good;
-                going = going & !ready;
+            if (evaluation > 3) going = going & ((e < T(real(0.8)) * e_before) | (e <= T(real(16)) * small));
+            if constexpr (K::costly) {
+                if (evaluation == 1) least = least_rate(a);
+                const Going ready = going & (e <= linear);
+                if (any(ready)) {
+                    solved = solved | carry(ready, e, e_before, least, small, a);
+                    going = going & !ready;
+                }
+            } else {
+                // What is left, e times its ratio to the one before, is rounding; or it no longer shrinks.
+                const Going ready = going & ((e * e <= small * e_before) | (e <= small) |
+                                             ((e <= T(real(16)) * small) & (e >= T(real(0.5)) * e_before)));
+                if (any(ready)) {
+                    settle(k, time, ready, a);
+                    increment = select(ready, e, increment);
+                    solved = solved | ready;
+                    going = going & !ready;
+                }
             }
             if (!any(going)) break;
             for (int i = 0; i < parts * n; ++i) a.X[i] = a.Y[i];
@@ -366,16 +383,30 @@ private:
         return solved;
     }
 
+    // W at the nodes Y of the lanes that are ready.
+    template <class Given>
+    LOBATTO_INLINE void settle(const Given& k, real time, Going ready, Arrays& a) const {
+        for (int p = 0; p < parts; ++p) {
+            Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.Y + p * n), a.W + p * n);
+            for (int c = 0; c < n; ++c) {
+                if constexpr (in_lanes)
+                    a.carried[p * n + c] = a.W[p * n + c];
+                else
+                    a.carried[p * n + c] = select(ready, a.W[p * n + c], a.carried[p * n + c]);
+            }
+        }
+    }
+
     // Sweeps with W + S (Y - X) in place of W(Y), until what is left of an increment, e times its ratio to the one
     // before, is rounding; then that is what W is at the nodes.
-    LOBATTO_INLINE Going carry(Going ready, T e, T e_before, T least, T tolerance, Arrays& a) {
-        Going still = ready & !((e * e <= tolerance * e_before) & (e * least <= tolerance));
+    LOBATTO_INLINE Going carry(Going ready, T e, T e_before, T least, T small, Arrays& a) {
+        Going still = ready & !((e * e <= small * e_before) & (e * least <= small));
         for (int i = 0; i < carried_limit && any(still); ++i) {
             const T next = sweep<true>(still, a);
             const Going stands =
                 still & (next >= T(real(0.5)) * e) & (next > T(real(0)));  // rounding, or no convergence
-            ready = ready & !(stands & (next > T(real(64)) * tolerance));
-            still = still & !stands & !((next * next <= tolerance * e) & (next * least <= tolerance));
+            ready = ready & !(stands & (next > T(real(64)) * small));
+            still = still & !stands & !((next * next <= small * e) & (next * least <= small));
             e = select(ready, next, e);
         }
         increment = select(ready, e, increment);

@@ -118,6 +118,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         if (result.interrupted) break;
 
         lobatto_advance call{};
+        call.tolerance = request.tolerance;
         call.steps = std::min(block, request.steps - result.steps_done);
         call.record_every = request.every;
         call.records = records.data();

@@ -33,6 +33,7 @@ struct TrajectoryRequest {
     std::vector<double> q, p;        // n each
     double time = 0;
     double step = 0;         // h; may be negative
+    double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
     std::int64_t steps = 0;  // >= 0
     std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
     int dense = 0;           // states between two steps, on the step's polynomial; above 0 needs every = 1

@@ -38,7 +38,7 @@ void start(void* ensemble, const void* time, const void* q, const void* p, int32
     for (int l = 0; l < 4; ++l)
         if (status[l] == LOBATTO_OK) status[l] = E::start(lane(ensemble, l), time, at(q, l), at(p, l));
 }
-void advance(void* ensemble, int64_t steps, int32_t* status, int64_t* steps_done, int64_t* iterations) {
+void advance(void* ensemble, int64_t steps, double, int32_t* status, int64_t* steps_done, int64_t* iterations) {
     if (steps < 1) static_cast<Ensemble*>(ensemble)->misused = true;
     for (int l = 0; l < 4; ++l) {
         lobatto_advance call{};

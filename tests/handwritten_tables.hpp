@@ -139,8 +139,7 @@ using SeparableGaussTwo = StaticSeparableTables<number, separable_gauss_values<n
 struct HandwrittenKernel {
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr const char* method = "by hand";
-    static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false;
-    static constexpr double tolerance = 0;
+    static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false, costly = true;
     static constexpr int events = 0;
 };
 
