@@ -208,12 +208,103 @@ TEST_CASE("a lane whose sweeps cannot contract is led on by Newton's iteration, 
             start = {{2, index == 3 ? omega : 1 + 0.01 * static_cast<double>(index)}, {1}, {0.25}};
         };
     };
-    const auto calm = together(kernel, wide, 9, 20, starts(1)), stiff = together(kernel, wide, 9, 20, starts(5.8));
+    const auto calm = together(kernel, wide, 9, 20, starts(1)), stiff = together(kernel, wide, 9, 20, starts(6.5));
     for (std::size_t i = 0; i < 9; ++i)
         if (i != 3) CHECK(stiff[i] == calm[i]);
     CHECK(stiff[3].status == LOBATTO_OK);
     CHECK(stiff[3].steps_done == 20);
-    EnsembleStart start;
-    starts(5.8)(3, start);
-    CHECK(distance(stiff[3].last, alone(kernel, wide, 20, start)) < 1000);  // 93
+    EnsembleStart first;
+    starts(6.5)(3, first);  // its first step is Newton's, to the bit
+    const Kernel newton = newton_kernel(derivation_of(pendulum, "points = 4"), Precision::double_);
+    CHECK(together(kernel, wide, 9, 1, starts(6.5))[3].last == alone(newton, wide, 1, first));
+    CHECK(together(kernel, wide, 9, 1, starts(1))[3].last != alone(newton, wide, 1, first));
+    CHECK(distance(stiff[3].last, alone(kernel, wide, 20, first)) < 1000);  // 93
+}
+
+namespace {
+
+// Sixteen trajectories of 50 steps in lanes of four widths; the bits of each.
+const char* const widths_program = R"(
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include "kernel.hpp"
+#include "motion.hpp"
+using namespace lobatto;
+using K = kernels::motion;
+template <int width> void print() {
+    const auto lanes = std::make_unique<Ensemble<K, width>>();
+    for (int first = 0; first < 16; first += width) {
+        double parameters[2 * width], q[width], p[width];
+        Status status[width];
+        std::int64_t done[width], iterations[width];
+        for (int l = 0; l < width; ++l) {
+            parameters[2 * l] = 1 + 0.125 * (first + l);
+            parameters[2 * l + 1] = first + l == 11 ? 14 : 1 + 0.0625 * (first + l);  // 11: beyond what sweeps solve
+            q[l] = first + l == 5 ? 0.0 / 0.0 : 0.25 * (first + l) - 2;
+            p[l] = 0.5;
+        }
+        lanes->prepare(parameters, 0.2, status);
+        lanes->start(0, q, p, status);
+        lanes->advance(50, 0, status, done, iterations);
+        lanes->state(q, p);
+        for (int l = 0; l < width; ++l) {
+            unsigned long long bits[2];
+            std::memcpy(bits, q + l, 8);
+            std::memcpy(bits + 1, p + l, 8);
+            if (first + l == 5) bits[0] = bits[1] = 0;
+            std::printf("%d:%d:%lld:%llx:%llx ", first + l, static_cast<int>(status[l]), static_cast<long long>(done[l]),
+                        bits[0], bits[1]);
+        }
+    }
+    std::printf("\n");
+}
+int main() {
+    print<2>();
+    print<4>();
+    print<8>();
+    print<16>();
+}
+)";
+
+}  // namespace
+
+TEST_CASE("lanes give the same bits in any width, on every instruction set, from every compiler") {
+    const TemporaryFolder folder;
+    const KernelSource source = emit(derivation_of(pendulum, "points = 4"));
+    write_text(folder / "motion.hpp", source.header);
+    write_text(folder / "widths.cpp", widths_program);
+    const auto compiled = [&](const std::string& compiler, const std::string& target) {
+        const Finished built = run({compiler, "-std=c++17", "-O1", "-ffp-contract=off", "-march=" + target, "-I",
+                                    LOBATTO_SOURCE_DIR "/runtime", folder / "widths.cpp", "-o", folder / "widths"});
+        INFO(built.err);
+        REQUIRE(built.exit_code == 0);
+    };
+    const auto output = [&](const std::string& compiler, const std::string& target) {
+        compiled(compiler, target);
+        return run({(folder / "widths").string()}).out;
+    };
+    const auto check_widths = [](const std::string& text) {
+        const std::size_t length = text.find('\n') + 1;
+        REQUIRE(length > 16 * 30);
+        REQUIRE(text.size() == 4 * length);
+        for (std::size_t line = 1; line < 4; ++line)
+            CHECK(text.substr(line * length, length) == text.substr(0, length));
+        CHECK(text.find(" 4:0:50:") != std::string::npos);
+        CHECK(text.find(" 5:2:0:0:0 ") != std::string::npos);  // not finite
+    };
+    const std::string plain = output("g++", "x86-64");
+    check_widths(plain);
+    const bool has_clang = run({"clang++", "--version"}).exit_code == 0;
+    if (has_clang) CHECK(output("clang++", "x86-64") == plain);
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        const std::string fused = output("g++", "haswell");
+        check_widths(fused);
+        CHECK(fused != plain);  // fused operations round once
+        if (has_clang) CHECK(output("clang++", "haswell") == fused);
+    }
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+        check_widths(output("g++", "x86-64-v4"));
+    else
+        compiled("g++", "x86-64-v4");
 }
