@@ -44,6 +44,14 @@ inline const Motion double_pendulum{
     {0.5, 0.75},
     {0, 0.25},
     0.1};
+// Its longitude f is cyclic: with Lobatto's nodes the conserved momentum has a multiplier (D29).
+inline const Motion spherical_pendulum{
+    "lagrangian = \"l^2*(a'^2 + sin(a)^2*f'^2)/2 + cos(a)\"\n[coordinates]\na = { position = 1, velocity = 0.25 }\n"
+    "f = { position = 0, velocity = 0.5 }\n[parameters]\nl = 1\n",
+    {1},
+    {1, 0},
+    {0.25, 0.5},
+    0.1};
 inline const Motion driven_pendulum{
     "time = \"t\"\nlagrangian = \"q'^2/2 + cos(q) + a*q*cos(w*t)\"\n[coordinates]\nq = { position = 0.5, velocity = 0 "
     "}\n"

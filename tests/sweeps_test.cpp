@@ -162,18 +162,21 @@ TEST_CASE("steps by sweeps are those of Newton's iteration, in double") {
         double bound;
     };
     const Motion twelve = chain();
-    for (const Compared& c : {Compared{pendulum, lobatto_4, 800},          // 102
-                              Compared{pendulum, "points = 5", 800},       // 127
-                              Compared{pendulum, lobatto_9, 400},          // 27
-                              Compared{pendulum, gauss_3, 400},            // 57
-                              Compared{henon_heiles, lobatto_4, 200},      // 11; its diagonal part is absorbed
-                              Compared{henon_heiles, lobatto_9, 400},      // 36
-                              Compared{kepler, "points = 5", 800},         // 97
-                              Compared{double_pendulum, lobatto_4, 1500},  // 174
-                              Compared{double_pendulum, lobatto_8, 1500},  // 142
-                              Compared{double_pendulum, gauss_4, 1500},    // 100
-                              Compared{driven_pendulum, lobatto_4, 200},   // 21
-                              Compared{twelve, lobatto_4, 800}}) {         // 90
+    for (const Compared& c :
+         {Compared{pendulum, lobatto_4, 800},             // 102
+          Compared{pendulum, "points = 5", 800},          // 127
+          Compared{pendulum, lobatto_9, 400},             // 27
+          Compared{pendulum, gauss_3, 400},               // 57
+          Compared{henon_heiles, lobatto_4, 200},         // 11; its diagonal part is absorbed
+          Compared{henon_heiles, lobatto_9, 400},         // 36
+          Compared{kepler, "points = 5", 800},            // 97
+          Compared{double_pendulum, lobatto_4, 1500},     // 174
+          Compared{double_pendulum, lobatto_8, 1500},     // 142
+          Compared{double_pendulum, gauss_4, 1500},       // 100
+          Compared{spherical_pendulum, lobatto_4, 4000},  // 546; against long double 37 by sweeps, 509 by Newton
+          Compared{spherical_pendulum, gauss_3, 500},     // 53
+          Compared{driven_pendulum, lobatto_4, 200},      // 21
+          Compared{twelve, lobatto_4, 800}}) {            // 90
         INFO(c.motion.body << c.method);
         CHECK(compared<double>(c.motion, c.method, Precision::double_, 200) < c.bound);
     }
@@ -252,8 +255,8 @@ TEST_CASE("dense output, events and the tangent map after steps by sweeps are th
     struct Seen {
         std::vector<double> between, events, tangent;
     };
-    for (const Watched& watched :
-         {Watched{pendulum, "q = 0"}, Watched{henon_heiles, "x = y"}, Watched{double_pendulum, "a = b"}}) {
+    for (const Watched& watched : {Watched{pendulum, "q = 0"}, Watched{henon_heiles, "x = y"},
+                                   Watched{double_pendulum, "a = b"}, Watched{spherical_pendulum, "a = 0.8"}}) {
         const Derivation derivation = derivation_of(watched.motion, lobatto_4, "events = [\"" + watched.event + "\"]");
         const std::size_t n = watched.motion.q.size(), columns = 2 + 2 * n, room = 100;
         const auto look = [&](const Kernel& kernel) {
@@ -284,9 +287,8 @@ TEST_CASE("dense output, events and the tangent map after steps by sweeps are th
         const Seen swept = look(kernel_in_own_cache(derivation, Precision::double_)),
                    newton = look(newton_kernel(derivation, Precision::double_));
         INFO(watched.motion.body);
-        CHECK(distance(swept.events, newton.events) < 30);     // 1.1, 0.5, 2.1 epsilon
-        CHECK(distance(swept.between, newton.between) < 150);  // 10.8, 6.1, 6.9
-        CHECK(distance(swept.tangent, newton.tangent) < 30);   // 1.0, 0.2, 0.5
-        CHECK(distance(swept.tangent, newton.tangent) >= 0);   // numbers
+        CHECK(distance(swept.events, newton.events) < 400);    // 1.1, 0.5, 2.1, 50 epsilon
+        CHECK(distance(swept.between, newton.between) < 400);  // 10.8, 6.1, 6.9, 43
+        CHECK(distance(swept.tangent, newton.tangent) < 300);  // 1.0, 0.2, 0.5, 33
     }
 }
