@@ -80,7 +80,8 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
     REQUIRE(a.size() == b.size());
     double most = 0, size = 0;
     for (std::size_t i = 1; i < a.size(); ++i) {
-        if (!(std::fabs(a[i] - b[i]) <= most)) most = std::fabs(a[i] - b[i]);
+        if (std::isnan(a[i] - b[i])) return HUGE_VAL;
+        most = std::fmax(most, std::fabs(a[i] - b[i]));
         size = std::fmax(size, std::fabs(b[i]));
     }
     return most / size / 2.220446049250313e-16;

@@ -57,7 +57,8 @@ double distance(const std::vector<real>& a, const std::vector<real>& b) {
     real most = 0, size = 0;
     for (std::size_t i = 0; i < a.size(); ++i) {
         const real d = std::fabs(a[i] - b[i]);
-        if (!(d <= most)) most = d;
+        if (std::isnan(d)) return std::numeric_limits<double>::infinity();
+        most = std::fmax(most, d);
         size = std::fmax(size, std::fabs(b[i]));
     }
     return static_cast<double>(most / size / std::numeric_limits<real>::epsilon());
