@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/method_option.hpp"
 
+#include <cstdlib>
+#include <string>
+
 namespace lobatto {
 
 void MethodOption::add_to(CLI::App& command) {
@@ -9,7 +12,13 @@ void MethodOption::add_to(CLI::App& command) {
     lobatto->check(CLI::Range(2, 12));
     gauss->check(CLI::Range(1, 10))->excludes(lobatto);
     command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
-        ->check(CLI::Range(1e-300, 1e-3));
+        ->check([](const std::string& text) {
+            const double value = std::strtod(text.c_str(), nullptr);
+            return value > 0 && value <= 1e-3 ? ""
+                                              : "the tolerance is " + text +
+                                                    "; it must be above 0 and at most 0.001; leave it out to iterate "
+                                                    "to rounding";
+        });
 }
 
 void MethodOption::apply(Scene& scene) const {

@@ -121,6 +121,33 @@ TEST_CASE("the trajectory file follows the exact solution and names its columns"
     CHECK(largest < 1e-7);
 }
 
+TEST_CASE("--tolerance takes the place of the scene's, and a loose one costs digits and saves evaluations") {
+    const Place place;
+    const auto energy_error = [](const Place& in, const std::string& name) {
+        const TrajectoryTable table = read_trajectory(in.file(name));
+        double largest = 0;
+        for (const std::vector<double>& row : table.rows)
+            largest = std::fmax(largest, std::fabs(row[3] / table.rows[0][3] - 1));
+        return largest;
+    };
+    const std::string scene = place.folder / "scene.toml";
+    std::string text = test::read_file(pendulum);
+    const std::string section = "[method]\n";
+    text.insert(text.find(section) + section.size(), "tolerance = 1e-6\n");
+    test::write_text(scene, text);
+    place.run({pendulum, "-o", place.file("rounding.csv")});
+    const std::string option = place.run({pendulum, "--tolerance", "1e-6", "-o", place.file("option.csv")}).out;
+    const std::string in_scene = place.run({scene, "-o", place.file("scene.csv")}).out;
+    place.run({scene, "--tolerance", "1e-15", "-o", place.file("over.csv")});
+    CHECK(contains(option, "1.00 per step"));
+    CHECK(contains(in_scene, "1.00 per step"));
+    const double rounding = energy_error(place, "rounding.csv"), loose = energy_error(place, "option.csv");
+    CHECK(rounding < 1e-7);        // 6.4e-8, the method's own error
+    CHECK(loose > 10 * rounding);  // 7.9e-6
+    CHECK(energy_error(place, "scene.csv") == loose);
+    CHECK(energy_error(place, "over.csv") == doctest::Approx(rounding).epsilon(1e-3));
+}
+
 TEST_CASE("a linear system needs no iteration and conserves its discrete energy") {
     const Place place;
     const test::Finished done = place.run({oscillator, "--until", "50", "-o", place.file()});
@@ -187,6 +214,10 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
           "--set:1:1: unknown parameter 'omgea'; declared: m, omega. Did you mean 'omega'?\n  1 | omgea=2\n   "
           " | ^\n");
     CHECK(refusal({"--set", "m"}) == "--set:1:1: expected name=value, such as --set m=2\n  1 | m\n    | ^\n");
+    for (const std::string value : {"0", "-1e-6", "0.002", "nan", "small"})
+        CHECK(contains(refusal({"--tolerance", value}), "--tolerance: the tolerance is " + value +
+                                                            "; it must be above 0 and at most 0.001; leave it "
+                                                            "out to iterate to rounding\n"));
     CHECK(contains(refusal({"--set", "m=2*omega"}), "--set:1:5: unknown name 'omega' in the value of m"));
     CHECK(contains(refusal({"--step", "2*"}), "--step:1:3: "));
     const std::string range = " must be 0, or of a size between 1e-300 and 1e300\n";

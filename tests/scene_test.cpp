@@ -591,6 +591,24 @@ TEST_CASE("the method is Lobatto's or Gauss's") {
                 "stages is 11; there is Gauss with 1 to 10 stages");
 }
 
+TEST_CASE("a tolerance is above 0 and at most 0.001; without one the iteration goes to rounding") {
+    const auto tolerance = [](const std::string& lines) {
+        return read(oscillator + "[method]\n" + lines).method.tolerance;
+    };
+    CHECK(tolerance("points = 5") == 0);
+    CHECK(tolerance("tolerance = 1e-6") == 1e-6);
+    CHECK(tolerance("tolerance = 0.001") == 0.001);
+    CHECK(tolerance("family = \"gauss\"\nstages = 2\ntolerance = \"1/2000\"") == 1.0 / 2000);
+    const auto check = [](const std::string& written, int column, const std::string& message) {
+        check_error(9, "until = 1\n[method]\ntolerance = " + written, {11, column}, message);
+    };
+    const std::string bounds = "; it must be above 0 and at most 0.001; leave it out to iterate to rounding";
+    check("0", 13, "the tolerance is 0" + bounds);
+    check("-1e-6", 13, "the tolerance is -1e-06" + bounds);
+    check("0.002", 13, "the tolerance is 0.002" + bounds);
+    check("\"q/1000\"", 14, "the coordinate q cannot occur in the tolerance: write it with numbers and parameters");
+}
+
 TEST_CASE("events have two sides and may have a direction") {
     const auto check = [](const std::string& events, int column, const std::string& message) {
         check_error(9, "until = 1\n[output]\nevents = " + events, {11, column}, message);

@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Trajectories side by side in the lanes of emitted kernels: each as if it were alone, whatever its neighbours do.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "runtime/ensemble.hpp"
+#include "runtime/trajectory.hpp"
+#include "tests/motions.hpp"
+
+using namespace lobatto;
+using namespace lobatto::test;
+using TestMotion = lobatto::test::Motion;
+
+namespace {
+
+struct Kept {
+    lobatto_status status;
+    std::int64_t steps_done, iterations;
+    std::vector<double> last;  // t, q, p
+    bool operator==(const Kept&) const = default;
+};
+
+using Starts = std::function<void(std::int64_t index, EnsembleStart& start)>;
+
+// From velocities, with the motion's step.
+std::vector<Kept> together(const Kernel& kernel, const TestMotion& motion, std::int64_t count, std::int64_t steps,
+                           const Starts& starts, int threads = 1) {
+    EnsembleRequest request;
+    request.count = count;
+    request.start = starts;
+    request.from_velocities = true;
+    request.step = motion.step;
+    request.steps = steps;
+    request.threads = threads;
+    std::vector<Kept> kept;
+    request.sink = [&](const EnsembleTrajectory& t) {
+        const double* const row = t.kept.rows + (t.kept.count - 1) * t.kept.columns;
+        kept.push_back({t.status, t.steps_done, t.iterations, {row, row + t.kept.columns}});
+    };
+    integrate(kernel, request);
+    return kept;
+}
+
+// The same by itself: t, q, p.
+std::vector<double> alone(const Kernel& kernel, const TestMotion& motion, std::int64_t steps,
+                          const EnsembleStart& start) {
+    LoadedStepper<double> stepper(kernel);
+    REQUIRE(stepper.prepare(start.parameters, motion.step) == LOBATTO_OK);
+    REQUIRE(stepper.start(0, start.q, stepper.momentum(0, start.q, start.rate)) == LOBATTO_OK);
+    lobatto_advance call{};
+    call.steps = steps;
+    REQUIRE(stepper.advance(call) == LOBATTO_OK);
+    std::vector<double> q(start.q.size()), p(start.q.size());
+    double time = 0;
+    stepper.state(time, q, p);
+    std::vector<double> all{time};
+    all.insert(all.end(), q.begin(), q.end());
+    all.insert(all.end(), p.begin(), p.end());
+    return all;
+}
+
+// Starts around the motion's own; parameters too, each a little different.
+Starts around(const TestMotion& motion) {
+    return [&motion](std::int64_t index, EnsembleStart& start) {
+        const auto i = static_cast<double>(index);
+        start = {motion.parameters, motion.q, motion.v};
+        for (std::size_t k = 0; k < start.parameters.size(); ++k)
+            start.parameters[k] *= 1 + 0.02 * std::sin(i + double(k));
+        for (std::size_t k = 0; k < start.q.size(); ++k) start.q[k] += 0.05 * std::cos(3 * i + double(k));
+        for (std::size_t k = 0; k < start.q.size(); ++k) start.rate[k] += 0.05 * std::sin(2 * i + double(k));
+    };
+}
+
+// The largest difference relative to the largest number, in units of epsilon.
+double distance(const std::vector<double>& a, const std::vector<double>& b) {
+    REQUIRE(a.size() == b.size());
+    double most = 0, size = 0;
+    for (std::size_t i = 1; i < a.size(); ++i) {
+        if (!(std::fabs(a[i] - b[i]) <= most)) most = std::fabs(a[i] - b[i]);
+        size = std::fmax(size, std::fabs(b[i]));
+    }
+    return most / size / 2.220446049250313e-16;
+}
+
+struct InLanes {
+    const TestMotion& motion;
+    double bound;
+};
+// Measured over 200 steps: 212, 280, 7, 0, 0, 25, 128 epsilon. One text serves both layouts, but sums over nodes are
+// taken in another order; a linear system has no such sums.
+const InLanes all[] = {
+    {pendulum, 2000},         {henon_heiles, 2500},   {double_pendulum, 100}, {harmonic_oscillator, 0},
+    {coupled_oscillators, 0}, {driven_pendulum, 250}, {kepler, 1500}};
+
+const Kernel& kernel_for(const TestMotion& motion) {
+    static std::vector<std::pair<const TestMotion*, Kernel>> made;
+    for (const auto& [of, kernel] : made)
+        if (of == &motion) return kernel;
+    made.reserve(std::size(all));
+    return made.emplace_back(&motion, ensemble_kernel_in_own_cache(derivation_of(motion, "points = 4"))).second;
+}
+
+}  // namespace
+
+TEST_CASE("a trajectory in a lane is the trajectory that runs alone") {
+    for (const InLanes& in : all) {
+        const Kernel& kernel = kernel_for(in.motion);
+        INFO(in.motion.body);
+        CHECK(kernel->lanes > 1);
+        const Starts starts = around(in.motion);
+        const auto kept = together(kernel, in.motion, 17, 200, starts);
+        REQUIRE(kept.size() == 17);
+        double worst = 0;
+        for (std::size_t i = 0; i < kept.size(); ++i) {
+            EnsembleStart start;
+            starts(static_cast<std::int64_t>(i), start);
+            CHECK(kept[i].status == LOBATTO_OK);
+            CHECK(kept[i].steps_done == 200);
+            const double d = distance(kept[i].last, alone(kernel, in.motion, 200, start));
+            if (!(d <= worst)) worst = d;
+        }
+        CHECK(worst <= in.bound);
+    }
+}
+
+TEST_CASE("any number of trajectories and of threads gives the same bits") {
+    for (const InLanes& in : all) {
+        INFO(in.motion.body);
+        const Kernel& kernel = kernel_for(in.motion);
+        const Starts starts = around(in.motion);
+        const auto most = together(kernel, in.motion, 200, 20, starts);
+        CHECK(together(kernel, in.motion, 200, 20, starts, 3) == most);
+        for (const std::int64_t count : {1, 3, 7, 9, 17}) {
+            const auto some = together(kernel, in.motion, count, 20, starts);
+            REQUIRE(std::ssize(some) == count);
+            CHECK(std::equal(some.begin(), some.end(), most.begin()));
+        }
+    }
+}
+
+TEST_CASE("the bits of a lane do not depend on its neighbours, nor on which lane it is") {
+    for (const InLanes& in : all) {
+        INFO(in.motion.body);
+        const Kernel& kernel = kernel_for(in.motion);
+        const Starts starts = around(in.motion);
+        const auto reference = together(kernel, in.motion, 1, 100, starts);
+        for (std::int64_t place = 0; place < kernel->lanes; ++place) {
+            const auto kept =
+                together(kernel, in.motion, kernel->lanes, 100, [&](std::int64_t index, EnsembleStart& start) {
+                    starts(index == place ? 0 : 20 + 7 * index + place, start);
+                });
+            CHECK(kept[static_cast<std::size_t>(place)] == reference[0]);
+        }
+    }
+}
+
+TEST_CASE("a start that is not a number stops its own trajectory alone") {
+    for (const InLanes& in : all) {
+        INFO(in.motion.body);
+        const Kernel& kernel = kernel_for(in.motion);
+        const Starts starts = around(in.motion);
+        const auto good = together(kernel, in.motion, 9, 50, starts);
+        for (const bool of_position : {true, false}) {
+            const auto kept = together(kernel, in.motion, 9, 50, [&](std::int64_t index, EnsembleStart& start) {
+                starts(index, start);
+                if (index == 2) (of_position ? start.q : start.rate)[0] = std::nan("");
+            });
+            REQUIRE(kept.size() == 9);
+            for (std::size_t i = 0; i < 9; ++i)
+                if (i != 2) CHECK(kept[i] == good[i]);
+            CHECK(kept[2].status == LOBATTO_NOT_FINITE);
+            CHECK(kept[2].steps_done == 0);
+        }
+    }
+}
+
+TEST_CASE("a trajectory whose step cannot be solved stops alone, with its last good state") {
+    TestMotion coarse = kepler;
+    coarse.step = 0.25;
+    const Kernel& kernel = kernel_for(kepler);
+    const Starts starts = around(kepler);
+    const auto good = together(kernel, coarse, 9, 100, starts);
+    const auto kept = together(kernel, coarse, 9, 100, [&](std::int64_t index, EnsembleStart& start) {
+        starts(index, start);
+        if (index == 4) start = {{1}, {0.5, 0}, {0, 0}};  // straight into the centre
+    });
+    for (std::size_t i = 0; i < 9; ++i)
+        if (i != 4) {
+            CHECK(good[i].status == LOBATTO_OK);
+            CHECK(kept[i] == good[i]);
+        }
+    CHECK(kept[4].status == LOBATTO_NOT_CONVERGED);
+    CHECK(kept[4].steps_done == 1);
+    CHECK(kept[4].last[0] == coarse.step * static_cast<double>(kept[4].steps_done));
+    for (const double x : kept[4].last) CHECK(std::isfinite(x));
+}
+
+TEST_CASE("a lane whose sweeps cannot contract is led on by Newton's iteration, the others unchanged") {
+    const Kernel& kernel = kernel_for(pendulum);
+    TestMotion wide = pendulum;
+    wide.step = 0.5;
+    const auto starts = [&](double omega) {
+        return [omega](std::int64_t index, EnsembleStart& start) {
+            start = {{2, index == 3 ? omega : 1 + 0.01 * static_cast<double>(index)}, {1}, {0.25}};
+        };
+    };
+    const auto calm = together(kernel, wide, 9, 20, starts(1)), stiff = together(kernel, wide, 9, 20, starts(6.5));
+    for (std::size_t i = 0; i < 9; ++i)
+        if (i != 3) CHECK(stiff[i] == calm[i]);
+    CHECK(stiff[3].status == LOBATTO_OK);
+    CHECK(stiff[3].steps_done == 20);
+    EnsembleStart first;
+    starts(6.5)(3, first);  // its first step is Newton's, to the bit
+    const Kernel newton = newton_kernel(derivation_of(pendulum, "points = 4"), Precision::double_);
+    CHECK(together(kernel, wide, 9, 1, starts(6.5))[3].last == alone(newton, wide, 1, first));
+    CHECK(together(kernel, wide, 9, 1, starts(1))[3].last != alone(newton, wide, 1, first));
+    CHECK(distance(stiff[3].last, alone(kernel, wide, 20, first)) < 5000);  // 482
+}
+
+namespace {
+
+// Sixteen trajectories of 50 steps in lanes of four widths; the bits of each.
+const char* const widths_program = R"(
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include "kernel.hpp"
+#include "motion.hpp"
+using namespace lobatto;
+using K = kernels::motion;
+template <int width> void print() {
+    const auto lanes = std::make_unique<Ensemble<K, width>>();
+    for (int first = 0; first < 16; first += width) {
+        double parameters[2 * width], q[width], p[width];
+        Status status[width];
+        std::int64_t done[width], iterations[width];
+        for (int l = 0; l < width; ++l) {
+            parameters[2 * l] = 1 + 0.125 * (first + l);
+            parameters[2 * l + 1] = first + l == 11 ? 14 : 1 + 0.0625 * (first + l);  // 11: beyond what sweeps solve
+            q[l] = first + l == 5 ? 0.0 / 0.0 : 0.25 * (first + l) - 2;
+            p[l] = 0.5;
+        }
+        lanes->prepare(parameters, 0.2, status);
+        lanes->start(0, q, p, status);
+        lanes->advance(50, 0, status, done, iterations);
+        lanes->state(q, p);
+        for (int l = 0; l < width; ++l) {
+            unsigned long long bits[2];
+            std::memcpy(bits, q + l, 8);
+            std::memcpy(bits + 1, p + l, 8);
+            if (first + l == 5) bits[0] = bits[1] = 0;
+            std::printf("%d:%d:%lld:%llx:%llx ", first + l, static_cast<int>(status[l]), static_cast<long long>(done[l]),
+                        bits[0], bits[1]);
+        }
+    }
+    std::printf("\n");
+}
+int main() {
+    print<2>();
+    print<4>();
+    print<8>();
+    print<16>();
+}
+)";
+
+}  // namespace
+
+TEST_CASE("lanes give the same bits in any width, on every instruction set, from every compiler") {
+    const TemporaryFolder folder;
+    const KernelSource source = emit(derivation_of(pendulum, "points = 4"));
+    write_text(folder / "motion.hpp", source.header);
+    write_text(folder / "widths.cpp", widths_program);
+    const auto compiled = [&](const std::string& compiler, const std::string& target) {
+        const Finished built = run({compiler, "-std=c++17", "-O1", "-ffp-contract=off", "-march=" + target, "-I",
+                                    LOBATTO_SOURCE_DIR "/runtime", folder / "widths.cpp", "-o", folder / "widths"});
+        INFO(built.err);
+        REQUIRE(built.exit_code == 0);
+    };
+    const auto output = [&](const std::string& compiler, const std::string& target) {
+        compiled(compiler, target);
+        return run({(folder / "widths").string()}).out;
+    };
+    const auto check_widths = [](const std::string& text) {
+        const std::size_t length = text.find('\n') + 1;
+        REQUIRE(length > 16 * 30);
+        REQUIRE(text.size() == 4 * length);
+        for (std::size_t line = 1; line < 4; ++line)
+            CHECK(text.substr(line * length, length) == text.substr(0, length));
+        CHECK(text.find(" 4:0:50:") != std::string::npos);
+        CHECK(text.find(" 5:2:0:0:0 ") != std::string::npos);  // not finite
+    };
+    const std::string plain = output("g++", "x86-64");
+    check_widths(plain);
+    const bool has_clang = run({"clang++", "--version"}).exit_code == 0;
+    if (has_clang) CHECK(output("clang++", "x86-64") == plain);
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        const std::string fused = output("g++", "haswell");
+        check_widths(fused);
+        CHECK(fused != plain);  // fused operations round once
+        if (has_clang) CHECK(output("clang++", "haswell") == fused);
+    }
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+        check_widths(output("g++", "x86-64-v4"));
+    else
+        compiled("g++", "x86-64-v4");
+}

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Motions on which fast ways through a step are compared with slow ones: a scene, its numbers, a start, a step.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/kernel_of.hpp"
+#include "tests/scenes.hpp"
+
+namespace lobatto::test {
+
+struct Motion {
+    std::string body;  // of the scene, up to its method
+    std::vector<double> parameters, q, v;
+    double step;
+};
+
+inline const Motion pendulum{
+    "lagrangian = \"m*q'^2/2 - m*omega^2*(1 - cos(q))\"\n[coordinates]\nq = { position = 1.5, velocity = 0.25 }\n"
+    "[parameters]\nm = 2\nomega = 1.5\n",
+    {2, 1.5},
+    {1.5},
+    {0.25},
+    0.2};
+inline const Motion henon_heiles{
+    "lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - lambda*(x^2*y - y^3/3)\"\n[coordinates]\n"
+    "x = { position = 0.1, velocity = 0.25 }\ny = { position = 0.3, velocity = 0.2 }\n[parameters]\nlambda = 1\n",
+    {1},
+    {0.1, 0.3},
+    {0.25, 0.2},
+    0.2};
+inline const Motion kepler{
+    "lagrangian = \"(x'^2 + y'^2)/2 + mu/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 0.7, velocity = 0 }\n"
+    "y = { position = 0, velocity = 1.3627 }\n[parameters]\nmu = 1\n",
+    {1},
+    {0.7, 0},
+    {0, 1.3627},
+    0.05};
+inline const Motion double_pendulum{
+    "lagrangian = \"(1 + m)*a'^2/2 + m*b'^2/2 + m*a'*b'*cos(a - b) + (1 + m)*g*cos(a) + m*g*cos(b)\"\n[coordinates]\n"
+    "a = { position = 0.5, velocity = 0 }\nb = { position = 0.75, velocity = 0.25 }\n[parameters]\nm = 2\ng = 1\n",
+    {2, 1},
+    {0.5, 0.75},
+    {0, 0.25},
+    0.1};
+inline const Motion driven_pendulum{
+    "time = \"t\"\nlagrangian = \"q'^2/2 + cos(q) + a*q*cos(w*t)\"\n[coordinates]\nq = { position = 0.5, velocity = 0 "
+    "}\n"
+    "[parameters]\na = 0.25\nw = 1.25\n",
+    {0.25, 1.25},
+    {0.5},
+    {0},
+    0.1};
+inline const Motion coupled_oscillators{
+    "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 - k*(x^2 + y^2 + z^2)/2 - (x - y)^2/4 - (y - z)^2/4\"\n[coordinates]\n"
+    "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0.5 }\nz = { position = -0.5, velocity = 0.25 "
+    "}\n"
+    "[parameters]\nk = 1.5\n",
+    {1.5},
+    {1, 0, -0.5},
+    {0, 0.5, 0.25},
+    0.1};
+inline const Motion harmonic_oscillator{
+    "lagrangian = \"m*q'^2/2 - k*q^2/2\"\n[coordinates]\nq = { position = 1, velocity = 0.5 }\n[parameters]\nm = 2\n"
+    "k = 3\n",
+    {2, 3},
+    {1},
+    {0.5},
+    0.1};
+// Twelve masses between two walls, plucked: springs that are linear and cubic.
+inline Motion chain() {
+    Motion chain{
+        "lagrangian = \"sum(i = 1 .. n, x[i]'^2/2) - sum(i = 2 .. n, s[i]) - k*x[1]^2/2 - x[1]^4/4 - k*x[n]^2/2 - "
+        "x[n]^4/4\"\n[definitions]\n\"s[i]\" = \"k*(x[i] - x[i-1])^2/2 + (x[i] - x[i-1])^4/4\"\n[coordinates]\n"
+        "x = { count = \"n\", position = \"i/20\", velocity = 0 }\n[parameters]\nn = { value = 12, constant = true }\n"
+        "k = 1\n",
+        {1},
+        {},
+        {},
+        0.1};
+    for (int i = 1; i <= 12; ++i) {
+        chain.q.push_back(i * (13 - i) * 0.02);
+        chain.v.push_back(i % 3 * 0.1);
+    }
+    return chain;
+}
+
+// `method`: the lines under [method]; `output`: those under [output].
+inline Derivation derivation_of(const Motion& motion, const std::string& method, const std::string& output = "",
+                                bool general = false) {
+    return derive(read_scene(Source("motion.toml", "title = \"Motion\"\n" + motion.body + "[method]\n" + method +
+                                                       "\n[run]\nstep = 0.1\nuntil = 1\n[output]\n" + output + "\n")),
+                  general);
+}
+
+// Without sweeps: each step by Newton's iteration alone.
+inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
+    static const TemporaryFolder folder;
+    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
+    EmitOptions options;
+    options.precision = precision;
+    KernelSource source = emit(derivation, options);
+    const std::string claim = "bool any_number = true";
+    source.header.replace(source.header.find(claim), claim.size(), "bool any_number = false");
+    return kernel_of(source, precision);
+}
+
+inline Kernel ensemble_kernel_in_own_cache(const Derivation& derivation) {
+    static const TemporaryFolder folder;
+    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
+    return ensemble_kernel_of(emit(derivation), Precision::double_);
+}
+
+}  // namespace lobatto::test
