@@ -189,7 +189,8 @@ private:
             else
                 speed = fastest;
             const T scale = fabs(T(h)) * speed + T(floor) * fabs(q[c]);
-            a.inverse_scale[c] = select(scale > T(Limits<real>::smallest), T(h) / scale, T(Limits<real>::largest));
+            a.inverse_scale[c] =
+                select(scale > T(Limits<real>::smallest), fabs(T(h)) / scale, T(Limits<real>::largest));
             rounding = maximum(rounding, select(scale > T(Limits<real>::smallest), fabs(q[c]) / scale, T(real(0))));
             kappa_now[c] = kappa[c];
         }

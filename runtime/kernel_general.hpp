@@ -410,13 +410,13 @@ private:
         return false;
     }
 
-    // Whether |p - dL/dv| is within a tolerance of what it is computed from.
-    bool is_near(const MassArrays& a, const real* momentum, const real* v, real tolerance) const {
+    // Whether |p - dL/dv| is within a bound of what it is computed from.
+    bool is_near(const MassArrays& a, const real* momentum, const real* v, real bound) const {
         real size[n];
         for (int k = 0; k < n; ++k) size[k] = fabs(momentum[k]);
         for (int e = 0; e < K::mass_entries; ++e) size[K::mass_row[e]] += fabs(a.entries[e] * v[K::mass_column[e]]);
         for (int k = 0; k < n; ++k)
-            if (!(fabs(a.residual[k]) <= tolerance * size[k])) return false;
+            if (!(fabs(a.residual[k]) <= bound * size[k])) return false;
         return true;
     }
 
@@ -724,7 +724,7 @@ private:
     // Newton's iteration. Convergence is quadratic, e_next = C e^2, so it stops as soon as the NEXT increment would be
     // below rounding; the slopes are then carried to first order, which errs by the same e^2.
     Status newton(Arrays& a) {
-        constexpr real tolerance = Limits<real>::root_epsilon;
+        constexpr real last = Limits<real>::root_epsilon;
         real previous = Limits<real>::largest;
         for (int iteration = 1; iteration <= iteration_limit; ++iteration) {
             evaluate_nodes(this->time(), q, p, a.Y, a);
@@ -736,7 +736,7 @@ private:
             const real e = apply_increment(a.matrix, a);
             increment = e;
             if (!is_finite(e)) return Status::not_finite;
-            if (e <= tolerance ||
+            if (e <= last ||
                 (iteration > 1 && e < previous && (e / previous) * (e / previous) * e <= Limits<real>::epsilon) ||
                 (iteration > 2 && e >= real(0.5) * previous && is_rounding(a))) {
                 carry_increment(a.H, entry_room, a);

@@ -256,6 +256,12 @@ struct Pack {
     Part part[count];
 
     Pack() = default;
+    // One register at a time: g++ keeps a Pack in registers only while it is not copied as a whole.
+    LOBATTO_INLINE Pack(const Pack& other) { copy(other, Each{}); }
+    LOBATTO_INLINE Pack& operator=(const Pack& other) {
+        copy(other, Each{});
+        return *this;
+    }
     LOBATTO_INLINE Pack(real x) : Pack(of(LOBATTO_EACH() { return x - Part{}; })) {}  // x - 0 keeps -0
 
     // The pack of the registers f(0), f(1), ...
@@ -369,6 +375,10 @@ struct Pack {
     }
 
 private:
+    template <int... i>
+    LOBATTO_INLINE void copy(const Pack& other, std::integer_sequence<int, i...>) {
+        ((part[i] = other.part[i]), ...);
+    }
     template <class F, int... i>
     LOBATTO_INLINE static Pack of(F f, std::integer_sequence<int, i...>) {
         Pack result;

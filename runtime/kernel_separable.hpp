@@ -532,7 +532,7 @@ private:
     // positions to first order, which errs by the same e^2.
     template <class AnyStages>
     Status newton(const AnyStages& stages, Arrays& a) {
-        constexpr real tolerance = Limits<real>::root_epsilon;
+        constexpr real last = Limits<real>::root_epsilon;
         real previous = Limits<real>::largest;
         for (int iteration = 1; iteration <= iteration_limit; ++iteration) {
             for (int i = 0; i < m; ++i)
@@ -548,7 +548,7 @@ private:
             increment = e;
             if (!is_finite(e)) return Status::not_finite;
             const bool next_is_rounding =
-                K::linear || e <= tolerance ||
+                K::linear || e <= last ||
                 (iteration > 1 && e < previous && (e / previous) * (e / previous) * e <= Limits<real>::epsilon);
             if (next_is_rounding ||
                 (iteration > 2 && e >= real(0.5) * previous && is_rounding(a, a.S, K::entries, real(64)))) {

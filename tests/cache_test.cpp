@@ -127,7 +127,7 @@ TEST_CASE("the command names the compiler that CXX names and all flags, and fuse
     const Workshop workshop;
     const std::string compiler = (workshop.folder / "compiler").string();
     CHECK(compile(answer).command == compiler +
-                                         " -O2 -march=native -fno-math-errno -ffp-contract=off -fPIC -shared "
+                                         " -O2 -fpeel-loops -march=native -fno-math-errno -ffp-contract=off -fPIC -shared "
                                          "-fvisibility=hidden -std=c++17 answer.cpp -o answer.so");
     const EnvironmentVariable words("CXX", compiler + "  -DLOBATTO_UNUSED='a' ");
     CHECK(compile(answer).command.starts_with(compiler + " '-DLOBATTO_UNUSED='\\''a'\\''' -O2 "));
@@ -391,7 +391,7 @@ TEST_CASE("a compiler that fails is quoted, and source, command and output are k
     for (int i = 1; i < 40; ++i) lines += std::to_string(i) + "\n";
     const std::string command =
         compiler +
-        " -O2 -march=native -fno-math-errno -ffp-contract=off -fPIC -shared -fvisibility=hidden "
+        " -O2 -fpeel-loops -march=native -fno-math-errno -ffp-contract=off -fPIC -shared -fvisibility=hidden "
         "-std=c++17 answer.cpp -o answer.so";
     CHECK(message == "the C++ compiler failed with exit code 3.\nCommand: " + command + "\nIts output:\n" + compiler +
                          ": fatal error: no room on the couch\n" + lines +
