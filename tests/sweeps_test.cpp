@@ -293,3 +293,20 @@ TEST_CASE("dense output, events and the tangent map after steps by sweeps are th
         CHECK(distance(swept.tangent, newton.tangent) < 300);  // 1.0, 0.2, 0.5, 33
     }
 }
+
+TEST_CASE("steps back in time are taken by sweeps too") {
+    for (const Motion* motion : {&pendulum, &double_pendulum}) {
+        const Derivation derivation = derivation_of(*motion, lobatto_4, "tangent = false");
+        const Kernel kernel = kernel_in_own_cache(derivation, Precision::double_),
+                     newton = newton_kernel(derivation, Precision::double_);
+        const auto forth = path<double>(kernel, *motion, motion->step, 100),
+                   back = path<double>(kernel, *motion, -motion->step, 100),
+                   newton_back = path<double>(newton, *motion, -motion->step, 100);
+        INFO(motion->body);
+        CHECK(distance(back, newton_back) < 300);  // 32 and 4 epsilon
+        CHECK(distance(back, newton_back) > 0);
+        CHECK(static_cast<double>(back.call.iterations) < 1.2 * static_cast<double>(forth.call.iterations));
+        // Newton's iteration alone would take fewer: 2 a step against 3 and 6.
+        CHECK(static_cast<double>(back.call.iterations) > 1.2 * static_cast<double>(newton_back.call.iterations));
+    }
+}
