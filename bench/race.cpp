@@ -75,11 +75,12 @@ std::vector<double> ladder_of(const Problem& problem, const Contestant& contesta
     return settings;
 }
 
-// From coarse to fine until it is too slow, or a few settings beyond the first that reaches the finest target.
+// From coarse to fine until it is too slow, or a few settings beyond the first that reaches the finest target. Implicit
+// methods may be slowest at the coarsest steps, so one slow setting is not the end.
 void scan(const Course& course, Lane& lane, bool quick, double time_limit) {
     const int beyond = 4;
     const double trajectories = static_cast<double>(course.starts.size());
-    int fine = 0;
+    int fine = 0, slow = 0;
     for (const double setting : ladder_of(course.problem, lane.contestant, quick)) {
         const double prepared = lane.contestant.prepare ? lane.contestant.prepare(setting, course.starts.size()) : 0;
         Measurement best = measure(course, lane.contestant, setting);
@@ -90,7 +91,8 @@ void scan(const Course& course, Lane& lane, bool quick, double time_limit) {
         best.compile_seconds = prepared;
         lane.scan.push_back(best);
         if (best.error < targets.back()) ++fine;
-        if (fine > beyond || best.seconds > time_limit) break;
+        slow = best.seconds > time_limit ? slow + 1 : 0;
+        if (fine > beyond || slow > (lane.contestant.ours ? 8 : 0)) break;
     }
 }
 

@@ -96,9 +96,10 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
     }
     if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
-    if (kernel.has_tangent != 0 && !has_forces(derivation))
+    if (kernel.has_tangent != 0 && !has_forces(derivation))  // of the first step, its equations solved to rounding
         print_row("symplectic defect",
-                  fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p)));  // of the first step
+                  request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
+                                        : fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p)));
     if (const auto error = watch.position_error()) {
         const std::string& unit = derivation.scene.coordinates.front().unit;
         print_row("position error",

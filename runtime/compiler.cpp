@@ -106,8 +106,8 @@ Compiler find_compiler(bool quadruple) {
 std::vector<std::string> compile_arguments(const Compiler& compiler, const std::string& source,
                                            const std::string& object, bool quadruple) {
     std::vector<std::string> arguments = compiler.words;
-    // -ffp-contract=off: without fused multiply-add g++, clang++ and every processor give the same bits; with it each
-    // fuses different products, and the error-free sums of a kernel would lose their proof. Measured cost: below 5 %.
+    // -ffp-contract=off: products and sums are fused where the text says so (`fused`), nowhere else; so g++ and clang++
+    // give the same bits on one kind of processor, and the error-free sums of a kernel keep their proof (adr/0002).
     // -ffast-math is never among the flags: it would let the compiler simplify x - x, and so the checks for finite
     // numbers, away.
     // -fpeel-loops: loops over the nodes and coordinates of small systems are written out, as with -O3, which takes
