@@ -130,7 +130,8 @@ and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
     void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);
     void (*ensemble_start)(void* ensemble, const void* time, const void* q, const void* p, int32_t* status);
     /* steps_done and iterations: one a lane, of this call. A lane that fails keeps its last good state. */
-    void (*ensemble_advance)(void* ensemble, int64_t steps, double tolerance, int32_t* status, int64_t* steps_done, int64_t* iterations);
+    void (*ensemble_advance)(void* ensemble, int64_t steps, double tolerance, int32_t* status, int64_t* steps_done,
+                             int64_t* iterations);
     void (*ensemble_state)(const void* ensemble, void* q, void* p);
     void (*ensemble_energy)(const void* ensemble, void* energy); /* H, one a lane; null without energy */
 } lobatto_kernel;

@@ -126,9 +126,10 @@ TEST_CASE("another text, another compiler and another precision are misses") {
 TEST_CASE("the command names the compiler that CXX names and all flags, and fuses no products") {
     const Workshop workshop;
     const std::string compiler = (workshop.folder / "compiler").string();
-    CHECK(compile(answer).command == compiler +
-                                         " -O2 -fpeel-loops -march=native -fno-math-errno -ffp-contract=off -fPIC -shared "
-                                         "-fvisibility=hidden -std=c++17 answer.cpp -o answer.so");
+    CHECK(compile(answer).command ==
+          compiler +
+              " -O2 -fpeel-loops -march=native -fno-math-errno -ffp-contract=off -fPIC -shared "
+              "-fvisibility=hidden -std=c++17 answer.cpp -o answer.so");
     const EnvironmentVariable words("CXX", compiler + "  -DLOBATTO_UNUSED='a' ");
     CHECK(compile(answer).command.starts_with(compiler + " '-DLOBATTO_UNUSED='\\''a'\\''' -O2 "));
 }
