@@ -21,13 +21,13 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "a8e167bd01a1285b";
+    static constexpr const char* digest = "a56a6c19c39f5c46";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 0;          // of the equations of a step; 0: none to solve
-    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers
+    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers: sweeps first
     static constexpr bool linear = true;        // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene

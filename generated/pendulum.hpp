@@ -21,13 +21,13 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "827c7cba261b1dbd";
+    static constexpr const char* digest = "8c29f8a2f9aa6748";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 2;          // of the equations of a step; 0: none to solve
-    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers
+    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers: sweeps first
     static constexpr bool linear = false;       // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene

@@ -170,7 +170,9 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int coordinates = {}", d.system.n), "n");
     line(text, fmt::format("int order = {}", d.quadrature.order()), "of accuracy in h");
     line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
-    line(text, "bool any_number = true", "formulas of a state are templates on the type of its numbers");
+    line(text, fmt::format("bool any_number = {}", !structure.general),
+         structure.general ? "Newton's iteration alone"
+                           : "formulas of a state are templates on the type of its numbers: sweeps first");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");

@@ -169,7 +169,9 @@ private:
     template <class Given>
     Going step_in(const Given& k, real time, T* q, T* p, Going going, Arrays& a) {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
-        T rounding = T(real(0)), kappa_now[n];
+        // Each coordinate has its own measure: increments as small as its rounding are so whatever the others do.
+        const real least = maximum(tolerance, Limits<real>::epsilon);
+        T kappa_now[n];
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             T* const flat = a.flat + c * parts * width;
@@ -189,12 +191,11 @@ private:
             else
                 speed = fastest;
             const T scale = fabs(T(h)) * speed + T(floor) * fabs(q[c]);
-            a.inverse_scale[c] =
-                select(scale > T(Limits<real>::smallest), fabs(T(h)) / scale, T(Limits<real>::largest));
-            rounding = maximum(rounding, select(scale > T(Limits<real>::smallest), fabs(q[c]) / scale, T(real(0))));
+            const T rounding = T(Limits<real>::epsilon / least) * fabs(q[c]) + T(Limits<real>::smallest);
+            a.inverse_scale[c] = fabs(T(h)) / maximum(scale, rounding);
             kappa_now[c] = kappa[c];
         }
-        const T small = maximum(T(tolerance), T(Limits<real>::epsilon) * (rounding + T(real(1))));
+        const T small = T(least);
         Going solved = going & !going;
         T e_before = T(Limits<real>::largest);
         evaluations = T(real(0));

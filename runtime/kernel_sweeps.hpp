@@ -97,7 +97,7 @@ struct Sweeps {
     };
     struct Arrays {
         V base[parts * n], X[parts * n], W[parts * n], S[parts * entries], Y[parts * n], carried[parts * n];
-        T flat[n * parts * width], rate[n], inverse_scale[n];
+        T flat[n * parts * width], rate[n], inverse_scale[n], inverse_linear[n];
     };
 
     Map map[maps];
@@ -240,9 +240,9 @@ private:
     }
 
     // One sweep: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place. The new Y of
-    // the lanes `still`, and the size of what it moved by.
+    // the lanes `still`, and the size of what it moved by; `displaced`: the same, in the measure for carrying.
     template <bool is_carried>
-    LOBATTO_INLINE T sweep(Going still, Arrays& a) const {
+    LOBATTO_INLINE T sweep(Going still, Arrays& a, T& displaced) const {
         for (int p = 0; p < parts; ++p) {
             V r[n];
             if constexpr (is_carried)
@@ -254,22 +254,27 @@ private:
                 lay_flat<1>(&r[c], 1, a.flat + (c * parts + p) * width);
             }
         }
-        V worst = V(real(0));
+        V worst = V(real(0)), farthest = V(real(0));
         for (int c = 0; c < n; ++c)
             for (int p = 0; p < parts; ++p) {
                 const V next = sum_of<m>(a.base[p * n + c], map_of(c).inner, p, a.flat + c * parts * width);
                 V& Y = a.Y[p * n + c];
                 const V moved = next - (is_carried ? Y : a.X[p * n + c]);
-                if constexpr (is_carried && !in_lanes)
-                    Y = select(still, next, Y);
-                else
+                if constexpr (in_lanes)
                     Y = next;
+                else
+                    Y = select(still, next, Y);
                 worst = maximum(worst, fabs(moved) * V(a.inverse_scale[c]));
+                if constexpr (K::costly && !is_carried)
+                    farthest = maximum(farthest, fabs(moved) * V(a.inverse_linear[c]));
             }
-        if constexpr (in_lanes)
+        if constexpr (in_lanes) {
+            displaced = largest(farthest);
             return largest(worst);
-        else
+        } else {
+            displaced = farthest;
             return worst;
+        }
     }
 
     // W + S (Y - X) of one part.
@@ -320,13 +325,16 @@ private:
     template <class Given>
     Going solve(const Given& k, real time, const T* q, const T* u, Going going, Arrays& a) {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
-        T rounding = T(real(0));
+        // Each coordinate has its own measures: increments as small as its rounding are so whatever the others do.
+        const real small = maximum(tolerance, Limits<real>::epsilon);
+        const real linear = maximum(Limits<real>::root_epsilon, sqrt(tolerance));  // where e^2 is no matter
         for (int c = 0; c < n; ++c) {
             const T W0 = w[c * s + s - 1];
             a.rate[c] = fused(T(-h * K::b[0]), W0, u[c]);
             const T scale = fabs(T(h) * a.rate[c]) + fabs(T(h) * (T(h) * W0)) + T(floor) * fabs(q[c]);
-            a.inverse_scale[c] = T(real(1)) / maximum(scale, T(Limits<real>::smallest));
-            rounding = maximum(rounding, fabs(q[c]) * a.inverse_scale[c]);
+            const T rounding = T(Limits<real>::epsilon) * fabs(q[c]) + T(Limits<real>::smallest);
+            a.inverse_scale[c] = T(real(1)) / maximum(scale, T(real(1) / small) * rounding);
+            a.inverse_linear[c] = T(real(1)) / maximum(scale, T(real(8) / linear) * rounding);
         }
         for (int c = 0; c < n; ++c)
             for (int p = 0; p < parts; ++p) {
@@ -345,9 +353,6 @@ private:
             evaluations = T(real(0));
             return going;
         }
-        const T small = maximum(T(tolerance), T(Limits<real>::epsilon) * (rounding + T(real(1))));
-        [[maybe_unused]] const T linear =
-            maximum(T(Limits<real>::root_epsilon), T(sqrt(tolerance)));  // where e^2 is no matter
         Going solved = going & !going;
         going = going & usable;
         T e_before = T(K::costly ? Limits<real>::largest : real(0));
@@ -356,19 +361,20 @@ private:
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
             evaluate(k, time, a);
             evaluations = select(going, evaluations + T(real(1)), evaluations);
-            const T e = sweep<false>(going, a);
-            if (evaluation > 3) going = going & ((e < T(real(0.8)) * e_before) | (e <= T(real(16)) * small));
+            T displaced;
+            const T e = sweep<false>(going, a, displaced);
+            if (evaluation > 3) going = going & ((e < T(real(0.8)) * e_before) | (e <= T(real(16) * small)));
             if constexpr (K::costly) {
                 if (evaluation == 1) least = least_rate(a);
-                const Going ready = going & (e <= linear);
+                const Going ready = going & (displaced <= T(linear));
                 if (any(ready)) {
                     solved = solved | carry(ready, e, e_before, least, small, a);
                     going = going & !ready;
                 }
             } else {
                 // What is left, e times its ratio to the one before, is rounding; or it no longer shrinks.
-                const Going ready = going & ((e * e <= small * e_before) | (e <= small) |
-                                             ((e <= T(real(16)) * small) & (e >= T(real(0.5)) * e_before)));
+                const Going ready = going & ((e * e <= T(small) * e_before) | (e <= T(small)) |
+                                             ((e <= T(real(16) * small)) & (e >= T(real(0.5)) * e_before)));
                 if (any(ready)) {
                     settle(k, time, ready, a);
                     increment = select(ready, e, increment);
@@ -399,10 +405,12 @@ private:
 
     // Sweeps with W + S (Y - X) in place of W(Y), until what is left of an increment, e times its ratio to the one
     // before, is rounding; then that is what W is at the nodes.
-    LOBATTO_INLINE Going carry(Going ready, T e, T e_before, T least, T small, Arrays& a) {
+    LOBATTO_INLINE Going carry(Going ready, T e, T e_before, T least, real bound, Arrays& a) {
+        const T small = T(bound);
+        T ignored;
         Going still = ready & !((e * e <= small * e_before) & (e * least <= small));
         for (int i = 0; i < carried_limit && any(still); ++i) {
-            const T next = sweep<true>(still, a);
+            const T next = sweep<true>(still, a, ignored);
             const Going stands =
                 still & (next >= T(real(0.5)) * e) & (next > T(real(0)));  // rounding, or no convergence
             ready = ready & !(stands & (next > T(real(64)) * small));

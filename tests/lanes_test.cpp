@@ -159,6 +159,30 @@ TEST_CASE("the bits of a lane do not depend on its neighbours, nor on which lane
     }
 }
 
+// Stiff in x, so that its quadratic part is taken into the stage map; neighbours of very different amplitude need other
+// numbers of sweeps.
+TEST_CASE("the bits of a lane do not depend on how long its neighbours are swept") {
+    const TestMotion stiff{
+        "lagrangian = \"x'^2/2 + z'^2/2 - 150*x^2 - 20*(1 - cos(x)) - z^2*x/5 - z^2/2 - 20*z^4\"\n"
+        "[coordinates]\nx = { position = 1, velocity = 0 }\nz = { position = 0.3, velocity = 0 }\n",
+        {},
+        {0.1, 0.3},
+        {0, 0},
+        0.02};
+    const Derivation derivation = derivation_of(stiff, "points = 5");
+    REQUIRE(derivation.structure.diagonal_part);
+    const Kernel kernel = ensemble_kernel_in_own_cache(derivation);
+    const auto among = [&](double amplitude) {
+        return together(kernel, stiff, kernel->lanes, 5000, [&](std::int64_t index, EnsembleStart& start) {
+            start = {stiff.parameters, stiff.q, stiff.v};
+            if (index > 0) start.q[0] = amplitude * static_cast<double>(index);
+        })[0];
+    };
+    const Kept reference = among(0.1);
+    CHECK(among(0.7) == reference);
+    CHECK(among(1e-9) == reference);
+}
+
 TEST_CASE("a start that is not a number stops its own trajectory alone") {
     for (const InLanes& in : all) {
         INFO(in.motion.body);

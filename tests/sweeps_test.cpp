@@ -223,6 +223,22 @@ TEST_CASE("energy does not drift in 100000 steps by sweeps, and with a tolerance
     CHECK(energy_drift(four, kepler, 100000, 1e-6) > 3e-12);  // 2.5e-11
 }
 
+// Increments are measured coordinate by coordinate: where one is far from zero and hardly moves, its rounding is large
+// beside its displacement, and must not stand for the rounding of the others.
+TEST_CASE("a coordinate at rest far from zero takes no accuracy from the others") {
+    for (const char* kinetic : {"(1 + x^2/9)", "1"}) {
+        const Motion motion{std::string("lagrangian = \"x'^2/2*") + kinetic +
+                                " + z'^2/2 - x^4/4 - x^2/2 - (z - 1)^2/2 - (z - 1)^4\"\n[coordinates]\n"
+                                "x = { position = 1, velocity = 0 }\nz = { position = 1, velocity = 0 }\n",
+                            {},
+                            {1, 1},
+                            {0, 0},
+                            0.1};
+        const Kernel kernel = kernel_in_own_cache(derivation_of(motion, "points = 6"), Precision::double_);
+        CHECK(energy_drift(kernel, motion, 20000, 0) < 1e-12);  // 1e-13; 1e-7 with one measure for all
+    }
+}
+
 TEST_CASE("where sweeps cannot contract Newton's iteration takes the step") {
     struct Stiff {
         const Motion& motion;
@@ -234,7 +250,7 @@ TEST_CASE("where sweeps cannot contract Newton's iteration takes the step") {
     for (const Stiff& stiff : {Stiff{pendulum, 2.9 / 1.5, 1, 0},       // h omega = 2.9
                                Stiff{pendulum, 2.9 / 1.5, 20, 20000},  // 1978: some steps by sweeps, errors grow
                                Stiff{twelve, 2.5, 50, 0},              // h omega = 5
-                               Stiff{double_pendulum, 0.9, 1, 0}, Stiff{double_pendulum, 0.9, 20, 200}}) {  // 17
+                               Stiff{double_pendulum, 0.9, 1, 10}, Stiff{double_pendulum, 0.9, 20, 200}}) {  // 17
         INFO(stiff.motion.body << stiff.steps);
         const Derivation derivation = derivation_of(stiff.motion, lobatto_4);
         const auto with =
