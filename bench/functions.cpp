@@ -75,6 +75,7 @@ double latency(Arguments range, Function function) {
     const auto chain = [&](auto step) {
         return least_time([&] {
             T x = middle;
+            asm volatile("" : "+m"(x));  // so that nobody knows that the lanes agree
             for (int i = 0; i < count; ++i) x = fused(step(x), T(1e-40), T(middle));
             asm volatile("" : : "m"(x));
         });
