@@ -497,6 +497,20 @@ LOBATTO_INLINE Pack<real, width> pow(real_of<Pack<real, width>> x, const Pack<re
     return pow(Pack<real, width>(x), y);
 }
 
+// Sine and cosine of one double: a pack of one lane, so that a lone trajectory and a lane of many have the same bits.
+inline double sin(double x) {
+    return sin(Pack<double, 1>(x))[0];
+}
+inline double cos(double x) {
+    return cos(Pack<double, 1>(x))[0];
+}
+inline void sincos(double x, double& sine, double& cosine) {
+    Pack<double, 1> one_sine, one_cosine;
+    sincos(Pack<double, 1>(x), one_sine, one_cosine);
+    sine = one_sine[0];
+    cosine = one_cosine[0];
+}
+
 }  // namespace lobatto
 
 #endif
