@@ -53,12 +53,12 @@ LOBATTO_INLINE Doubles<width> unless(const Where<width>& holds, const Doubles<wi
     return Doubles<width>::load(values);
 }
 
-// x = k pi/2 + r + low with |r| <= pi/4, and the sine and cosine of r + low; the last bits of `quadrant` are k's.
+// x = k pi/2 + r - excess with |r| <= pi/4, and the sine and cosine of r - excess; the last bits of `quadrant` are k's.
 // For |x| < 2^19 pi/2.
 //
 // With pi/2 = a + b + c (53 bits each) x - k a is exact with FMA, and so is what rounding it to r loses. Without FMA
 // the parts have 33, 33 and 53 bits, so that the first two products are exact. Then the minimax polynomials of degree
-// 13 and 14 on [-pi/4, pi/4] published with FDLIBM; `low` is ready before they are.
+// 13 and 14 on [-pi/4, pi/4] published with FDLIBM; `excess` is ready before they are.
 template <int width>
 struct Reduced {
     Doubles<width> sine, cosine;
@@ -69,36 +69,36 @@ struct Reduced {
         const P shifted = fused(x, P(0.63661977236758134308), P(integer_shift));
         const P k = shifted - integer_shift;
         quadrant = bits(shifted);
-        P r, low;
+        P r, excess;
         if constexpr (has_fused) {
             constexpr double a = 0x1.921fb54442d18p+0, b = 0x1.1a62633145c07p-54, c = -0x1.f1976b7ed8fbcp-110;
             const P first = fused(k, P(-a), x);
             r = fused(k, P(-b), first);
-            const P d = first - r;
-            low = fused(k, P(-c), fused(k, P(-b), d) + ((first - d) - r));
+            const P d = r - first;
+            excess = fused(k, P(c), fused(k, P(b), d) + (r - (first + d)));
         } else {
             const P first = x - k * 1.57079632673412561417e+00;
             const P t = k * 6.07710050630396597660e-11;
             r = first - t;
             const P back = first - r;
-            low = ((back - t) + (first - (r + back))) - k * 2.02226624879595063154e-21;
+            excess = k * 2.02226624879595063154e-21 - ((back - t) + (first - (r + back)));
         }
         const P z = r * r;
         const P z2 = z * z;
         const P cube = z * r;
         const P s = fused(z2,
-                          fused(z2, fused(z, P(1.58969099521155010221e-10), P(-2.50507602534068634195e-08)),
-                                fused(z, P(2.75573137070700676789e-06), P(-1.98412698298579493134e-04))),
-                          fused(z, P(8.33333333332248946124e-03), P(-1.66666666666666324348e-01)));
+                          fused(z2, fused(z, P(-1.58969099521155010221e-10), P(2.50507602534068634195e-08)),
+                                fused(z, P(-2.75573137070700676789e-06), P(1.98412698298579493134e-04))),
+                          fused(z, P(-8.33333333332248946124e-03), P(1.66666666666666324348e-01)));
         const P rest = fused(z, P(-0.5), P(1.0));  // nearly the cosine, and the slope of the sine
-        sine = r + fused(cube, s, low * rest);
+        sine = r - fused(cube, s, excess * rest);  // -0 for -0
         const P c = fused(z2,
                           fused(z2, fused(z, P(-1.13596475577881948265e-11), P(2.08757232129817482790e-09)),
                                 fused(z, P(-2.75573143513906633035e-07), P(2.48015872894767294178e-05))),
                           fused(z, P(-1.38888888888741095749e-03), P(4.16666666666666019037e-02)));
-        P slope = -r;  // of the cosine; without FMA `low` may be ten units in the last place of r: one term more
-        if constexpr (!has_fused) slope = cube * 1.66666666666666324348e-01 - r;
-        cosine = rest + fused(z2, c, fused(low, slope, fused(z, P(-0.5), 1.0 - rest)));
+        P slope = r;  // minus that of the cosine; without FMA `excess` may be ten units in the last place of r
+        if constexpr (!has_fused) slope = r - cube * 1.66666666666666324348e-01;
+        cosine = rest + fused(z2, c, fused(excess, slope, fused(z, P(-0.5), 1.0 - rest)));
     }
 };
 
@@ -409,18 +409,22 @@ LOBATTO_INLINE Doubles<width> acos(const Doubles<width>& x) {
     return select(arc.large, select(x < 0.0, near_minus_one, near_one), small);
 }
 
-// float in double, register by register.
 template <int width>
 LOBATTO_INLINE Pack<double, width> widened(const Pack<float, width>& x) {
-    Pack<double, width> result;
-    for (int i = 0; i < width; ++i) result.set(i, static_cast<double>(x[i]));
-    return result;
+    float from[width];
+    double to[width];
+    x.store(from);
+    for (int i = 0; i < width; ++i) to[i] = static_cast<double>(from[i]);
+    return Pack<double, width>::load(to);
 }
 template <int width>
 LOBATTO_INLINE Pack<float, width> narrowed(const Pack<double, width>& x) {
-    Pack<float, width> result;
-    for (int i = 0; i < width; ++i) result.set(i, static_cast<float>(x[i]));
-    return result;
+    double from[width];
+    float to[width];
+    x.store(from);
+    for (int i = 0; i < width; ++i) to[i] = static_cast<float>(from[i]);
+    asm("" : "+m"(to));  // g++ 12 leaves out this rounding of two lanes where a widening follows
+    return Pack<float, width>::load(to);
 }
 
 // Register by register: the constants of a function fill too many registers for two at a time.
@@ -491,6 +495,20 @@ LOBATTO_INLINE Pack<real, width> pow(const Pack<real, width>& x, real_of<Pack<re
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> pow(real_of<Pack<real, width>> x, const Pack<real, width>& y) {
     return pow(Pack<real, width>(x), y);
+}
+
+// Sine and cosine of one double: a pack of one lane, so that a lone trajectory and a lane of many have the same bits.
+inline double sin(double x) {
+    return sin(Pack<double, 1>(x))[0];
+}
+inline double cos(double x) {
+    return cos(Pack<double, 1>(x))[0];
+}
+inline void sincos(double x, double& sine, double& cosine) {
+    Pack<double, 1> one_sine, one_cosine;
+    sincos(Pack<double, 1>(x), one_sine, one_cosine);
+    sine = one_sine[0];
+    cosine = one_cosine[0];
 }
 
 }  // namespace lobatto

@@ -100,67 +100,11 @@ inline long double cos(long double x) {
     return std::cos(x);
 }
 
-// Sine and cosine of one argument together.
+// Sine and cosine of one argument together. Those of double are in kernel_functions.hpp.
 template <class real>
 inline void sincos(real x, real& sine, real& cosine) {
     sine = sin(x);
     cosine = cos(x);
-}
-
-// The same for double, up to |x| < 2^19 pi/2: reduction by pi/2 in three parts (33 + 33 + 53 bits, so that k * part is
-// exact for |k| < 2^20 in the first two), kept as a sum of two doubles, then the minimax polynomials of degree 13 and
-// 14 on
-// [-pi/4, pi/4] published with FDLIBM. Measured: at most 0.77 ulp for |x| < 10^4 and 0.87 beyond, but 1.07 at some of
-// the doubles nearest the multiples of pi/2. Uses no FMA, so that every processor and compiler gives the same bits.
-inline void sincos(double x, double& sine, double& cosine) {
-    if (!(fabs(x) < 823549.0)) {
-        sine = std::sin(x);
-        cosine = std::cos(x);
-        return;
-    }
-    constexpr double shift = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
-    const double shifted = x * 0.63661977236758134308 + shift;
-    const double k = shifted - shift;
-    const std::int64_t quadrant = static_cast<std::int64_t>(k);
-    const double r1 = x - k * 1.57079632673412561417e+00;  // exact: the part has 33 bits
-    const double t = k * 6.07710050630396597660e-11;       // exact: the next 33 bits
-    const double r2 = r1 - t;
-    const double back = r1 - r2;
-    const double lost = (back - t) + (r1 - (r2 + back));       // what r1 - t lost
-    const double low = lost - k * 2.02226624879595063154e-21;  // the last 53 bits; the reduced argument is r2 + low
-    // Polynomials in Estrin's order: their latency is what a step waits for, and `low` is ready before they are.
-    const double z = r2 * r2;
-    const double z2 = z * z;
-    const double z4 = z2 * z2;
-    const double s =
-        (8.33333333332248946124e-03 + z * -1.98412698298579493134e-04) +
-        (z2 * (2.75573137070700676789e-06 + z * -2.50507602534068634195e-08) + z4 * 1.58969099521155010221e-10);
-    const double cube = z * r2;
-    const double sixth = cube * 1.66666666666666324348e-01;
-    const double sine_reduced = r2 - (sixth - (cube * (z * s) + (low - 0.5 * (z * low))));
-    const double c = (4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
-                     (z2 * (2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
-                      z4 * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11));
-    const double half = 0.5 * z;
-    const double rest = 1.0 - half;
-    const double cosine_reduced = rest + (((1.0 - rest) - half) + (z2 * c - low * (r2 - sixth)));
-    const bool swap = (quadrant & 1) != 0;
-    const double a = swap ? cosine_reduced : sine_reduced;
-    const double b = swap ? sine_reduced : cosine_reduced;
-    sine = (quadrant & 2) != 0 ? -a : a;
-    cosine = ((quadrant + 1) & 2) != 0 ? -b : b;
-}
-
-// Sine and cosine alone; for double half of the pair above, so that a lone sine has the same bits.
-inline double sin(double x) {
-    double sine, cosine;
-    sincos(x, sine, cosine);
-    return sine;
-}
-inline double cos(double x) {
-    double sine, cosine;
-    sincos(x, sine, cosine);
-    return cosine;
 }
 
 template <class... reals>
