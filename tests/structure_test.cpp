@@ -80,7 +80,8 @@ TEST_CASE("the runtime includes neither generator/ nor cli/, and none of the gen
 }
 
 TEST_CASE("what emitted kernels include stands on the C and C++ standard libraries alone") {
-    std::set<std::string> allowed = {"cmath", "cstdint", "limits", "type_traits", "utility", "quadmath.h"}, parts = {"kernel.hpp"};
+    std::set<std::string> allowed = {"cmath", "cstdint", "limits", "type_traits", "utility", "quadmath.h"},
+                          parts = {"kernel.hpp"};
     for (const std::string& name : includes(tree / "runtime/kernel.hpp")) parts.insert(name);
     REQUIRE(parts.size() > 5);
     allowed.insert(parts.begin(), parts.end());
