@@ -27,16 +27,16 @@ namespace lobatto {
 template <class real, class T, int inner>
 struct NodeLayout {
     static constexpr bool in_lanes = std::is_same_v<T, real>;
-    static constexpr int padded(int count) {
-        int width = 1;
-        while (width < count) width *= 2;
-        return width;
+    static constexpr int padded(int values) {
+        int lanes = 1;
+        while (lanes < values) lanes *= 2;
+        return lanes;
     }
     static constexpr int width = !in_lanes                                ? 1
                                  : padded(inner + 1) < native_lanes<real> ? padded(inner + 1)
                                                                           : native_lanes<real>;
     using V = std::conditional_t<in_lanes, Pack<real, width>, T>;
-    static constexpr int parts_of(int count) { return (count + width - 1) / width; }
+    static constexpr int parts_of(int values) { return (values + width - 1) / width; }
     // The end of the step is swept along with the inner nodes where that costs no further part.
     static constexpr bool with_end = width > 1 && parts_of(inner + 1) == parts_of(inner);
     static constexpr int count = inner + (with_end ? 1 : 0);
