@@ -97,15 +97,18 @@ VectorXd Linearisation::force(const VectorXd& q) {
 std::optional<VectorXd> Linearisation::equilibrium_from(VectorXd q) {
     const double extent = std::fmax(1.0, q.cwiseAbs().maxCoeff());
     try {
-        for (int iteration = 0; iteration < 60; ++iteration) {
+        for (int iteration = 0; iteration < 200; ++iteration) {  // slow where the stiffness vanishes too
             const VectorXd f = force(q);
             const MatrixXd S = at(0, q, VectorXd::Zero(system_.n)).stiffness;
             VectorXd step = S.completeOrthogonalDecomposition().solve(f);
             const double length = step.cwiseAbs().maxCoeff();
             if (!std::isfinite(length)) return std::nullopt;
             // The step may be zero because the force is, or because no direction resists it.
-            if (length <= 1e-15 * extent)
-                return f.norm() <= 1e-9 * extent * S.norm() || f.isZero(0) ? std::optional(q) : std::nullopt;
+            if (length <= 1e-15 * extent) {
+                if (!(f.norm() <= 1e-9 * extent * S.norm() || f.isZero(0))) return std::nullopt;
+                VectorXd rounded = q.unaryExpr([&](double x) { return std::fabs(x) < 1e-6 * extent ? 0 : x; });
+                return force(rounded).norm() <= f.norm() ? rounded : q;
+            }
             if (length > extent / 2) step *= extent / 2 / length;
             // Half as far as long as the force grows much: towards a pole, or over a top.
             for (int halving = 0; halving < 8 && !(force(q + step).norm() <= 2 * f.norm()); ++halving) step /= 2;
@@ -120,17 +123,18 @@ std::vector<VectorXd> Linearisation::equilibria(const std::vector<VectorXd>& sta
     std::vector<VectorXd> found;
     std::vector<VectorXd> spectra;
     for (const VectorXd& start : starts) {
-        auto q = equilibrium_from(start);
+        const auto q = equilibrium_from(start);
         if (!q) continue;
-        const double extent = std::fmax(1.0, start.cwiseAbs().maxCoeff());
-        for (double& x : *q)
-            if (std::fabs(x) < 1e-14 * extent) x = 0;
         const LinearSystem system = at(0, *q, VectorXd::Zero(system_.n));
+        // Where the mass matrix has no inverse the coordinates are singular, as angles at a pole.
+        Eigen::FullPivLU<MatrixXd> mass(system.mass);
+        mass.setThreshold(1e-10);
+        if (!mass.isInvertible()) continue;
+        const MatrixXd pull = mass.solve(system.stiffness);
         VectorXd spectrum(2);
-        spectrum << system.mass.partialPivLu().solve(system.stiffness).trace(),
-            system.mass.partialPivLu().solve(system.stiffness).squaredNorm();
+        spectrum << pull.trace(), (pull * pull).trace();
         const bool known = std::any_of(spectra.begin(), spectra.end(), [&](const VectorXd& other) {
-            return (other - spectrum).norm() <= 1e-9 * (other.norm() + spectrum.norm());
+            return (other - spectrum).norm() <= 1e-7 * (other.norm() + spectrum.norm());
         });
         if (known) continue;
         found.push_back(*q);

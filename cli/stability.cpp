@@ -9,13 +9,20 @@
 #include "cli/commands.hpp"
 #include "cli/drawing.hpp"
 #include "cli/method_option.hpp"
-#include "cli/output_path.hpp"
 #include "cli/stability_chart.hpp"
 #include "cli/stability_text.hpp"
+#include "generator/source.hpp"
 
 namespace lobatto {
 
 namespace {
+
+std::vector<Method> all_methods() {
+    std::vector<Method> methods;
+    for (int points = 2; points <= 12; ++points) methods.push_back({Family::lobatto, points});
+    for (int stages = 1; stages <= 10; ++stages) methods.push_back({Family::gauss, stages});
+    return methods;
+}
 
 struct StabilityCommand {
     std::string scene, chart;
@@ -24,28 +31,42 @@ struct StabilityCommand {
     bool json = false;
 };
 
-void draw_chart(const StabilityReport& report, const std::string& given) {
-    const auto script = stability_chart(report);
-    if (!script) {
-        if (!given.empty())
-            throw InputError(
-                fmt::format("{}: there is no chart to draw: no oscillation was found", report.derivation.scene.path));
-        return;
-    }
-    namespace fs = std::filesystem;
-    const fs::path path = output_path(given, report.derivation.scene.name + ".stability.svg");
-    if (path.extension() != ".svg")
-        throw InputError(fmt::format("{}: the chart is an SVG file; give it a name that ends in .svg", given));
-    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-    draw(folder.string(), path.stem().string(), *script, 900, 640, "Install it (apt install gnuplot-nox).");
+namespace fs = std::filesystem;
+
+// Before anything is computed.
+fs::path chart_path(const std::string& given) {
+    const fs::path path = given;
+    if (path.extension() != ".svg" || path.stem().empty())
+        throw InputError(fmt::format("--chart {}: the chart is an SVG file; give it a name that ends in .svg", given));
+    if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder))
+        throw InputError(fmt::format("--chart {}: there is no folder {}; make it first", given, folder.string()));
+    return path;
 }
 
-void show(const StabilityCommand& options) {
+void show_members(const StabilityCommand& options) {
+    if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
+        throw InputError("--chart, --step and --set belong to a scene; name one");
+    std::vector<Method> methods;
+    if (options.method.points)
+        methods = {{Family::lobatto, *options.method.points}};
+    else if (options.method.stages)
+        methods = {{Family::gauss, *options.method.stages}};
+    else
+        methods = all_methods();
+    std::vector<Stability> members;
+    for (const Method& method : methods) members.push_back(stability(quadrature_of(method)));
+    std::cout << (options.json ? json_of(members) : members.size() == 1 ? text_of(members.front()) : text_of(members));
+}
+
+void show_scene(const StabilityCommand& options) {
+    const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart);
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
     const StabilityReport report = stability_report(std::move(scene), options.overrides);
-    if (!options.chart.empty()) draw_chart(report, options.chart);
-    std::cout << (options.json ? json_of(report.member, &report) : text_of(report));
+    if (!chart.empty())
+        draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),
+             stability_chart(report), 900, 640, "Install it (apt install gnuplot-nox).");
+    std::cout << (options.json ? json_of(report) : text_of(report));
 }
 
 }  // namespace
@@ -54,7 +75,7 @@ void add_stability(CLI::App& program) {
     const auto options = std::make_shared<StabilityCommand>();
     CLI::App* command = program.add_subcommand(
         "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
-    command->add_option("scene", options->scene, "the scene file")->required();
+    command->add_option("scene", options->scene, "the scene file (default: none, every member of both families)");
     options->method.add_to(*command);
     command->add_option("--step", options->overrides.step,
                         "Step h; may use the scene's parameters, as in 2*pi/omega/50");
@@ -65,7 +86,7 @@ void add_stability(CLI::App& program) {
     command->add_option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
     command->add_flag("--json", options->json, "for machines (described in docs/stability.md)");
     command->footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
-    command->callback([options] { show(*options); });
+    command->callback([options] { options->scene.empty() ? show_members(*options) : show_scene(*options); });
 }
 
 }  // namespace lobatto

@@ -2,14 +2,14 @@
 // The stability chart: the trace with its bounds, and the growth of a step, theory and measurement.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "cli/stability_report.hpp"
 
 namespace lobatto {
 
-// A gnuplot script; nothing when the scene has no oscillation to draw.
-std::optional<std::string> stability_chart(const StabilityReport& report);
+// A gnuplot script. Of a linear scene, or of the equilibrium with the fastest oscillation; without one the stiffest
+// moment of the motion is marked, and nothing is measured.
+std::string stability_chart(const StabilityReport& report);
 
 }  // namespace lobatto

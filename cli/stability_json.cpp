@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/stability_text.hpp"
+#include "generator/modified_energy.hpp"
 #include "generator/notation.hpp"
 
 namespace lobatto {
@@ -20,9 +21,9 @@ Json root_of(const RealRoot& root) {
     Json json{{"z", decimal_of(root, shown_digits)},
               {"angle", decimal_of_square_root(root, shown_digits)},
               {"polynomial", text_of(root.polynomial, "z")}};
-    if (const auto exact = root.exact()) {
-        json["exact_z"] = canonical_text(*exact);
-        json["exact_angle"] = canonical_text(GiNaC::sqrt(*exact));
+    if (const std::string radicals = radicals_of(root); !radicals.empty()) {
+        json["exact_z"] = radicals;
+        json["exact_angle"] = radicals_of_square_root(root);
     }
     return json;
 }
@@ -87,27 +88,44 @@ Json point_of(const StabilityReport& report, const PointReport& point) {
     return json;
 }
 
+std::string text_of(const Json& json) {
+    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
 }  // namespace
 
-std::string json_of(const Stability& member, const StabilityReport* report) {
+std::string json_of(const std::vector<Stability>& members) {
     Json json;
     json["format"] = 1;
-    json["member"] = member_of(member);
-    if (report != nullptr) {
-        json["scene"] = report->derivation.scene.name;
-        json["title"] = report->derivation.scene.title;
-        json["step"] = report->step;
-        json["linear"] = report->derivation.system.linear;
-        json["points"] = Json::array();
-        for (const PointReport& point : report->points) json["points"].push_back(point_of(*report, point));
-        if (const auto& motion = report->trajectory)
-            json["trajectory"] = {{"steps", motion->steps},           {"looked_at", motion->looked_at},
-                                  {"largest_z", motion->largest_z},   {"largest_z_time", motion->largest_z_time},
-                                  {"parting", motion->parting},       {"rate", motion->rate},
-                                  {"exact_rate", motion->exact_rate}, {"time", motion->time},
-                                  {"excess", motion->excess},         {"excess_time", motion->excess_time}};
+    json["members"] = Json::array();
+    for (const Stability& member : members) json["members"].push_back(member_of(member));
+    return text_of(json);
+}
+
+std::string json_of(const StabilityReport& report) {
+    Json json;
+    json["format"] = 1;
+    json["scene"] = report.derivation.scene.name;
+    json["title"] = report.derivation.scene.title;
+    json["linear"] = report.derivation.system.linear;
+    json["step"] = report.step;
+    json["member"] = member_of(report.member);
+    json["points"] = Json::array();
+    for (const PointReport& point : report.points) json["points"].push_back(point_of(report, point));
+    if (const auto& motion = report.trajectory)
+        json["trajectory"] = {{"steps", motion->steps},           {"looked_at", motion->looked_at},
+                              {"largest_z", motion->largest_z},   {"largest_z_time", motion->largest_z_time},
+                              {"parting", motion->parting},       {"rate", motion->rate},
+                              {"exact_rate", motion->exact_rate}, {"time", motion->time},
+                              {"excess", motion->excess},         {"excess_time", motion->excess_time}};
+    if (const auto& energy = report.energy) {
+        json["energy"] = {{"order", energy->order},
+                          {"variation", energy->variation},
+                          {"modified_variation", energy->modified_variation}};
+        if (const auto general = general_modified_energy(report.member.method))
+            json["energy"]["term_of_one_coordinate"] = canonical_text(*general);
     }
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return text_of(json);
 }
 
 }  // namespace lobatto

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "cli/kernel_of.hpp"
 #include "cli/linearisation.hpp"
 #include "cli/motion.hpp"
+#include "generator/modified_energy.hpp"
 #include "runtime/error.hpp"
 #include "runtime/monodromy.hpp"
 
@@ -51,6 +53,16 @@ PointReport point_report(const StabilityReport& report, const LinearSystem& syst
     point.kernel_rate = measured_rate_at(report, q, report.step);
     return point;
 }
+
+// Of values near an origin.
+struct Extent {
+    cln::cl_R origin = 0;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    void take(const cln::cl_R& value) {
+        low = std::fmin(low, cln::double_approx(value - origin));
+        high = std::fmax(high, cln::double_approx(value - origin));
+    }
+};
 
 struct State {
     double time = 0;
@@ -116,6 +128,40 @@ TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation&
     return result;
 }
 
+std::optional<EnergyReport> energy_report(const StabilityReport& report, const std::vector<State>& states) {
+    const System& system = report.derivation.system;
+    const Scene& scene = report.derivation.scene;
+    const auto modified = modified_energy(system, report.member.method);
+    if (!modified || states.empty()) return std::nullopt;
+    Formulas formulas;
+    for (const Parameter& parameter : scene.parameters)
+        formulas.set(parameter.symbol, float_of(scene.evaluate(parameter.value, "the parameter " + parameter.name)));
+    const auto set = [&](const State& state) {
+        for (std::size_t k = 0; k < modified->p.size(); ++k) {
+            formulas.set(system.q[k], float_of(exactly(state.q(static_cast<Eigen::Index>(k)))));
+            formulas.set(modified->p[k], float_of(exactly(state.p(static_cast<Eigen::Index>(k)))));
+        }
+    };
+    set(states.front());
+    const std::vector<Id> ids = formulas.convert({modified->energy, modified->term});
+    const double power = std::pow(report.step, modified->order);
+    EnergyReport result;
+    result.order = modified->order;
+    Extent plain_energy, corrected;
+    for (const State& state : states) {
+        set(state);
+        const std::vector<cln::cl_R> values = formulas.evaluate(ids);
+        // Their differences matter, not their sizes: taken at 60 digits.
+        if (&state == &states.front()) plain_energy.origin = corrected.origin = values[0];
+        plain_energy.take(values[0]);
+        corrected.take(values[0] + cln::rational(cln::cl_DF(power)) * values[1]);
+        result.size = std::fmax(result.size, std::fabs(cln::double_approx(values[0])));
+    }
+    result.variation = plain_energy.high - plain_energy.low;
+    result.modified_variation = corrected.high - corrected.low;
+    return result;
+}
+
 Scene with_tangent(Scene scene) {
     Outputs outputs;
     outputs.energy = outputs.momenta = false;
@@ -131,7 +177,7 @@ StabilityReport begin(Scene scene, const Overrides& overrides, TrajectoryRequest
     const Steps steps = steps_of(derivation.scene, overrides);
     LoadedStepper<double> stepper(kernel);
     request = request_of(derivation.scene, steps.count, stepper);
-    StabilityReport report{std::move(derivation), std::move(kernel), request.parameters, request.step, {}, {}, {}};
+    StabilityReport report{std::move(derivation), std::move(kernel), request.parameters, request.step, {}, {}, {}, {}};
     report.member = stability(report.derivation.quadrature);
     return report;
 }
@@ -175,6 +221,7 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
             report.points.push_back(point_report(report, linearisation.at(0, q, rest), q));
     }
     report.trajectory = trajectory_report(report, linearisation, states, request.steps);
+    report.energy = energy_report(report, states);
     return report;
 }
 

@@ -37,6 +37,14 @@ struct TrajectoryReport {
     double excess = 0, excess_time = 0;         // the largest difference of the two, and when
 };
 
+// Of nonlinear separable systems: how much along the scene's motion H varies, and what backward error analysis says
+// that the steps keep better (D37).
+struct EnergyReport {
+    int order = 0;
+    double variation = 0, modified_variation = 0;  // greatest minus least value: of H, of H + h^order H_order
+    double size = 0;                               // the largest |H|
+};
+
 struct StabilityReport {
     Derivation derivation;  // of the scene with its overrides
     Kernel kernel;
@@ -45,6 +53,7 @@ struct StabilityReport {
     Stability member;
     std::vector<PointReport> points;             // of a linear system one
     std::optional<TrajectoryReport> trajectory;  // of nonlinear systems
+    std::optional<EnergyReport> energy;
 };
 
 // Derives, compiles and runs. InputError, ComputationError, MachineError.

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "generator/describe.hpp"
+#include "generator/modified_energy.hpp"
 #include "generator/notation.hpp"
 
 namespace lobatto {
@@ -32,15 +34,14 @@ std::string polynomial(const GiNaC::ex& f, const Propagation& step) {
 // 1.0253, or 1 + 4.5e-07 of narrow gaps.
 std::string growth_text(double rate) {
     if (std::isinf(rate)) return "without bound";
+    if (rate <= 0) return "1";
     return std::fabs(rate) < 1e-3 ? fmt::format("1 + {:.2g}", rate) : fmt::format("{:.5g}", std::exp(rate));
 }
 
 std::string limit_text(const RealRoot& limit) {
     std::string text = decimal_of_square_root(limit, shown_digits);
-    if (const auto exact = limit.exact()) {
-        const std::string radicals = canonical_text(GiNaC::sqrt(*exact));
-        if (radicals != text) text += " = " + radicals;
-    }
+    const std::string radicals = radicals_of_square_root(limit);
+    if (!radicals.empty() && radicals != text) text += " = " + radicals;
     return text;
 }
 
@@ -96,8 +97,12 @@ std::string mode_text(const Stability& member, const Mode& mode, double h) {
     text += "stable";
     if (member.limits.empty()) return text;
     std::size_t k = 0;
-    while (k < member.limits.size() && member.limits[k].high.to_double() < mode.z) ++k;
-    return text + fmt::format(" while h < {:.6g}", std::sqrt(member.limits[k].high.to_double()) / (x / h));
+    while (member.limits[k].high.to_double() < mode.z) ++k;
+    const auto step_at = [&](std::size_t limit) {
+        return std::sqrt(member.limits[limit].approximation(20).to_double()) / (x / h);
+    };
+    return text + (k == 0 ? fmt::format(" while h < {:.6g}", step_at(0))
+                          : fmt::format(" between h = {:.6g} and {:.6g}", step_at(k - 1), step_at(k)));
 }
 
 // All, or the ends of a long list and what is unstable.
@@ -133,7 +138,7 @@ std::string point_text(const StabilityReport& report, const PointReport& point) 
         text += fmt::format(
             "  coupled by velocities: no independent oscillations; the motion itself grows by {} in a "
             "time h\n",
-            growth_text(point.exact_rate));
+            growth_text(point.exact_rate > 1e-12 ? point.exact_rate : 0));
     if (point.kernel_rate)
         text += fmt::format("  measured on the kernel: growth a step {}\n",
                             *point.kernel_rate > 1e-4 ? growth_text(*point.kernel_rate) : "1, to rounding");
@@ -155,8 +160,11 @@ std::string trajectory_text(const StabilityReport& report) {
         text += "\n";
     }
     if (motion.looked_at == 0) return text;
-    text += fmt::format("  of {} steps looked at, {} have an eigenvalue above 1: neighbouring motions part there\n",
-                        motion.looked_at, motion.parting);
+    text +=
+        motion.parting == 0
+            ? fmt::format("  no eigenvalue of a step is above 1 ({} steps looked at)\n", motion.looked_at)
+            : fmt::format("  an eigenvalue above 1, so that neighbouring motions part, in {} of {} steps looked at\n",
+                          motion.parting, motion.looked_at);
     if (motion.parting > 0)
         text += fmt::format("  fastest at t = {:.6g}: {} a step; the motion itself {}\n", motion.time,
                             growth_text(motion.rate), growth_text(motion.exact_rate));
@@ -166,7 +174,40 @@ std::string trajectory_text(const StabilityReport& report) {
     return text;
 }
 
+std::string energy_text(const StabilityReport& report) {
+    const EnergyReport& energy = *report.energy;
+    std::string text = fmt::format(
+        "\nEnergy that the steps keep, by backward error analysis (D37): H + h^{0}*H_{0} + ...\n", energy.order);
+    if (report.derivation.system.n == 1)
+        if (const auto general = general_modified_energy(report.member.method))
+            text += row(fmt::format("H_{}", energy.order), canonical_text(*general)) +
+                    "  (m the mass, V_k the k-th derivative of V)\n";
+    return text + fmt::format("  along the motion H varies by {:.2g}, this sum by {:.2g}; rounding is some {:.0e}\n",
+                              energy.variation, energy.modified_variation,
+                              energy.size * std::numeric_limits<double>::epsilon());
+}
+
+std::string left(const std::string& text, std::size_t columns) {
+    return text + std::string(text.size() < columns ? columns - text.size() : 1, ' ');
+}
+
 }  // namespace
+
+std::string text_of(const std::vector<Stability>& members) {
+    std::string text = left("member", 19) + left("order", 7) + left("phase error", 46) +
+                       left("first limit of h*omega", 34) + "unstable intervals, last limit\n";
+    for (const Stability& member : members) {
+        const std::size_t gaps = member.limits.size() / 2;
+        text += left(member.method.name(), 19) + left(std::to_string(member.method.order()), 7) +
+                left(fmt::format("{}*(h*omega)^{}", canonical_text(member.phase_error), member.phase_order), 46) +
+                left(member.limits.empty() ? "none" : decimal_of_square_root(member.limits.front(), shown_digits), 34) +
+                (member.limits.empty()
+                     ? "none: stable for every step (proved)"
+                     : fmt::format("{} and beyond {}", gaps, decimal_of_square_root(member.limits.back(), 10))) +
+                "\n";
+    }
+    return text;
+}
 
 std::string text_of(const Stability& member) {
     const Propagation& step = member.step;
@@ -211,6 +252,7 @@ std::string text_of(const StabilityReport& report) {
         text += point_text(report, point);
     }
     if (report.trajectory) text += trajectory_text(report);
+    if (report.energy) text += energy_text(report);
     return text;
 }
 

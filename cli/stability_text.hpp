@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "cli/stability_report.hpp"
 
@@ -13,7 +14,11 @@ std::string text_of(const Stability& member);
 // The same and then the scene.
 std::string text_of(const StabilityReport& report);
 
-// docs/stability.md, last section. `report` may be null: the member alone.
-std::string json_of(const Stability& member, const StabilityReport* report);
+// A table, a line for each.
+std::string text_of(const std::vector<Stability>& members);
+
+// docs/stability.md, last section.
+std::string json_of(const std::vector<Stability>& members);
+std::string json_of(const StabilityReport& report);
 
 }  // namespace lobatto

@@ -61,6 +61,8 @@ std::optional<ModifiedEnergy> modified_energy(const System& system, const Method
     // The time derivatives of q along the exact motion, in q and p; p' = -grad V.
     std::vector<ex> momenta(result.p.begin(), result.p.end());
     const std::vector<ex> velocity = accelerated(momenta);
+    result.energy = system.potential;
+    for (std::size_t k = 0; k < size; ++k) result.energy += result.p[k] * velocity[k] / 2;
     const auto along_motion = [&](const ex& f) {
         ex rate = 0;
         for (std::size_t k = 0; k < size; ++k)

@@ -15,8 +15,9 @@ namespace lobatto {
 // The steps follow, but for terms of higher order, the exact motion of H + h^order term (D37). Autonomous separable
 // systems without outer forces: L = 1/2 v^T M v - V(q).
 struct ModifiedEnergy {
-    int order = 0;   // of the member
-    GiNaC::ex term;  // in the system's positions q and the momenta p
+    int order = 0;     // of the member
+    GiNaC::ex energy;  // H = 1/2 p^T M^-1 p + V, in the system's positions q and the momenta p
+    GiNaC::ex term;    // H_order
     std::vector<GiNaC::symbol> p;
 };
 

@@ -264,6 +264,21 @@ std::vector<RealRoot> positive_roots(const ex& polynomial, const GiNaC::symbol& 
     return roots;
 }
 
+std::string radicals_of(const RealRoot& root) {
+    const auto exact = root.exact();
+    if (!exact) return "";
+    if (root.low == root.high || root.polynomial[1].is_zero()) return canonical_text(*exact);
+    const numeric centre = -root.polynomial[1] / (2 * root.polynomial[2]);
+    const bool above = root.low >= centre;
+    return canonical_text(centre) + (above ? " + " : " - ") + canonical_text(above ? *exact - centre : centre - *exact);
+}
+
+std::string radicals_of_square_root(const RealRoot& root) {
+    if (root.low == root.high) return canonical_text(GiNaC::sqrt(ex(root.low)));
+    const std::string radicals = radicals_of(root);
+    return radicals.empty() ? "" : "sqrt(" + radicals + ")";
+}
+
 std::string decimal_of(const RealRoot& root, int digits) {
     return agreed_digits(root, digits,
                          [](const numeric& x, int shown, int working) { return decimal(real_of(x, working), shown); });

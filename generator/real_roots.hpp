@@ -58,6 +58,10 @@ struct RealRoot {
 // All zeros z > 0, ascending, the intervals disjoint. Multiplicities are those in the polynomial.
 std::vector<RealRoot> positive_roots(const GiNaC::ex& polynomial, const GiNaC::symbol& z);
 
+// "39 + sqrt(849)" and "sqrt(39 + sqrt(849))": the zero and its square root where there are radicals, else "".
+std::string radicals_of(const RealRoot& root);
+std::string radicals_of_square_root(const RealRoot& root);
+
 // The zero, or its square root, correctly rounded to this many significant digits.
 std::string decimal_of(const RealRoot& root, int digits);
 std::string decimal_of_square_root(const RealRoot& root, int digits);
