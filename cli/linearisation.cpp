@@ -21,15 +21,20 @@ bool is_small(const MatrixXd& difference, const MatrixXd& matrix) {
 }  // namespace
 
 std::optional<VectorXd> LinearSystem::squared_frequencies() const {
-    if (!is_small(drag, mass * std::sqrt(stiffness.norm() / mass.norm()))) return std::nullopt;
+    if (!drag.isZero(0) && !is_small(drag, mass * std::sqrt(stiffness.norm() / mass.norm()))) return std::nullopt;
     if (!is_small(stiffness - stiffness.transpose(), stiffness)) return std::nullopt;
     if (mass.llt().info() != Eigen::Success) return std::nullopt;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(stiffness, mass, Eigen::EigenvaluesOnly);
+    // Coordinates in units in which each has mass 1.
+    const VectorXd unit = mass.diagonal().cwiseSqrt().cwiseInverse();
+    const MatrixXd M = unit.asDiagonal() * mass * unit.asDiagonal(),
+                   S = unit.asDiagonal() * stiffness * unit.asDiagonal();
+    if (!M.allFinite() || !S.allFinite()) return std::nullopt;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(S, M, Eigen::EigenvaluesOnly);
     if (solver.info() != Eigen::Success) return std::nullopt;
     VectorXd values = solver.eigenvalues();
-    const double largest = values.cwiseAbs().maxCoeff();
+    const double noise = 1e-14 * static_cast<double>(values.size()) * values.cwiseAbs().maxCoeff();
     for (double& value : values)  // a free direction
-        if (std::fabs(value) <= 10 * rounding * largest) value = 0;
+        if (std::fabs(value) <= noise) value = 0;
     return values;
 }
 

@@ -75,6 +75,9 @@ std::string stability_chart(const StabilityReport& report) {
             const double share = 0.5 - 0.5 * std::cos(i * 3.14159265358979 / 40);
             places.push_back(limits[k] + (limits[k + 1] - limits[k]) * share);
         }
+    for (std::size_t k = 0; k + 1 < limits.size(); k += 2)  // the curves rise steeply from zero
+        for (const double share : {1e-8, 1e-6, 1e-4, 1 - 1e-4, 1 - 1e-6, 1 - 1e-8})
+            places.push_back(limits[k] + (limits[k + 1] - limits[k]) * share);
     std::sort(places.begin(), places.end());
     for (const double x : places) {
         const double rate = rate_at(x);
@@ -83,7 +86,8 @@ std::string stability_chart(const StabilityReport& report) {
     const auto measure = [&](double x) {
         if (point == nullptr) return;
         const auto rate = measured_rate_at(report, point->q, report.step * x / highest);
-        if (rate && *rate > least_rate) measured += fmt::format("{:.10g},{:.6g}\n", x, *rate);
+        if (rate && *rate > std::fmax(least_rate, measured_floor(report)))
+            measured += fmt::format("{:.10g},{:.6g}\n", x, *rate);
     };
     for (int i = 1; i <= 60; ++i) measure(right * i / 60);
     for (std::size_t k = 0; k + 1 < limits.size(); k += 2)
@@ -112,9 +116,9 @@ std::string stability_chart(const StabilityReport& report) {
         modes.size() > 1 ? " of the fastest mode" : "", least_rate, most_rate);
     for (std::size_t k = 0; k + 1 < limits.size(); k += 2)
         script += shade(limits[k], limits[k + 1], least_rate, most_rate);
-    script +=
-        "plot $theory using 1:2 with lines ls 2 title \"theory\", $measured using 1:2 with points ls 3 ps 0.8 "
-        "title \"kernel, measured\"\nunset multiplot\n";
+    script += "plot $theory using 1:2 with lines ls 2 title \"theory\"";
+    if (point != nullptr) script += ", $measured using 1:2 with points ls 3 ps 0.8 title \"kernel, measured\"";
+    script += "\nunset multiplot\n";
     return script;
 }
 

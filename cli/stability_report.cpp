@@ -2,6 +2,8 @@
 // What there is to know of the stability of a scene's steps: exactly, and measured on its kernel.
 #include "cli/stability_report.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,9 +22,11 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr std::int64_t states_looked_at = 200;
-constexpr int most_starts = 24;           // of the search for equilibria
-constexpr int most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
-constexpr int fine = 8;                   // steps of h/8 stand for the motion itself
+constexpr int most_starts = 24;                   // of the search for equilibria
+constexpr std::size_t most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
+constexpr std::size_t most_coordinates = 1024;
+constexpr double least_z = 1e-290;  // below, nothing moves
+constexpr int fine = 8;             // steps of h/8 stand for the motion itself
 
 std::vector<double> plain(const VectorXd& values) {
     return {values.begin(), values.end()};
@@ -35,7 +39,12 @@ GiNaC::numeric exactly(double x) {
 std::vector<Mode> modes_of(const Stability& member, const VectorXd& squared, double h) {
     std::vector<Mode> modes;
     for (const double value : squared) {
-        const double z = h * h * value;
+        double z = h * h * value;
+        if (!std::isfinite(z))
+            throw ComputationError(fmt::format(
+                "the squared frequency {:.3g} times the squared step leaves the range of numbers; choose other units",
+                value));
+        if (std::fabs(z) < least_z) z = 0;
         modes.push_back({value, z, z == 0 ? 0 : rate_of_step(member, exactly(z))});
     }
     return modes;
@@ -108,7 +117,7 @@ TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation&
             }
         } catch (const DomainError&) {  // at a singularity
         }
-        if (report.kernel->coordinates > most_for_eigenvalues) continue;
+        if (state.q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) continue;
         const auto values = step_eigenvalues(stepper, report.step, state.time, q, p);
         const auto exact = step_eigenvalues(finer, report.step / fine, state.time, q, p, fine);
         if (!values || !exact) continue;
@@ -162,14 +171,23 @@ std::optional<EnergyReport> energy_report(const StabilityReport& report, const s
     return result;
 }
 
+long measured_steps(const StabilityReport& report) {
+    const long n = report.kernel->coordinates;
+    return std::max(1L << 9, (1L << 16) / (n * n));
+}
+
 Scene with_tangent(Scene scene) {
     Outputs outputs;
     outputs.energy = outputs.momenta = false;
+    outputs.tangent = scene.coordinates.size() <= most_for_eigenvalues;
     scene.outputs = outputs;
     return scene;
 }
 
 StabilityReport begin(Scene scene, const Overrides& overrides, TrajectoryRequest& request) {
+    if (scene.coordinates.size() > most_coordinates)
+        throw InputError(fmt::format("{}: the frequencies of {} coordinates would take too long; at most {} are judged",
+                                     scene.path, scene.coordinates.size(), most_coordinates));
     scene = with_tangent(std::move(scene));
     Derivation derivation = derive(scene);
     Kernel kernel = kernel_of(emit(derivation), Precision::double_);
@@ -184,12 +202,15 @@ StabilityReport begin(Scene scene, const Overrides& overrides, TrajectoryRequest
 
 }  // namespace
 
+double measured_floor(const StabilityReport& report) {
+    return report.kernel->linear != 0 ? 8.0 / static_cast<double>(measured_steps(report)) : 1e-6;
+}
+
 std::optional<double> measured_rate_at(const StabilityReport& report, const VectorXd& q, double step) {
     LoadedStepper<double> stepper(report.kernel);
     if (stepper.prepare(report.parameters, step) != LOBATTO_OK) return std::nullopt;
-    const int n = report.kernel->coordinates;
-    if (report.kernel->linear != 0) return measured_rate(stepper, step, std::max(1L << 9, (1L << 16) / (n * n)));
-    if (n > most_for_eigenvalues) return std::nullopt;
+    if (report.kernel->linear != 0) return measured_rate(stepper, step, measured_steps(report));
+    if (q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) return std::nullopt;
     const std::vector<double> position = plain(q),
                               momentum = stepper.momentum(0, position, std::vector<double>(position.size()));
     const auto values = step_eigenvalues(stepper, step, 0, position, momentum);
@@ -214,7 +235,7 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
         return report;
     }
     const std::vector<State> states = states_along(report, request);
-    if (system.autonomous && system.n <= most_for_eigenvalues) {
+    if (system.autonomous && system.n <= static_cast<int>(most_for_eigenvalues)) {
         std::vector<VectorXd> starts{start};
         for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);
         for (const VectorXd& q : linearisation.equilibria(starts))

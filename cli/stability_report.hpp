@@ -62,6 +62,8 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides);
 // ln of the growth of a linear system's steps of size h, by running the kernel; of others by the eigenvalues of the
 // kernel's step at q.
 std::optional<double> measured_rate_at(const StabilityReport& report, const Eigen::VectorXd& q, double step);
+// What is below this of such a measurement may be left of the start.
+double measured_floor(const StabilityReport& report);
 
 // The largest rate of a linear system's modes when the step is `factor` times the report's.
 double largest_rate(const StabilityReport& report, const std::vector<Mode>& modes, double factor);

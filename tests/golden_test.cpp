@@ -234,7 +234,7 @@ TEST_CASE("the emitted oscillator is the paper's Phi, with determinant 1") {
     }
 }
 
-TEST_CASE("the emitted discrete energy of the oscillator is the paper's form, and a million steps keep it") {
+TEST_CASE("the emitted discrete energy of the oscillator is the paper's form, and steps keep it") {
     using K = lobatto::kernels::harmonic_oscillator;
     lobatto::Stepper<K> stepper;
     const double h = 0.05, omega = 6.283185307179586, z = h * h * omega * omega, q = 1.25, p = -3;
@@ -248,7 +248,7 @@ TEST_CASE("the emitted discrete energy of the oscillator is the paper's form, an
     const double first = H_d(&q, &p);
     CHECK(relative(first, (h * c * p * p - b / h * q * q) / (2 * delta)) < 1e-15);
     double worst = 0;
-    for (int i = 0; i < 1000000; ++i) {
+    for (int i = 0; i < 100000; ++i) {
         REQUIRE(stepper.step() == lobatto::Status::ok);
         worst = std::fmax(worst, relative(H_d(stepper.q, stepper.p), first));
     }

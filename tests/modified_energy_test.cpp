@@ -39,8 +39,8 @@ std::pair<double, double> variations(const Kernel& kernel, const System& system,
     LoadedStepper<__float128> stepper(kernel);
     REQUIRE(stepper.prepare({}, step) == LOBATTO_OK);
     const auto n = static_cast<std::size_t>(system.n);
-    std::vector<__float128> q(n, 0.9Q), p(n, 0.3Q);
-    p[0] = 0.1Q;
+    std::vector<__float128> q(n, 0.9), p(n, 0.3);
+    p[0] = 0.1;
     REQUIRE(stepper.start(0, q, p) == LOBATTO_OK);
     Formulas formulas;
     std::vector<Id> ids;

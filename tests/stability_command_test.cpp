@@ -127,7 +127,7 @@ TEST_CASE("a pendulum is linearised where it hangs and where it stands, and alon
 
 TEST_CASE("a step beyond the first limit somewhere along a motion is named") {
     const test::TemporaryFolder folder;
-    const std::string path = scene_in(folder, "q'^2/2 - 450*(1 - cos(q))", "q = { position = 0.5, velocity = 0 }");
+    const std::string path = scene_in(folder, "q'^2/2 - 450*(1 - cos(q))", "q = { position = 0.05, velocity = 0 }");
     const test::Finished done = stability({path, "--points", "2"});
     CHECK(done.exit_code == 0);
     CHECK(contains(done.out, "UNSTABLE: grows by"));

@@ -75,7 +75,7 @@ TEST_CASE("the trace is in lowest terms, its denominator has positive coefficien
         CAPTURE(method.name());
         const Stability& member = stability_of(method);
         const GiNaC::symbol& z = member.step.z;
-        CHECK(GiNaC::gcd(member.step.a, member.step.delta).is_equal(1));
+        CHECK(GiNaC::gcd(member.step.a, member.step.delta).degree(z) == 0);
         for (const numeric& coefficient : member.trace_below) CHECK(coefficient > 0);
         CHECK(member.trace(0) == 2);
         // a^2 - b c = delta^2: the step has determinant 1.
