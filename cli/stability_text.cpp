@@ -34,8 +34,9 @@ std::string polynomial(const GiNaC::ex& f, const Propagation& step) {
 // 1.0253, or 1 + 4.5e-07 of narrow gaps.
 std::string growth_text(double rate) {
     if (std::isinf(rate)) return "without bound";
-    if (rate <= 0) return "1";
-    return std::fabs(rate) < 1e-3 ? fmt::format("1 + {:.2g}", rate) : fmt::format("{:.5g}", std::exp(rate));
+    if (rate == 0) return "1";
+    return std::fabs(rate) < 1e-3 ? fmt::format("1 {} {:.2g}", rate > 0 ? '+' : '-', std::fabs(rate))
+                                  : fmt::format("{:.5g}", std::exp(rate));
 }
 
 std::string limit_text(const RealRoot& limit) {
@@ -135,10 +136,8 @@ std::string point_text(const StabilityReport& report, const PointReport& point) 
     if (point.modes)
         text += modes_text(report.member, *point.modes, report.step);
     else
-        text += fmt::format(
-            "  coupled by velocities: no independent oscillations; the motion itself grows by {} in a "
-            "time h\n",
-            growth_text(point.exact_rate > 1e-12 ? point.exact_rate : 0));
+        text += fmt::format("  no independent oscillations: {}; the motion itself grows by {} in a time h\n",
+                            point.obstacle, growth_text(std::fabs(point.exact_rate) > 1e-12 ? point.exact_rate : 0));
     if (point.kernel_rate)
         text += fmt::format("  measured on the kernel: growth a step {}\n", *point.kernel_rate > measured_floor(report)
                                                                                 ? growth_text(*point.kernel_rate)
@@ -148,7 +147,11 @@ std::string point_text(const StabilityReport& report, const PointReport& point) 
 
 std::string trajectory_text(const StabilityReport& report) {
     const TrajectoryReport& motion = *report.trajectory;
-    std::string text = fmt::format("\nAlong the motion: {} steps\n", motion.steps);
+    std::string text = fmt::format(
+        "\nAlong the motion: {}\n",
+        motion.steps_done == motion.steps
+            ? fmt::format("{} steps", motion.steps)
+            : fmt::format("it stops after {} of {} steps; lobatto run says why", motion.steps_done, motion.steps));
     if (motion.largest_z > 0) {
         text += fmt::format("  stiffest at t = {:.6g}: h*omega = {:.6g}", motion.largest_z_time,
                             std::sqrt(motion.largest_z));
