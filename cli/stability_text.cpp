@@ -139,9 +139,9 @@ std::string point_text(const StabilityReport& report, const PointReport& point) 
         text += fmt::format("  no independent oscillations: {}; the motion itself grows by {} in a time h\n",
                             point.obstacle, growth_text(std::fabs(point.exact_rate) > 1e-12 ? point.exact_rate : 0));
     if (point.kernel_rate)
-        text += fmt::format("  measured on the kernel: growth a step {}\n", *point.kernel_rate > measured_floor(report)
-                                                                                ? growth_text(*point.kernel_rate)
-                                                                                : "1, to rounding");
+        text += fmt::format("  measured on the kernel: growth a step {}\n",
+                            std::fabs(*point.kernel_rate) > measured_floor(report) ? growth_text(*point.kernel_rate)
+                                                                                   : "1, to rounding");
     return text;
 }
 
