@@ -306,6 +306,8 @@ private:
                     for (std::size_t j = 0; j < element.x.size(); ++j) {
                         if (target == slope + "[i" + std::to_string(j) + "] +=")
                             add(element_target(slope, static_cast<std::size_t>(variable(j))), value);
+                        else if (target == slope + "[i" + std::to_string(j) + "] -=")
+                            add(element_target(slope, static_cast<std::size_t>(variable(j))), -value);
                         for (std::size_t column = 0; column < pairs.size() && j == 0; ++column)
                             if (target == second + "[" + name + "_entry[r * " + std::to_string(pairs.size()) + " + " +
                                               std::to_string(column) + "]] +=")

@@ -162,7 +162,7 @@ TEST_CASE("steps by sweeps are those of Newton's iteration, in double") {
         const char* method;
         double bound;
     };
-    const Motion twelve = chain();
+    const Motion twelve = chain(), ring = lattice();
     for (const Compared& c :
          {Compared{pendulum, lobatto_4, 800},             // 102
           Compared{pendulum, "points = 5", 800},          // 127
@@ -177,15 +177,17 @@ TEST_CASE("steps by sweeps are those of Newton's iteration, in double") {
           Compared{spherical_pendulum, lobatto_4, 4000},  // 546; against long double 37 by sweeps, 509 by Newton
           Compared{spherical_pendulum, gauss_3, 500},     // 53
           Compared{driven_pendulum, lobatto_4, 200},      // 21
-          Compared{twelve, lobatto_4, 800}}) {            // 90
+          Compared{twelve, lobatto_4, 800},               // 90; neighbours in lanes, as the next
+          Compared{ring, "points = 5", 800}, Compared{ring, "points = 2", 800}, Compared{ring, gauss_3, 800}}) {
         INFO(c.motion.body << c.method);
         CHECK(compared<double>(c.motion, c.method, Precision::double_, 200) < c.bound);
     }
 }
 
 TEST_CASE("steps by sweeps are those of Newton's iteration, in float and long double") {
-    // 71, 11, 66, 61 in float, 4 and 6 in long double
-    for (const Motion* motion : {&pendulum, &henon_heiles, &kepler, &double_pendulum}) {
+    // 71, 11, 66, 61, ... in float, 4 and 6 in long double
+    const Motion ring = lattice();
+    for (const Motion* motion : {&pendulum, &henon_heiles, &kepler, &double_pendulum, &ring}) {
         INFO(motion->body);
         CHECK(compared<float>(*motion, lobatto_4, Precision::single, 100) < 500);
         if (motion == &henon_heiles || motion == &double_pendulum)
@@ -239,6 +241,21 @@ TEST_CASE("a coordinate at rest far from zero takes no accuracy from the others"
     }
 }
 
+TEST_CASE("formulas go along neighbouring coordinates where these stand in rows, and only there") {
+    const auto claims = [](const Motion& motion, const char* output = "", bool general = false) {
+        return derivation_of(motion, lobatto_4, output, general).structure.neighbours;
+    };
+    CHECK(claims(chain()));
+    CHECK(claims(lattice()));
+    CHECK_FALSE(claims(chain(), "", true));
+    CHECK_FALSE(claims(pendulum));
+    Motion scattered = chain();
+    for (const char* find : {"x[i] - x[i-1]"})  // 1 with 5, 2 with 10, ...: nobody's neighbour
+        for (std::size_t at; (at = scattered.body.find(find)) != std::string::npos;)
+            scattered.body.replace(at, std::string(find).size(), "x[i] - x[mod(5*i, n+1)]");
+    CHECK_FALSE(claims(scattered));
+}
+
 TEST_CASE("where sweeps cannot contract Newton's iteration takes the step") {
     struct Stiff {
         const Motion& motion;
@@ -272,8 +289,10 @@ TEST_CASE("dense output, events and the tangent map after steps by sweeps are th
     struct Seen {
         std::vector<double> between, events, tangent;
     };
-    for (const Watched& watched : {Watched{pendulum, "q = 0"}, Watched{henon_heiles, "x = y"},
-                                   Watched{double_pendulum, "a = b"}, Watched{spherical_pendulum, "a = 0.8"}}) {
+    const Motion twelve = chain();
+    for (const Watched& watched :
+         {Watched{twelve, "x_1 = 0"}, Watched{pendulum, "q = 0"}, Watched{henon_heiles, "x = y"},
+          Watched{double_pendulum, "a = b"}, Watched{spherical_pendulum, "a = 0.8"}}) {
         const Derivation derivation = derivation_of(watched.motion, lobatto_4, "events = [\"" + watched.event + "\"]");
         const std::size_t n = watched.motion.q.size(), columns = 2 + 2 * n, room = 100;
         const auto look = [&](const Kernel& kernel) {
@@ -311,7 +330,8 @@ TEST_CASE("dense output, events and the tangent map after steps by sweeps are th
 }
 
 TEST_CASE("steps back in time are taken by sweeps too") {
-    for (const Motion* motion : {&pendulum, &double_pendulum}) {
+    const Motion twelve = chain();
+    for (const Motion* motion : {&pendulum, &double_pendulum, &twelve}) {
         const Derivation derivation = derivation_of(*motion, lobatto_4, "tangent = false");
         const Kernel kernel = kernel_in_own_cache(derivation, Precision::double_),
                      newton = newton_kernel(derivation, Precision::double_);
