@@ -66,8 +66,8 @@ struct ExportEnsemble {
     static void read(const void* ensemble, void* q, void* p) {
         if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->state(out(q), out(p));
     }
-    static void measure(const void* ensemble, void* energy) {
-        if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->energy(out(energy));
+    static void measure(const void* ensemble, void* value) {
+        if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->energy(out(value));
     }
 
     static constexpr auto prepare = lanes > 0 ? make : nullptr;
