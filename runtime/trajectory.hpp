@@ -65,7 +65,7 @@ struct TrajectoryRequest {
     std::function<void(const EventRecords&)> events;  // likewise; nothing: events are not sought
     std::function<void(std::int64_t done)> progress;  // called about ten times a second
     const volatile int* interrupted = nullptr;        // stop between blocks once it is not zero
-    // Called about four times a second, less often where it takes longer than a fiftieth of the time, and when the run
+    // Called about ten times a second, less often where it takes longer than a fiftieth of the time, and when the run
     // is interrupted; all that came before has gone to the sinks. Going on from there gives the bits of a run that was
     // never stopped.
     std::function<void(const Halfway&)> checkpoint;

@@ -20,7 +20,8 @@ bool contains(const std::string& text, const std::string& part) {
 
 // A scene with one piece of it replaced by the attacker's.
 struct Pieces {
-    std::string title = "\"Harmless\"", unit = "\"m\"", name = "x", number = "1", event = "\"x = 0\"", key = "k";
+    std::string title = "\"Harmless\"", unit = "'`touch pwned`;$(touch pwned)*/%n'", name = "x", number = "1",
+                event = "\"x = 0\"", key = "k";
 
     std::string text() const {
         return "title = " + title + "\nlagrangian = \"" + name + "'^2/2 - " + key + "*" + name +
@@ -49,13 +50,13 @@ TEST_CASE("titles, units and events that a shell, C++, gnuplot or LaTeX would ta
     const std::vector<std::string> texts = {
         "\"`touch pwned` $(touch pwned) ; touch pwned | touch pwned\"",
         "'''Its '; touch pwned; system('touch pwned')'''",
-        "\"%s%n {} {0} @touch pwned@ */ #include ??/ #line 1 R'(\"",
+        "\"%s%n {} {0} @touch pwned@ */ #include ?\?/ #line 1 R'(\"",
         "'''{`touch pwned`} #{system} <<EOF'''",
     };
     for (const std::string& text : texts) {
         CAPTURE(text);
         Pieces pieces;
-        pieces.title = pieces.unit = text;
+        pieces.title = text;
         const Finished done = attack("run", pieces);
         CHECK_MESSAGE(done.exit_code == 0, done.err);
         CHECK(attack("derive", pieces, {"--latex"}).exit_code == 0);
@@ -102,16 +103,6 @@ TEST_CASE("names and numbers that are none are refused where they stand") {
         Pieces pieces;
         pieces.number = number;
         CHECK(attack("run", pieces).exit_code == 2);
-    }
-}
-
-TEST_CASE("names that are words of C++, of macros or of the kernel's own text compile and change nothing") {
-    for (const char* name :
-         {"int", "new", "NULL", "assert", "linux", "unix", "EOF", "main", "this", "K", "real", "std"}) {
-        CAPTURE(name);
-        Pieces pieces;
-        pieces.key = name;
-        CHECK(attack("run", pieces).exit_code == 0);
     }
 }
 
