@@ -70,8 +70,10 @@ std::optional<std::string> own_file(const std::string& path) {
     if (descriptor < 0 && errno == ENOENT) return std::nullopt;
     if (descriptor < 0) fail(path, std::strerror(errno));
     struct stat status {};
-    const bool is_ours = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == ::geteuid() &&
-                         (status.st_mode & S_IWOTH) == 0;
+    const bool is_file = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+    // A group of one's own is no stranger: with umask 002 what one writes is writable by it.
+    const mode_t strangers = status.st_gid == ::getegid() ? S_IWOTH : S_IWGRP | S_IWOTH;
+    const bool is_ours = is_file && status.st_uid == ::geteuid() && (status.st_mode & strangers) == 0;
     std::string content(is_ours ? static_cast<std::size_t>(status.st_size) : 0, '\0');
     const ssize_t count = ::pread(descriptor, content.data(), content.size(), 0);
     ::close(descriptor);

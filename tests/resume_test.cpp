@@ -30,20 +30,20 @@ struct Subject {
 const Subject subjects[] = {
     {"swept",
      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\npoints = 6\n"
-     "[run]\nstep = 0.1\nuntil = 400000\n[output]\nevery = 37\nevents = [\"q = 0 rising\"]\n",
+     "[run]\nstep = 0.1\nuntil = 200000\n[output]\nevery = 37\nevents = [\"q = 0 rising\"]\n",
      {}},
     {"general",
      "lagrangian = \"a'^2 + b'^2/2 + a'*b'*cos(a - b) + 2*cos(a) + cos(b)\"\n[coordinates]\n"
-     "a = { position = 1, velocity = 0 }\nb = { position = 2, velocity = 0 }\n[run]\nstep = 0.05\nuntil = 40000\n"
+     "a = { position = 1, velocity = 0 }\nb = { position = 2, velocity = 0 }\n[run]\nstep = 0.05\nuntil = 20000\n"
      "[output]\nevery = 10\n",
      {}},
     {"linear",
      "lagrangian = \"q'^2/2 - 2*q^2\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[run]\nstep = 0.1\n"
-     "until = 1500000\n[output]\nevery = 100\n",
+     "until = 750000\n[output]\nevery = 100\n",
      {}},
     {"dense",
      "lagrangian = \"x'^2/2 + y'^2/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 0.7, velocity = 0 }\n"
-     "y = { position = 0, velocity = 1.3627 }\n[run]\nstep = 0.05\nuntil = 10000\n[output]\ndense = 1\n"
+     "y = { position = 0, velocity = 1.3627 }\n[run]\nstep = 0.05\nuntil = 5000\n[output]\ndense = 1\n"
      "events = [\"y = 0\"]\n",
      {"--tolerance", "1e-9"}}};
 
@@ -115,7 +115,7 @@ void check_kills(int kills, unsigned seed) {
         const TemporaryFolder folder;
         const std::string torn = folder / "torn.csv", log = folder / "log";
         // A run that were always killed before its first checkpoint would never end.
-        std::uniform_int_distribution<std::int64_t> moment(0, std::max<std::int64_t>(whole.length.count(), 600000));
+        std::uniform_int_distribution<std::int64_t> moment(0, std::max<std::int64_t>(whole.length.count(), 400000));
         bool ended = false;
         std::int64_t kept = 0;
         while (!ended) {
