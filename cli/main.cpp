@@ -87,6 +87,7 @@ void describe(CLI::App& program) {
 int main(int argc, char** argv) {
     // `lobatto derive scene | head -1` ends quietly, even when the parent process ignores closed pipes.
     std::signal(SIGPIPE, SIG_DFL);
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write(2)
     CLI::App program("Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.",
                      "lobatto");
     try {

@@ -126,8 +126,6 @@ inline Derivation derivation_of(const Motion& motion, const std::string& method,
 
 // Without sweeps: each step by Newton's iteration alone.
 inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
-    static const TemporaryFolder folder;
-    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     EmitOptions options;
     options.precision = precision;
     KernelSource source = emit(derivation, options);
@@ -138,8 +136,6 @@ inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
 }
 
 inline Kernel ensemble_kernel_in_own_cache(const Derivation& derivation) {
-    static const TemporaryFolder folder;
-    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     return ensemble_kernel_of(emit(derivation), Precision::double_);
 }
 
