@@ -18,6 +18,7 @@ void add_emit(CLI::App& program);
 void add_gallery(CLI::App& program);
 void add_run(CLI::App& program);
 void add_paper(CLI::App& program);
+void add_stability(CLI::App& program);
 void add_sweep(CLI::App& program);
 void add_verify(CLI::App& program);
 

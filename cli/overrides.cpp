@@ -48,7 +48,8 @@ GiNaC::ex in_parameters(const std::string& option, const std::string& argument, 
     Names names = parameter_names(scene);
     const Scope scope{&names, what, false, {}};
     GiNaC::exmap values;
-    for (const Parameter& parameter : scene.parameters) values[parameter.symbol] = parameter.value;
+    for (const Parameter& parameter : scene.parameters)  // whose own values may be formulas, as 2*pi
+        values[parameter.symbol] = scene.evaluate(parameter.value, "the parameter " + parameter.name);
     const Source source(option, argument);
     const GiNaC::ex expression = parse_expression(source, text_of(argument, 0), scope);
     value_in_range(source, {1, 1}, expression, what, values);

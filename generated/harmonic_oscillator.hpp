@@ -21,7 +21,7 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "a56a6c19c39f5c46";
+    static constexpr const char* digest = "53ebdb83061157a5";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -136,6 +136,12 @@ struct harmonic_oscillator {
     static void propagate(const CoefficientsOf<given>& k, const number* q, const number* p, number* q1, number* p1) {
         q1[0] = q[0] + (q[0] * k.Phi_minus_I[0] + p[0] * k.Phi_minus_I[1]);
         p1[0] = p[0] + (q[0] * k.Phi_minus_I[3] + p[0] * k.Phi_minus_I[4]);
+    }
+
+    // (D21) The energy that the steps conserve exactly, nearly h times H(q, p); q, p: n.
+    template <class given, class number>
+    static number discrete_energy(const CoefficientsOf<given>& k, const number* q, const number* p) {
+        return lobatto::discrete_energy<coordinates>(k.Phi_minus_I, q, p);
     }
 };
 

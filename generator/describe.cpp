@@ -535,11 +535,10 @@ private:
         vector("propagation", "D20", "eq:symplecticSystem", "one step",
                {name_of(disc.Q.back()[0]), name_of(disc.p1[0])},
                {position / symbol("delta"), momentum / symbol("delta")});
-        if (force.is_zero())
-            scalar(
-                "discrete_energy", "D21", "eq:discreteEnergy", "the energy that the steps conserve exactly", "H_d",
-                (h / m * symbol("c") * GiNaC::pow(disc.p0[0], 2) - m / h * symbol("b") * GiNaC::pow(disc.Q[0][0], 2)) /
-                    (2 * symbol("delta")));
+        scalar("discrete_energy", "D21", "eq:discreteEnergy", "the energy that the steps conserve exactly", "H_d",
+               (h / m * symbol("c") * GiNaC::pow(disc.p0[0], 2) - m / h * symbol("b") * GiNaC::pow(disc.Q[0][0], 2) -
+                (force.is_zero() ? ex(0) : 2 * h * force * symbol("e_p") * disc.Q[0][0])) /
+                   (2 * symbol("delta")));
     }
 
     const Derivation& d_;

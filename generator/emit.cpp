@@ -65,6 +65,13 @@ public:
                 "q1, "
                 "number* p1) {\n"
                 "        lobatto::apply_map<coordinates>(k.Phi_minus_I, q, p, q1, p1);\n    }\n";
+        if (is_map() && !forced())
+            text +=
+                "\n    // (D21) The energy that the steps conserve exactly, nearly h times H(q, p); q, p: n.\n"
+                "    template <class given, class number>\n"
+                "    static number discrete_energy(const CoefficientsOf<given>& k, const number* q, const number* p) "
+                "{\n"
+                "        return lobatto::discrete_energy<coordinates>(k.Phi_minus_I, q, p);\n    }\n";
         text += "};\n\n}  // namespace lobatto::kernels\n";
         return text;
     }
@@ -78,10 +85,8 @@ private:
             "// Written by Lobatto from a scene file; edit the scene, not this file. Formula numbers (D..): "
             "docs/derivation.md.\n//\n";
         text += wrapped("// Lagrangian   L = " + comment_safe(d_.scene.lagrangian_text), "//                  ");
-        const bool forced = std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
-                                        [](const GiNaC::ex& force) { return !force.is_zero(); });
         text += fmt::format("// Method       {}: order {}, {}\n", d_.quadrature.method.name(), d_.quadrature.order(),
-                            forced ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
+                            forced() ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
         text += "// Coordinates  ";
         for (int k = 0; k < n_; ++k) {
             const Coordinate& coordinate = d_.scene.coordinates[static_cast<std::size_t>(k)];
@@ -309,6 +314,10 @@ private:
     bool takes_how(const Declaration& declaration) const {
         return d_.structure.neighbours && has_lanes(options_.precision) &&
                std::string(declaration.program) == "acceleration";
+    }
+    bool forced() const {
+        return std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
+                           [](const GiNaC::ex& force) { return !force.is_zero(); });
     }
     bool is_map() const { return d_.structure.form == Form::linear_map; }
 

@@ -9,6 +9,12 @@
 
 namespace lobatto {
 
+namespace {
+
+constexpr int most_coordinates = 64;  // of a discrete energy: matrices of twice as many rows
+
+}  // namespace
+
 template <class real>
 real symplectic_defect(const LoadedStepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p) {
     const std::size_t n = q.size(), rows = 2 * n;
@@ -42,12 +48,13 @@ double DiscreteEnergy::operator()(const double* q, const double* p) const {
     z -= Eigen::Map<const Eigen::VectorXd>(centre.data(), 2 * n);
     const Eigen::Map<const Eigen::MatrixXd> matrix(form.data(), 2 * n,
                                                    2 * n);  // symmetric: the order of storage does not matter
-    return z.dot(matrix * z);
+    return z.dot(matrix * z) + z.dot(Eigen::Map<const Eigen::VectorXd>(slope.data(), 2 * n));
 }
 
 std::optional<DiscreteEnergy> discrete_energy(const LoadedStepper<double>& stepper) {
-    if (stepper.kernel()->form != LOBATTO_LINEAR_MAP) return std::nullopt;
-    const int n = stepper.kernel()->coordinates;
+    const lobatto_kernel& kernel = stepper.kernel().table();
+    const int n = kernel.coordinates;
+    if (kernel.linear == 0 || kernel.autonomous == 0 || n > most_coordinates) return std::nullopt;
     const std::vector<double> zero(static_cast<std::size_t>(n), 0.0);
     std::vector<double> q1, p1, T;
     if (stepper.tangent(0, zero, zero, q1, p1, T) != LOBATTO_OK) return std::nullopt;
@@ -59,14 +66,18 @@ std::optional<DiscreteEnergy> discrete_energy(const LoadedStepper<double>& stepp
     // (1 - Phi) z* = shift, where it has a solution.
     const Matrix difference = Matrix::Identity(2 * n, 2 * n) - Phi;
     const Eigen::VectorXd centre = difference.completeOrthogonalDecomposition().solve(shift);
-    const double rounding = 1e-10 * shift.norm();
-    if (!((difference * centre - shift).norm() <= rounding)) return std::nullopt;
+    Eigen::VectorXd left = shift - difference * centre;
+    if (left.norm() <= 1e-10 * shift.norm()) left.setZero();
 
     Matrix J = Matrix::Zero(2 * n, 2 * n);
     J.topRightCorner(n, n).setIdentity();
     J.bottomLeftCorner(n, n) = -Matrix::Identity(n, n);
     const Matrix form = -0.25 * (J * Phi + (J * Phi).transpose());
-    return DiscreteEnergy{n, {form.data(), form.data() + form.size()}, {centre.data(), centre.data() + centre.size()}};
+    const Eigen::VectorXd slope = -0.5 * (J * left + Phi.transpose() * (J * left));
+    return DiscreteEnergy{n,
+                          {form.data(), form.data() + form.size()},
+                          {centre.data(), centre.data() + centre.size()},
+                          {slope.data(), slope.data() + slope.size()}};
 }
 
 }  // namespace lobatto

@@ -162,6 +162,23 @@ inline void apply_map(const given* E, const number* q, const number* p, number* 
     }
 }
 
+// (D21) H_d(z) = 1/2 ((p - w_p).q1 - (q - w_q).p1) for z = (q, p), the step z1 = z + E z + w and the shift w: conserved
+// exactly where Phi = 1 + E is symplectic, whether or not the map has a fixed point. In increments d = E z + w, so that
+// p.q and q.p do not have to cancel.
+template <int n, class given, class number>
+inline number discrete_energy(const given* E, const number* q, const number* p) {
+    number value = number(0);
+    for (int k = 0; k < n; ++k) {
+        const given *const row_q = E + k * (2 * n + 1), *const row_p = E + (n + k) * (2 * n + 1);
+        const given w_q = row_q[2 * n], w_p = row_p[2 * n];
+        number d_q = number(w_q), d_p = number(w_p);
+        for (int j = 0; j < n; ++j) d_q += row_q[j] * q[j] + row_q[n + j] * p[j];
+        for (int j = 0; j < n; ++j) d_p += row_p[j] * q[j] + row_p[n + j] * p[j];
+        value += (p[k] * d_q - q[k] * d_p) + (w_q * (p[k] + d_p) - w_p * (q[k] + d_q));
+    }
+    return value * number(0.5);
+}
+
 // The stepper of an affine map: the whole step is K::propagate.
 template <class K>
 struct Stepper<K, Form::linear_map> : Motion<K> {

@@ -234,3 +234,25 @@ TEST_CASE("the emitted oscillator is the paper's Phi, with determinant 1") {
         CHECK(defect(E) < 1e-19 + 3e-18 * static_cast<double>(x));
     }
 }
+
+TEST_CASE("the emitted discrete energy of the oscillator is the paper's form, and steps keep it") {
+    using K = lobatto::kernels::harmonic_oscillator;
+    lobatto::Stepper<K> stepper;
+    const double h = 0.05, omega = 6.283185307179586, z = h * h * omega * omega, q = 1.25, p = -3;
+    REQUIRE(stepper.prepare({}, h) == lobatto::Status::ok);
+    REQUIRE(stepper.start(0, &q, &p) == lobatto::Status::ok);
+    const auto H_d = [&](const double* position, const double* momentum) {
+        return K::discrete_energy(stepper.coefficients, position, momentum);
+    };
+    const double delta = 1 + z / 30 + z * z / 1800, b = -z + 2 * z * z / 15 - z * z * z / 300 + z * z * z * z / 43200,
+                 c = 1 - 2 * z / 15 + z * z / 300;
+    const double first = H_d(&q, &p);
+    CHECK(relative(first, (h * c * p * p - b / h * q * q) / (2 * delta)) < 1e-15);
+    double worst = 0;
+    for (int i = 0; i < 100000; ++i) {
+        REQUIRE(stepper.step() == lobatto::Status::ok);
+        worst = std::fmax(worst, relative(H_d(stepper.q, stepper.p), first));
+    }
+    CHECK(worst < 1e-12);
+    CHECK(worst > 0);
+}

@@ -296,3 +296,35 @@ TEST_CASE("a massless pendulum is refused") {
     Pendulum stepper;
     CHECK(stepper.prepare({0, 1}, 0.1) == Status::singular_mass);
 }
+
+TEST_CASE("the discrete energy of an affine symplectic map is conserved, with a fixed point and without") {
+    // A kick p -= A q + a, then a drift q += B p + b: symplectic for symmetric A and B. With a singular A there is no
+    // fixed point.
+    for (const double last : {1.25, 0.5}) {  // 1, 1/2; 1/2, last: the determinant is last - 1/4
+        const double A[2][2] = {{1, 0.5}, {0.5, last == 0.5 ? 0.25 : last}}, B[2][2] = {{0.5, 0.25}, {0.25, 1}};
+        const double a[2] = {0.3, -1}, b[2] = {0.7, 0.2};
+        double E[4 * 5] = {};  // rows q, p; columns q, p, shift
+        for (int i = 0; i < 2; ++i) {
+            for (int j = 0; j < 2; ++j) {
+                E[(2 + i) * 5 + j] = -A[i][j];
+                E[i * 5 + 2 + j] = B[i][j];
+                for (int k = 0; k < 2; ++k) E[i * 5 + j] -= B[i][k] * A[k][j];
+                E[i * 5 + 4] -= B[i][j] * a[j];
+            }
+            E[i * 5 + 4] += b[i];
+            E[(2 + i) * 5 + 4] = -a[i];
+        }
+        double q[2] = {0.4, -1.1}, p[2] = {0.9, 0.35};
+        const double first = lobatto::discrete_energy<2>(E, q, p);
+        CHECK(std::fabs(first) > 0.01);
+        for (int step = 0; step < 6; ++step) {
+            double q1[2], p1[2];
+            lobatto::apply_map<2>(E, q, p, q1, p1);
+            for (int k = 0; k < 2; ++k) {
+                q[k] = q1[k];
+                p[k] = p1[k];
+            }
+            CHECK(std::fabs(lobatto::discrete_energy<2>(E, q, p) - first) < 1e-12);
+        }
+    }
+}

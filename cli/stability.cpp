@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto stability: which steps keep a motion bounded, exactly, and what a scene's step does.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+
+#include "cli/commands.hpp"
+#include "cli/drawing.hpp"
+#include "cli/method_option.hpp"
+#include "cli/stability_chart.hpp"
+#include "cli/stability_text.hpp"
+#include "generator/source.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::vector<Method> all_methods() {
+    std::vector<Method> methods;
+    for (int points = 2; points <= 12; ++points) methods.push_back({Family::lobatto, points});
+    for (int stages = 1; stages <= 10; ++stages) methods.push_back({Family::gauss, stages});
+    return methods;
+}
+
+struct StabilityCommand {
+    std::string scene, chart;
+    MethodOption method;
+    Overrides overrides;
+    bool json = false;
+};
+
+namespace fs = std::filesystem;
+
+// Before anything is computed.
+fs::path chart_path(const std::string& given) {
+    const fs::path path = given;
+    if (path.extension() != ".svg" || path.stem().empty())
+        throw InputError(fmt::format("--chart {}: the chart is an SVG file; give it a name that ends in .svg", given));
+    if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder))
+        throw InputError(fmt::format("--chart {}: there is no folder {}; make it first", given, folder.string()));
+    return path;
+}
+
+void show_members(const StabilityCommand& options) {
+    if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
+        throw InputError("--chart, --step and --set belong to a scene; name one");
+    std::vector<Method> methods;
+    if (options.method.points)
+        methods = {{Family::lobatto, *options.method.points}};
+    else if (options.method.stages)
+        methods = {{Family::gauss, *options.method.stages}};
+    else
+        methods = all_methods();
+    std::vector<Stability> members;
+    for (const Method& method : methods) members.push_back(stability(quadrature_of(method)));
+    std::cout << (options.json ? json_of(members) : members.size() == 1 ? text_of(members.front()) : text_of(members));
+}
+
+void show_scene(const StabilityCommand& options) {
+    const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart);
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    const StabilityReport report = stability_report(std::move(scene), options.overrides);
+    if (!chart.empty())
+        draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),
+             stability_chart(report), 900, 640, "Install it (apt install gnuplot-nox).");
+    std::cout << (options.json ? json_of(report) : text_of(report));
+}
+
+}  // namespace
+
+void add_stability(CLI::App& program) {
+    const auto options = std::make_shared<StabilityCommand>();
+    CLI::App* command = program.add_subcommand(
+        "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
+    command->add_option("scene", options->scene, "the scene file (default: none, every member of both families)");
+    options->method.add_to(*command);
+    command->add_option("--step", options->overrides.step,
+                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
+    command
+        ->add_option("--set", options->overrides.set,
+                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
+        ->allow_extra_args(false);
+    command->add_option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
+    command->add_flag("--json", options->json, "for machines (described in docs/stability.md)");
+    command->footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
+    command->callback([options] { options->scene.empty() ? show_members(*options) : show_scene(*options); });
+}
+
+}  // namespace lobatto

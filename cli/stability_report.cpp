@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What there is to know of the stability of a scene's steps: exactly, and measured on its kernel.
+#include "cli/stability_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "cli/kernel_of.hpp"
+#include "cli/linearisation.hpp"
+#include "cli/motion.hpp"
+#include "generator/modified_energy.hpp"
+#include "runtime/error.hpp"
+#include "runtime/monodromy.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr std::int64_t states_looked_at = 200;
+constexpr int most_starts = 24;                   // of the search for equilibria
+constexpr std::size_t most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
+constexpr std::size_t most_coordinates = 1024;
+constexpr double least_z = 1e-290;  // below, nothing moves
+constexpr int fine = 8;             // steps of h/8 stand for the motion itself
+
+std::vector<double> plain(const VectorXd& values) {
+    return {values.begin(), values.end()};
+}
+
+GiNaC::numeric exactly(double x) {
+    return GiNaC::numeric(cln::rational(cln::cl_DF(x)));
+}
+
+std::vector<Mode> modes_of(const Stability& member, const VectorXd& squared, double h) {
+    std::vector<Mode> modes;
+    for (const double value : squared) {
+        double z = h * h * value;
+        if (!std::isfinite(z))
+            throw ComputationError(fmt::format(
+                "the squared frequency {:.3g} times the squared step leaves the range of numbers; choose other units",
+                value));
+        if (std::fabs(z) < least_z) z = 0;
+        modes.push_back({value, z, z == 0 ? 0 : rate_of_step(member, exactly(z))});
+    }
+    return modes;
+}
+
+PointReport point_report(const StabilityReport& report, const LinearSystem& system, const VectorXd& q) {
+    PointReport point;
+    point.q = q;
+    point.exact_rate = report.step * system.rate();
+    if (const auto squared = system.squared_frequencies()) {
+        point.modes = modes_of(report.member, *squared, report.step);
+        const double lowest = squared->minCoeff();
+        point.exact_rate = lowest < 0 ? report.step * std::sqrt(-lowest) : 0;
+    }
+    point.kernel_rate = measured_rate_at(report, q, report.step);
+    return point;
+}
+
+// Of values near an origin.
+struct Extent {
+    cln::cl_R origin = 0;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    void take(const cln::cl_R& value) {
+        low = std::fmin(low, cln::double_approx(value - origin));
+        high = std::fmax(high, cln::double_approx(value - origin));
+    }
+};
+
+struct State {
+    double time = 0;
+    VectorXd q, p;
+};
+
+std::vector<State> states_along(const StabilityReport& report, TrajectoryRequest request) {
+    std::vector<State> states;
+    const Eigen::Index n = report.kernel->coordinates;
+    request.every = std::max<std::int64_t>(1, request.steps / states_looked_at);
+    request.dense = 0;
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) {
+            const double* const row = records.rows + i * records.columns;
+            states.push_back(
+                {row[0], Eigen::Map<const VectorXd>(row + 1, n), Eigen::Map<const VectorXd>(row + 1 + n, n)});
+        }
+    };
+    integrate(report.kernel, request);         // as far as it goes
+    if (states.size() > 1) states.pop_back();  // a step that fails may come after the last
+    return states;
+}
+
+TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation& linearisation,
+                                   const std::vector<State>& states, std::int64_t steps) {
+    TrajectoryReport result;
+    result.steps = steps;
+    LoadedStepper<double> stepper(report.kernel), finer(report.kernel);
+    stepper.prepare(report.parameters, report.step);
+    finer.prepare(report.parameters, report.step / fine);
+    std::vector<double> velocity;
+    for (const State& state : states) {
+        const std::vector<double> q = plain(state.q), p = plain(state.p);
+        try {
+            if (stepper.velocity(state.time, q, p, velocity) == LOBATTO_OK) {
+                const Eigen::Map<const VectorXd> v(velocity.data(), state.q.size());
+                const auto squared = linearisation.at(state.time, state.q, v).squared_frequencies();
+                if (const double z = squared ? report.step * report.step * squared->maxCoeff() : 0;
+                    z > result.largest_z) {
+                    result.largest_z = z;
+                    result.largest_z_time = state.time;
+                }
+            }
+        } catch (const DomainError&) {  // at a singularity
+        }
+        if (state.q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) continue;
+        const auto values = step_eigenvalues(stepper, report.step, state.time, q, p);
+        const auto exact = step_eigenvalues(finer, report.step / fine, state.time, q, p, fine);
+        if (!values || !exact) continue;
+        ++result.looked_at;
+        const double rate = std::log(std::abs(values->front())), exact_rate = std::log(std::abs(exact->front()));
+        if (rate > 1e-6) ++result.parting;
+        if (rate > result.rate) {
+            result.rate = rate;
+            result.exact_rate = exact_rate;
+            result.time = state.time;
+        }
+        if (rate - exact_rate > result.excess) {
+            result.excess = rate - exact_rate;
+            result.excess_time = state.time;
+        }
+    }
+    return result;
+}
+
+std::optional<EnergyReport> energy_report(const StabilityReport& report, const std::vector<State>& states) {
+    const System& system = report.derivation.system;
+    const Scene& scene = report.derivation.scene;
+    const auto modified = modified_energy(system, report.member.method);
+    if (!modified || states.empty()) return std::nullopt;
+    Formulas formulas;
+    for (const Parameter& parameter : scene.parameters)
+        formulas.set(parameter.symbol, float_of(scene.evaluate(parameter.value, "the parameter " + parameter.name)));
+    const auto set = [&](const State& state) {
+        for (std::size_t k = 0; k < modified->p.size(); ++k) {
+            formulas.set(system.q[k], float_of(exactly(state.q(static_cast<Eigen::Index>(k)))));
+            formulas.set(modified->p[k], float_of(exactly(state.p(static_cast<Eigen::Index>(k)))));
+        }
+    };
+    set(states.front());
+    const std::vector<Id> ids = formulas.convert({modified->energy, modified->term});
+    const double power = std::pow(report.step, modified->order);
+    EnergyReport result;
+    result.order = modified->order;
+    Extent plain_energy, corrected;
+    for (const State& state : states) {
+        set(state);
+        const std::vector<cln::cl_R> values = formulas.evaluate(ids);
+        // Their differences matter, not their sizes: taken at 60 digits.
+        if (&state == &states.front()) plain_energy.origin = corrected.origin = values[0];
+        plain_energy.take(values[0]);
+        corrected.take(values[0] + cln::rational(cln::cl_DF(power)) * values[1]);
+        result.size = std::fmax(result.size, std::fabs(cln::double_approx(values[0])));
+    }
+    result.variation = plain_energy.high - plain_energy.low;
+    result.modified_variation = corrected.high - corrected.low;
+    return result;
+}
+
+long measured_steps(const StabilityReport& report) {
+    const long n = report.kernel->coordinates;
+    return std::max(1L << 9, (1L << 16) / (n * n));
+}
+
+Scene with_tangent(Scene scene) {
+    Outputs outputs;
+    outputs.energy = outputs.momenta = false;
+    outputs.tangent = scene.coordinates.size() <= most_for_eigenvalues;
+    scene.outputs = outputs;
+    return scene;
+}
+
+StabilityReport begin(Scene scene, const Overrides& overrides, TrajectoryRequest& request) {
+    if (scene.coordinates.size() > most_coordinates)
+        throw InputError(fmt::format("{}: the frequencies of {} coordinates would take too long; at most {} are judged",
+                                     scene.path, scene.coordinates.size(), most_coordinates));
+    scene = with_tangent(std::move(scene));
+    Derivation derivation = derive(scene);
+    Kernel kernel = kernel_of(emit(derivation), Precision::double_);
+    apply(overrides, derivation.scene);  // after the derivation: one kernel serves all values
+    const Steps steps = steps_of(derivation.scene, overrides);
+    LoadedStepper<double> stepper(kernel);
+    request = request_of(derivation.scene, steps.count, stepper);
+    StabilityReport report{std::move(derivation), std::move(kernel), request.parameters, request.step, {}, {}, {}, {}};
+    report.member = stability(report.derivation.quadrature);
+    return report;
+}
+
+}  // namespace
+
+double measured_floor(const StabilityReport& report) {
+    return report.kernel->linear != 0 ? 8.0 / static_cast<double>(measured_steps(report)) : 1e-6;
+}
+
+std::optional<double> measured_rate_at(const StabilityReport& report, const VectorXd& q, double step) {
+    LoadedStepper<double> stepper(report.kernel);
+    if (stepper.prepare(report.parameters, step) != LOBATTO_OK) return std::nullopt;
+    if (report.kernel->linear != 0) return measured_rate(stepper, step, measured_steps(report));
+    if (q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) return std::nullopt;
+    const std::vector<double> position = plain(q),
+                              momentum = stepper.momentum(0, position, std::vector<double>(position.size()));
+    const auto values = step_eigenvalues(stepper, step, 0, position, momentum);
+    return values ? std::optional(std::log(std::abs(values->front()))) : std::nullopt;
+}
+
+double largest_rate(const StabilityReport& report, const std::vector<Mode>& modes, double factor) {
+    double largest = 0;
+    for (const Mode& mode : modes)
+        if (mode.z != 0) largest = std::fmax(largest, rate_of_step(report.member, exactly(factor * factor * mode.z)));
+    return largest;
+}
+
+StabilityReport stability_report(Scene scene, const Overrides& overrides) {
+    TrajectoryRequest request;
+    StabilityReport report = begin(std::move(scene), overrides, request);
+    const System& system = report.derivation.system;
+    Linearisation linearisation(report.derivation.scene, system);
+    const VectorXd start = Eigen::Map<const VectorXd>(request.q.data(), system.n), rest = VectorXd::Zero(system.n);
+    if (system.linear) {
+        report.points.push_back(point_report(report, linearisation.at(0, start, rest), start));
+        return report;
+    }
+    const std::vector<State> states = states_along(report, request);
+    if (system.autonomous && system.n <= static_cast<int>(most_for_eigenvalues)) {
+        std::vector<VectorXd> starts{start};
+        for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);
+        for (const VectorXd& q : linearisation.equilibria(starts))
+            report.points.push_back(point_report(report, linearisation.at(0, q, rest), q));
+    }
+    report.trajectory = trajectory_report(report, linearisation, states, request.steps);
+    report.energy = energy_report(report, states);
+    return report;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto stability from the outside: members, linear scenes, equilibria, motions, charts, mistakes.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+test::Finished stability(std::vector<std::string> arguments) {
+    static const test::TemporaryFolder folder;
+    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
+    arguments.insert(arguments.begin(), {LOBATTO_PROGRAM, "stability"});
+    return test::run(arguments);
+}
+
+std::string scene_path(const std::string& name) {
+    return LOBATTO_SOURCE_DIR "/scenes/" + name + ".toml";
+}
+
+nlohmann::json report_of(std::vector<std::string> arguments) {
+    arguments.push_back("--json");
+    const test::Finished done = stability(arguments);
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+    return nlohmann::json::parse(done.out);
+}
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+std::string scene_in(const test::TemporaryFolder& folder, const std::string& lagrangian, const std::string& coordinates,
+                     const std::string& more = "") {
+    const std::string path = folder / "scene.toml";
+    test::write_text(path, more + "title = \"Test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" +
+                               coordinates + "\n[run]\nstep = 0.1\nuntil = 10\n");
+    return path;
+}
+
+}  // namespace
+
+TEST_CASE("without a scene every member is listed, for people and for machines") {
+    const test::Finished done = stability({});
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.out, "Lobatto, 4 points  6      1/604800*(h*omega)^6"));
+    CHECK(contains(done.out, "3.11271764816421725708492043465"));
+    CHECK(contains(done.out, "Gauss, 10 stages   20"));
+    const auto members = report_of({})["members"];
+    REQUIRE(members.size() == 21);
+    CHECK(members[1]["intervals"][0]["to"]["exact_angle"] == "sqrt(8)");
+    CHECK(members[2]["intervals"][0]["to"]["exact_angle"] == "sqrt(42 - 6*sqrt(29))");
+    for (const auto& member : members)
+        CHECK(member.contains("proof") == member["method"].get<std::string>().starts_with("Gauss"));
+}
+
+TEST_CASE("one member alone is shown in full, Gauss's with its proof") {
+    const test::Finished lobatto = stability({"--points", "3"});
+    CHECK(contains(lobatto.out, "  trace = 2*a/delta = (48 - 22*z + z^2)/(24 + z)\n"));
+    CHECK(contains(lobatto.out, "  stable   to 2.82842712474619009760337744842 = sqrt(8)\n"));
+    CHECK(contains(lobatto.out, "(1 + (h*omega)^4/2880 + ...), so the motion runs ahead"));
+    const test::Finished gauss = stability({"--stages", "2"});
+    CHECK(contains(gauss.out, "  stable   without end\n"));
+    CHECK(contains(gauss.out, "4 - trace^2 = z*(2*c/delta)^2"));
+    CHECK(contains(gauss.out, "No step size is unstable."));
+    CHECK(contains(gauss.out, "so the motion runs late"));
+}
+
+TEST_CASE("a linear scene in a gap of stability is called unstable, at the rate its kernel shows") {
+    // h omega = 3.1375, in the gap between sqrt(42 - 6 sqrt(29)) and sqrt(10).
+    const auto report = report_of({scene_path("harmonic_oscillator"), "--step", "3.1375/omega"});
+    const auto mode = report["points"][0]["modes"][0];
+    CHECK(mode["stable"] == false);
+    CHECK(mode["rate"].get<double>() == doctest::Approx(0.0250313631).epsilon(1e-6));
+    CHECK(report["points"][0]["measured_rate"].get<double>() == doctest::Approx(0.0250313631).epsilon(1e-6));
+    // Beyond the gap it is stable again.
+    CHECK(report_of({scene_path("harmonic_oscillator"), "--step", "4/omega"})["points"][0]["modes"][0]["stable"] ==
+          true);
+    const test::Finished text = stability({scene_path("harmonic_oscillator"), "--step", "3.1375/omega"});
+    CHECK(contains(text.out, "UNSTABLE: grows by 1.0253 a step"));
+}
+
+TEST_CASE("several coordinates are judged by their eigenfrequencies, and the kernel agrees") {
+    // Frequencies 1 and sqrt(1.2): at h = 2.86 the faster one is in the gap, the slower one not.
+    const auto report = report_of({scene_path("coupled_oscillators"), "--step", "2.86"});
+    const auto modes = report["points"][0]["modes"];
+    REQUIRE(modes.size() == 2);
+    CHECK(modes[0]["squared_frequency"].get<double>() == doctest::Approx(1));
+    CHECK(modes[1]["squared_frequency"].get<double>() == doctest::Approx(1.2));
+    CHECK(modes[0]["stable"] == true);
+    CHECK(modes[1]["stable"] == false);
+    const double rate = modes[1]["rate"];
+    CHECK(rate > 0.01);
+    // 16384 steps; what is left of the start is below 1e-4 of it.
+    CHECK(report["points"][0]["measured_rate"].get<double>() == doctest::Approx(rate).epsilon(1e-3));
+}
+
+TEST_CASE("a pendulum is linearised where it hangs and where it stands, and along its motion") {
+    const test::TemporaryFolder folder;
+    // It turns over: both equilibria lie near its motion.
+    const auto report =
+        report_of({scene_in(folder, "q'^2/2 - 4*(1 - cos(q))", "q = { position = 0, velocity = 4.5 }")});
+    std::vector<double> squares;
+    for (const auto& point : report["points"]) {
+        squares.push_back(point["modes"][0]["squared_frequency"]);
+        CHECK(point["measured_rate"].get<double>() ==
+              doctest::Approx(point["modes"][0]["rate"].get<double>()).epsilon(1e-9).scale(1));
+    }
+    REQUIRE(squares.size() == 2);
+    CHECK(squares[0] == doctest::Approx(4));
+    CHECK(squares[1] == doctest::Approx(-4));
+    const auto motion = report["trajectory"];
+    CHECK(motion["looked_at"].get<int>() >= 99);
+    CHECK(motion["parting"].get<int>() > 10);
+    // A step near the top: exp(h omega) with omega = 2.
+    CHECK(motion["rate"].get<double>() == doctest::Approx(0.2).epsilon(0.02));
+    CHECK(std::fabs(motion["excess"].get<double>()) < 1e-6);
+    CHECK(motion["largest_z"].get<double>() == doctest::Approx(0.04).epsilon(0.01));
+    // The energy that the steps keep better.
+    CHECK(report["energy"]["order"] == 6);
+    CHECK(report["energy"]["modified_variation"].get<double>() < 0.2 * report["energy"]["variation"].get<double>());
+}
+
+TEST_CASE("a step beyond the first limit somewhere along a motion is named") {
+    const test::TemporaryFolder folder;
+    const std::string path = scene_in(folder, "q'^2/2 - 450*(1 - cos(q))", "q = { position = 0.05, velocity = 0 }");
+    const test::Finished done = stability({path, "--points", "2"});
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.out, "UNSTABLE: grows by"));
+    CHECK(contains(done.out, "BEYOND the first limit, 1.06 times"));
+}
+
+TEST_CASE("velocities that couple, time, singular places and no equilibrium are each said in words") {
+    const test::TemporaryFolder folder;
+    const std::string two = "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }";
+    CHECK(contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + y^2)/2", two)}).out,
+                   "coupled by velocities: no independent oscillations; the motion itself grows by 1 in a time h\n"
+                   "  measured on the kernel: growth a step 1, to rounding\n"));
+    CHECK(contains(
+        stability({scene_in(folder, "q'^2/2 + cos(q)*sin(t)", "q = { position = 1, velocity = 0 }", "time = \"t\"\n")})
+            .out,
+        "its forces change with time; it has no equilibria\n"));
+    CHECK(contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", two)}).out,
+                   "no equilibrium was found from its start and along its motion\n"));
+    const test::Finished free = stability({scene_in(folder, "q'^2/2 - 3*q", "q = { position = 1, velocity = 0 }")});
+    CHECK(contains(free.out, "omega = 0              free: moves on steadily\n"));
+    const test::Finished saddle = stability({scene_in(folder, "q'^2/2 + q^2/2", "q = { position = 1, velocity = 0 }")});
+    CHECK(contains(saddle.out, "runs away itself, by 1.1052 in a time h; the step by 1.1052\n"));
+    CHECK(contains(saddle.out, "measured on the kernel: growth a step 1.1052\n"));
+}
+
+TEST_CASE("the chart is an SVG file, the same bytes on every run, with theory and measurement") {
+    const test::TemporaryFolder folder;
+    std::string bytes[2];
+    for (std::string& text : bytes) {
+        const test::Finished done = stability({scene_path("harmonic_oscillator"), "--chart", folder / "chart.svg"});
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+        text = test::read_file(folder / "chart.svg");
+    }
+    CHECK(bytes[0] == bytes[1]);
+    CHECK(contains(bytes[0], "kernel, measured"));
+    CHECK(contains(bytes[0], "Lobatto, 4 points"));
+    CHECK(!std::filesystem::exists(folder / "chart.gnuplot"));
+    // Without an equilibrium the member is drawn, with the stiffest moment of the motion.
+    CHECK(stability({scene_path("kepler"), "--chart", folder / "orbit.svg"}).exit_code == 0);
+    CHECK(std::filesystem::file_size(folder / "orbit.svg") > 10000);
+}
+
+TEST_CASE("mistakes on the command line are refused before anything is computed") {
+    const auto refusal = [](const std::vector<std::string>& arguments) {
+        const test::Finished done = stability(arguments);
+        CHECK(done.exit_code == 2);
+        CHECK(done.out == "");
+        return done.err;
+    };
+    const std::string oscillator = scene_path("harmonic_oscillator");
+    CHECK(refusal({oscillator, "--chart", "x.png"}) ==
+          "--chart x.png: the chart is an SVG file; give it a name that ends in .svg\n");
+    CHECK(refusal({oscillator, "--chart", "no/such/x.svg"}) ==
+          "--chart no/such/x.svg: there is no folder no/such; make it first\n");
+    CHECK(refusal({"--step", "0.1"}) == "--chart, --step and --set belong to a scene; name one\n");
+    CHECK(contains(refusal({"missing.toml"}), "missing.toml"));
+    CHECK(contains(refusal({oscillator, "--step", "-1"}), "the step must be positive"));
+    CHECK(contains(refusal({oscillator, "--points", "13"}), "--points"));
+}
