@@ -19,6 +19,8 @@ void add_gallery(CLI::App& program);
 void add_run(CLI::App& program);
 void add_paper(CLI::App& program);
 void add_sweep(CLI::App& program);
+void add_tradeoff(CLI::App& program);
+void add_tune(CLI::App& program);
 void add_verify(CLI::App& program);
 
 }  // namespace lobatto

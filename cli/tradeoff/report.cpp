@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/tradeoff/report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/tradeoff/measurement_json.hpp"
+#include "cli/tradeoff/search.hpp"
+#include "cli/tradeoff/stability_limit.hpp"
+#include "runtime/cache.hpp"
+#include "runtime/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr double trusted = 1e-9;  // a reference that is worse is no reference for a trade of this
+
+// The fastest of each half decade.
+std::vector<Measurement> thinned(const std::vector<Measurement>& front) {
+    std::vector<Measurement> rows;
+    double next = 1;  // errors above this are of no use
+    for (const Measurement& m : front) {
+        if (m.error > next) continue;
+        rows.push_back(m);
+        next = m.error / std::sqrt(10);
+    }
+    return rows;
+}
+
+std::string tolerance_text(double tolerance) {
+    return tolerance > 0 ? fmt::format("{:.0e}", tolerance) : "rounding";
+}
+
+std::string time_a_unit(double seconds, double until) {
+    return fmt::format("{:.3g}", seconds / until * 1e9);
+}
+
+}  // namespace
+
+bool is_chaotic(const Laboratory& laboratory) {
+    return laboratory.reference().disagreement.back() > trusted;
+}
+
+std::string reference_text(const Laboratory& laboratory) {
+    const Reference& reference = laboratory.reference();
+    std::string text = fmt::format("reference: {}; {} differs from it by {:.1e} at most", reference.first,
+                                   reference.second, reference.disagreement.back());
+    if (is_chaotic(laboratory))
+        text += fmt::format(
+            "\nThe two disagree: beyond t = {:.4g} nobody knows this motion to {:.0e}. It is chaotic, and errors of states mean "
+            "nothing there; look at energy, momenta, and how long a method follows the true motion.",
+            reference.trusted_until(trusted), trusted);
+    return text;
+}
+
+std::string front_table(const Laboratory& laboratory) {
+    const double until = laboratory.until();
+    std::string text = fmt::format("  {:>9}  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}  {:>9}\n", "error", "ns a unit",
+                                   "method", "step", "precision", "iterate", "gradients", "energy");
+    for (const Measurement& m : thinned(pareto_front(measurements_of(laboratory.notebook()))))
+        text += fmt::format("  {:>9.1e}  {:>9}  {:<10}  {:>10.4g}  {:<11}  {:>8}  {:>9.3g}  {:>9}\n", m.error,
+                            time_a_unit(m.seconds, until), m.candidate.name(),
+                            until / static_cast<double>(m.candidate.steps), precision_name(m.candidate.member.precision),
+                            tolerance_text(m.candidate.tolerance), m.gradients / until,
+                            std::isfinite(m.energy_error) ? fmt::format("{:.1e}", m.energy_error) : "");
+    return text;
+}
+
+void write_csv(const Laboratory& laboratory, const std::string& path) {
+    std::string text = csv_header();
+    for (const Measurement& m : measurements_of(laboratory.notebook())) text += csv_row(m, laboratory.until());
+    write_file(path, text);
+}
+
+void write_json(const Laboratory& laboratory, const std::string& path) {
+    const Reference& reference = laboratory.reference();
+    nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
+    for (const Measurement& m : measurements_of(laboratory.notebook())) measurements.push_back(json_of(m));
+    for (const Measurement& m : pareto_front(measurements_of(laboratory.notebook()))) front.push_back(json_of(m));
+    const nlohmann::ordered_json json = {
+        {"scene", laboratory.scene().name},
+        {"title", laboratory.scene().title},
+        {"until", laboratory.until()},
+        {"reference",
+         {{"method", reference.first},
+          {"check", reference.second},
+          {"disagreement", reference.disagreement.back()},
+          {"trusted_until", reference.trusted_until(trusted)},
+          {"samples", reference.samples},
+          {"frequency", reference.frequency}}},
+        {"chaotic", is_chaotic(laboratory)},
+        {"front", front},
+        {"measurements", measurements}};
+    write_file(path, json.dump(1) + '\n');
+}
+
+}  // namespace lobatto

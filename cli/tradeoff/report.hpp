@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What the measurements say: a table for the terminal, CSV and JSON for machines, pictures and a page for people.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/tradeoff/laboratory.hpp"
+
+namespace lobatto {
+
+// What is to be said before any number: what the errors are errors of.
+std::string reference_text(const Laboratory& laboratory);
+// Whether the two references differ by more than the errors that are to be shown.
+bool is_chaotic(const Laboratory& laboratory);
+
+// Pareto's front, thinned to about two rows a decade.
+std::string front_table(const Laboratory& laboratory);
+
+void write_csv(const Laboratory& laboratory, const std::string& path);
+void write_json(const Laboratory& laboratory, const std::string& path);
+
+}  // namespace lobatto
