@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "cli/summary.hpp"
@@ -74,6 +75,11 @@ Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequ
     wish.interrupted = request_.interrupted;
     reference_ = compute_reference(exact, start_, wish);
     measurer_.emplace(reference_, start_, exact, conserves_, request_.interrupted);
+}
+
+double Laboratory::figure(const Measurement& measurement) const {
+    if (!is_chaotic()) return measurement.error;
+    return std::isfinite(measurement.energy_error) ? measurement.energy_error : 1 / measurement.reaches;
 }
 
 double Laboratory::elapsed() const {

@@ -38,6 +38,13 @@ public:
     bool conserves() const { return conserves_; }
     const LaboratoryRequest& request() const { return request_; }
 
+    // Whether the two references differ by more than the errors that are of interest.
+    bool is_chaotic() const { return reference_.disagreement.back() > trusted; }
+    static constexpr double trusted = 1e-9;
+    // What is to be small: the error; of a chaotic motion the energy error, or without energy 1/t, t the time until which
+    // the true motion was followed.
+    double figure(const Measurement& measurement) const;
+
     double until() const { return reference_.until; }
     double elapsed() const;
     double left() const { return request_.seconds - elapsed(); }

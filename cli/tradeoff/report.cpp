@@ -16,16 +16,16 @@ namespace lobatto {
 
 namespace {
 
-constexpr double trusted = 1e-9;  // a reference that is worse is no reference for a trade of this
+constexpr double trusted = Laboratory::trusted;
 
 // The fastest of each half decade.
-std::vector<Measurement> thinned(const std::vector<Measurement>& front) {
+std::vector<Measurement> thinned(const Laboratory& laboratory) {
     std::vector<Measurement> rows;
-    double next = 1;  // errors above this are of no use
-    for (const Measurement& m : front) {
-        if (m.error > next) continue;
+    double next = 0.3;  // errors above this are of no use
+    for (const Measurement& m : pareto_front(laboratory)) {
+        if (laboratory.figure(m) > next) continue;
         rows.push_back(m);
-        next = m.error / std::sqrt(10);
+        next = laboratory.figure(m) / std::sqrt(10);
     }
     return rows;
 }
@@ -40,15 +40,11 @@ std::string time_a_unit(double seconds, double until) {
 
 }  // namespace
 
-bool is_chaotic(const Laboratory& laboratory) {
-    return laboratory.reference().disagreement.back() > trusted;
-}
-
 std::string reference_text(const Laboratory& laboratory) {
     const Reference& reference = laboratory.reference();
     std::string text = fmt::format("reference: {}; {} differs from it by {:.1e} at most", reference.first,
                                    reference.second, reference.disagreement.back());
-    if (is_chaotic(laboratory))
+    if (laboratory.is_chaotic())
         text += fmt::format(
             "\nThe two disagree: beyond t = {:.4g} nobody knows this motion to {:.0e}. It is chaotic, and errors of states mean "
             "nothing there; look at energy, momenta, and how long a method follows the true motion.",
@@ -60,7 +56,7 @@ std::string front_table(const Laboratory& laboratory) {
     const double until = laboratory.until();
     std::string text = fmt::format("  {:>9}  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}  {:>9}\n", "error", "ns a unit",
                                    "method", "step", "precision", "iterate", "gradients", "energy");
-    for (const Measurement& m : thinned(pareto_front(measurements_of(laboratory.notebook()))))
+    for (const Measurement& m : thinned(laboratory))
         text += fmt::format("  {:>9.1e}  {:>9}  {:<10}  {:>10.4g}  {:<11}  {:>8}  {:>9.3g}  {:>9}\n", m.error,
                             time_a_unit(m.seconds, until), m.candidate.name(),
                             until / static_cast<double>(m.candidate.steps), precision_name(m.candidate.member.precision),
@@ -71,15 +67,15 @@ std::string front_table(const Laboratory& laboratory) {
 
 void write_csv(const Laboratory& laboratory, const std::string& path) {
     std::string text = csv_header();
-    for (const Measurement& m : measurements_of(laboratory.notebook())) text += csv_row(m, laboratory.until());
+    for (const auto& [key, m] : laboratory.notebook().all()) text += csv_row(m, laboratory.until());
     write_file(path, text);
 }
 
 void write_json(const Laboratory& laboratory, const std::string& path) {
     const Reference& reference = laboratory.reference();
     nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
-    for (const Measurement& m : measurements_of(laboratory.notebook())) measurements.push_back(json_of(m));
-    for (const Measurement& m : pareto_front(measurements_of(laboratory.notebook()))) front.push_back(json_of(m));
+    for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(json_of(m));
+    for (const Measurement& m : pareto_front(laboratory)) front.push_back(json_of(m));
     const nlohmann::ordered_json json = {
         {"scene", laboratory.scene().name},
         {"title", laboratory.scene().title},
@@ -91,7 +87,7 @@ void write_json(const Laboratory& laboratory, const std::string& path) {
           {"trusted_until", reference.trusted_until(trusted)},
           {"samples", reference.samples},
           {"frequency", reference.frequency}}},
-        {"chaotic", is_chaotic(laboratory)},
+        {"chaotic", laboratory.is_chaotic()},
         {"front", front},
         {"measurements", measurements}};
     write_file(path, json.dump(1) + '\n');

@@ -11,8 +11,6 @@ namespace lobatto {
 
 // What is to be said before any number: what the errors are errors of.
 std::string reference_text(const Laboratory& laboratory);
-// Whether the two references differ by more than the errors that are to be shown.
-bool is_chaotic(const Laboratory& laboratory);
 
 // Pareto's front, thinned to about two rows a decade.
 std::string front_table(const Laboratory& laboratory);

@@ -37,21 +37,16 @@ double cost(const std::optional<Measurement>& measurement) {
 
 }  // namespace
 
-std::vector<Measurement> measurements_of(const Notebook& notebook) {
-    std::vector<Measurement> all;
-    for (const auto& [key, measurement] : notebook.all()) all.push_back(measurement);
-    return all;
-}
-
-std::vector<Measurement> pareto_front(const std::vector<Measurement>& measurements) {
+std::vector<Measurement> pareto_front(const Laboratory& laboratory) {
     std::vector<Measurement> complete, front;
-    for (const Measurement& m : measurements)
+    for (const auto& [key, m] : laboratory.notebook().all())
         if (m.complete) complete.push_back(m);
-    std::sort(complete.begin(), complete.end(), [](const Measurement& a, const Measurement& b) {
-        return std::tuple(a.seconds, a.error, a.candidate.key()) < std::tuple(b.seconds, b.error, b.candidate.key());
+    std::sort(complete.begin(), complete.end(), [&](const Measurement& a, const Measurement& b) {
+        return std::tuple(a.seconds, laboratory.figure(a), a.candidate.key()) <
+               std::tuple(b.seconds, laboratory.figure(b), b.candidate.key());
     });
     for (const Measurement& m : complete)
-        if (front.empty() || m.error < front.back().error) front.push_back(m);
+        if (front.empty() || laboratory.figure(m) < laboratory.figure(front.back())) front.push_back(m);
     return front;
 }
 
@@ -283,10 +278,10 @@ std::vector<Member> tour() {
     add(Family::gauss, Precision::double_, {6});
     add(Family::lobatto, Precision::double_, {12, 2});
     add(Family::gauss, Precision::double_, {10});
-    add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::double_, {6, 10});
     add(Family::lobatto, Precision::single, {6});
     add(Family::gauss, Precision::double_, {3, 1});
+    add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::extended, {12});
     add(Family::lobatto, Precision::double_, {5, 3, 9, 7, 11});
     add(Family::gauss, Precision::double_, {8, 4, 2, 5, 7, 9});
@@ -296,75 +291,98 @@ std::vector<Member> tour() {
 }
 
 // The least time of what is as accurate or better.
-double fastest_within(const Notebook& notebook, double error) {
+double fastest_within(const Laboratory& laboratory, double figure) {
     double seconds = infinity;
-    for (const auto& [key, m] : notebook.all())
-        if (m.complete && m.error <= error) seconds = std::min(seconds, m.seconds);
+    for (const auto& [key, m] : laboratory.notebook().all())
+        if (m.complete && laboratory.figure(m) <= figure) seconds = std::min(seconds, m.seconds);
     return seconds;
 }
 
+// A ladder of steps of one member; finer ratios and looser iterations once it is known to be among the best.
+struct Scan {
+    Member member;
+    double ratio = 1.5, tolerance = 0;
+    auto key() const { return std::tuple(member, ratio, tolerance); }
+    friend bool operator<(const Scan& a, const Scan& b) { return a.key() < b.key(); }
+};
+
 // From coarse to fine until it has lost, or rounding is reached.
-void scan(Laboratory& laboratory, const Member& member, double ratio, double tolerance, double reserve) {
-    const StepLadder ladder = ladder_of(laboratory, ratio);
+void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
+    const StepLadder ladder = ladder_of(laboratory, scan.ratio);
     const double longest_run = laboratory.request().seconds / 40;
     double least = infinity;
     int no_better = 0, dominated = 0;
     for (std::int64_t steps = ladder.at_least(fewest_steps(laboratory));
          static_cast<double>(steps) < most_steps && laboratory.left() > reserve; steps = ladder.next(steps)) {
-        const Measurement m = laboratory.measure({member, steps, tolerance});
-        if (!m.complete) {
-            if (m.seconds > longest_run) return;
-            continue;
-        }
-        no_better = m.error > 0.7 * least ? no_better + 1 : 0;
-        least = std::min(least, m.error);
-        const bool at_rounding = least < 1e4 * rounding_of(member.precision) * std::sqrt(static_cast<double>(steps));
-        if (no_better >= 3 && at_rounding) return;
-        // What is as accurate or better in a quarter of the time: this member will not win at finer steps either, when its
-        // order is not the highest; twice in a row, because coarse steps may be slow.
-        dominated = m.error < 0.1 && m.seconds > 4 * fastest_within(laboratory.notebook(), m.error) ? dominated + 1 : 0;
-        if (dominated >= 4 || m.seconds > longest_run) return;
+        const Measurement m = laboratory.measure({scan.member, steps, scan.tolerance});
+        if (m.seconds > longest_run) return;
+        if (!m.complete) continue;
+        const double figure = laboratory.figure(m);
+        no_better = figure > 0.7 * least ? no_better + 1 : 0;
+        least = std::min(least, figure);
+        const double rounding =
+            1e4 * rounding_of(scan.member.precision) * std::sqrt(static_cast<double>(steps)) + scan.tolerance;
+        if (no_better >= 3 && least < rounding) return;
+        // Another is as accurate in a fraction of the time; four times in a row, because the coarsest steps may be slow.
+        const double lead = scan.ratio < 1.5 ? 2 : 4;
+        dominated = figure < 0.1 && m.seconds > lead * fastest_within(laboratory, figure) ? dominated + 1 : 0;
+        if (dominated >= 4) return;
     }
+}
+
+// What would tell more about the members that are best at present; none is done twice.
+std::optional<Scan> refinement(const Laboratory& laboratory, const std::set<Scan>& done) {
+    std::vector<Member> winners;
+    for (const Measurement& m : pareto_front(laboratory))
+        if (m.error < 0.1 && std::find(winners.begin(), winners.end(), m.candidate.member) == winners.end())
+            winners.push_back(m.candidate.member);
+    for (const double ratio : {1.2, 1.08})
+        for (const double tolerance : {0.0, 1e-12, 1e-9, 1e-6})
+            for (const Member& member : winners) {
+                if (member.precision == Precision::quadruple) continue;
+                if (tolerance > 0 && tolerance < 4 * rounding_of(member.precision)) continue;
+                if (const Scan scan{member, ratio, tolerance}; done.count(scan) == 0) return scan;
+            }
+    return std::nullopt;
 }
 
 }  // namespace
 
 void explore(Laboratory& laboratory) {
     Workshop& workshop = laboratory.workshop();
-    const double reserve = 0.12 * laboratory.request().seconds;
-    const std::vector<Member> members = tour();
-    std::size_t ordered = 0;
-    const auto order_ahead = [&](std::size_t measured) {
-        while (ordered < members.size() && ordered < measured + workshop.threads() + 1 && laboratory.left() > reserve)
-            workshop.order(members[ordered++]);
+    const double all = laboratory.request().seconds, reserve = 0.12 * all, last_order = 0.25 * all;
+    std::vector<Member> waiting = tour();
+    std::set<Scan> done;
+    const auto name = [](const Member& member) {
+        return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));
     };
-    std::size_t seen = 0;
-    for (; seen < members.size(); ++seen) {
-        order_ahead(seen);
-        const Member& member = members[seen];
-        if (seen >= ordered) break;
-        while (!workshop.is_ready(member) && laboratory.left() > reserve) {
-            laboratory.check_interruption();
+    while (laboratory.left() > reserve) {
+        laboratory.check_interruption();
+        std::size_t at_work = 0;
+        for (const Member& member : waiting)
+            at_work += workshop.is_ordered(member) && !workshop.is_ready(member) ? 1 : 0;
+        const auto next =
+            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return !workshop.is_ordered(m); });
+        if (at_work <= workshop.threads() && next != waiting.end() && laboratory.left() > last_order)
+            workshop.order(*next);
+        const auto ready =
+            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return workshop.is_ready(m); });
+        if (ready != waiting.end()) {
+            const Member member = *ready;
+            waiting.erase(ready);
+            laboratory.request().say("measuring " + name(member));
+            work_on(laboratory, {member, member.precision == Precision::quadruple ? 2.0 : 1.5, 0}, reserve);
+        } else if (const auto scan = refinement(laboratory, done)) {
+            laboratory.request().say(fmt::format("finer steps of {}", name(scan->member)));
+            done.insert(*scan);
+            work_on(laboratory, *scan, reserve);
+        } else if (at_work == 0 && next == waiting.end()) {
+            break;
+        } else {
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
-        if (!workshop.is_ready(member)) break;
-        laboratory.request().say(fmt::format("measuring {} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision)));
-        scan(laboratory, member, member.precision == Precision::quadruple ? 2.0 : 1.5, 0, reserve);
-        if (laboratory.left() < reserve) break;
     }
     workshop.cancel();
-    // Finer steps, and iterations that end earlier, where it matters.
-    for (const double ratio : {1.2, 1.08}) {
-        std::set<Member> winners;
-        for (const Measurement& m : pareto_front(measurements_of(laboratory.notebook()))) winners.insert(m.candidate.member);
-        for (const Member& member : winners) {
-            if (member.precision == Precision::quadruple) continue;
-            laboratory.request().say(fmt::format("finer steps of {} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision)));
-            for (const double tolerance : {0.0, 1e-12, 1e-9, 1e-6})
-                if (laboratory.left() > reserve && (tolerance == 0 || tolerance > 4 * rounding_of(member.precision)))
-                    scan(laboratory, member, ratio, tolerance, reserve);
-        }
-    }
 }
 
 }  // namespace lobatto

@@ -10,8 +10,7 @@
 namespace lobatto {
 
 // No other is both faster and more accurate; from coarse to fine.
-std::vector<Measurement> pareto_front(const std::vector<Measurement>& measurements);
-std::vector<Measurement> measurements_of(const Notebook& notebook);
+std::vector<Measurement> pareto_front(const Laboratory& laboratory);
 
 // One member's coarsest steps that meet a goal.
 struct Crossing {
