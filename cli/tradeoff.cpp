@@ -47,7 +47,7 @@ void tradeoff(const TradeoffOptions& options) {
     LaboratoryRequest request;
     request.seconds = seconds;
     request.notebook = folder + "/measurements.jsonl";
-    request.first = {{Family::lobatto, 8, Precision::double_}};
+    request.first = first_of_tour();
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
     bool interrupted = false;

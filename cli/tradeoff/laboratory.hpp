@@ -16,8 +16,7 @@ namespace lobatto {
 
 struct LaboratoryRequest {
     double seconds = 20;  // of wall time
-    Precision reference_precision = Precision::quadruple;
-    double wanted = 1e-20;  // the disagreement of the two references that is good enough
+    double wanted = 1e-18;  // the disagreement of the two references that is good enough
     std::string notebook;   // its file; empty: none
     std::vector<Member> first;  // kernels that will be needed whatever is found
     const volatile int* interrupted = nullptr;

@@ -9,7 +9,6 @@
 #include <limits>
 #include <optional>
 
-#include "runtime/error.hpp"
 #include "runtime/extrapolation.hpp"
 #include "runtime/frequency.hpp"
 
@@ -27,7 +26,7 @@ double seconds_since(Clock::time_point start) {
 constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
 constexpr double rough = 1e-6;           // tolerance of the first look
 constexpr double precise_factor = 6;     // what the precise way takes longer, at most, about
-constexpr double quarter = 0.25;         // of the seconds, for the extrapolation
+constexpr double half = 0.5;             // of the seconds, for a first way; the rest is for finer steps
 constexpr double radians_of_step = 0.75; // h omega of the family's first run
 constexpr int most_refinements = 4;
 constexpr int frequency_looks = 24;
@@ -48,7 +47,7 @@ public:
 
     Reference compute() {
         look();
-        const double tolerance = reference_.precision == Precision::quadruple ? 1e-22 : 1e-18;
+        const double tolerance = reference_.precision == Precision::quadruple ? 1e-22 : 3e-17;
         const auto states = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
         if (!states) throw ComputationError("the reference fails: its steps become too short");
         keep(*states);
@@ -103,14 +102,21 @@ private:
         set_frequency(*states, samples);
         // At least one macro step of some twenty slopes a sample.
         const double at_least = 40 * seconds / static_cast<double>(std::max<std::int64_t>(evaluations_, 1));
-        reference_.samples = sample_counts[std::size(sample_counts) - 1];
+        const double step = step_seconds(), fewest = request_.until / static_cast<double>(step_of_family());
+        double least = 0;
         for (const int count : sample_counts) {
-            const double family = count * step_seconds();
-            if (std::max(precise_factor * seconds, at_least * count) + family > quarter * request_.seconds_limit)
-                continue;
+            least = std::max(precise_factor * seconds, at_least * count) + step * std::max(fewest, double(count));
             reference_.samples = count;
-            break;
+            if (least < half * request_.seconds_limit) return;
         }
+        if (least > 1.5 * request_.seconds_limit) fail_slow(request_.until * request_.seconds_limit / least);
+    }
+
+    [[noreturn]] void fail_slow(double reached) const {
+        throw TooSlow(fmt::format("a reference to t = {:.6g} takes longer than the {:.3g} s that the budget leaves for it; "
+                                  "it would do to about t = {:.2g}. Give more time with --budget, or an earlier --until",
+                                  request_.until, request_.seconds_limit, reached),
+                      reached);
     }
 
     // Of one step of the kernel.
@@ -122,7 +128,7 @@ private:
         call.steps = 2;
         const auto began = Clock::now();
         stepper_.advance(call);
-        return seconds_since(began) / 2;
+        return seconds_since(began) / static_cast<double>(call.steps);
     }
 
     real step_of_family() const {
@@ -139,10 +145,8 @@ private:
             check_interruption();
             if (!way.advance_to(static_cast<real>(request_.until) * real(i) / real(samples))) return std::nullopt;
             states.insert(states.end(), way.state().begin(), way.state().end());
-            if (quick && seconds_since(began_) > request_.seconds_limit)
-                throw ComputationError(fmt::format(
-                    "a reference takes longer than the budget allows: {:.3g} s were enough to t = {:.3g} only",
-                    request_.seconds_limit, static_cast<double>(way.time())));
+            if (seconds_since(began_) > (quick ? half : 2) * request_.seconds_limit)
+                fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
         }
         evaluations_ = way.evaluations();
         return states;

@@ -9,6 +9,7 @@
 
 #include "cli/exact_start.hpp"
 #include "cli/tradeoff/candidate.hpp"
+#include "runtime/error.hpp"
 #include "runtime/library.hpp"
 
 namespace lobatto {
@@ -38,6 +39,13 @@ struct ReferenceRequest {
     double seconds_limit = 10;  // of wall time, beyond which it stays as good as it is
     std::vector<int> groups;    // n: coordinates of the same unit have the same number
     const volatile int* interrupted = nullptr;
+};
+
+// It cannot be had within the time that is given.
+class TooSlow : public ComputationError {
+public:
+    TooSlow(const std::string& message, double reached_time) : ComputationError(message), reached(reached_time) {}
+    double reached;  // the time to which that would do, about
 };
 
 // With a kernel of the family in extended or quadruple precision. ComputationError when there is no reference.

@@ -348,9 +348,15 @@ std::optional<Scan> refinement(const Laboratory& laboratory, const std::set<Scan
 
 }  // namespace
 
+std::vector<Member> first_of_tour() {
+    const std::vector<Member> members = tour();
+    return {members.begin(), members.begin() + 4};
+}
+
 void explore(Laboratory& laboratory) {
     Workshop& workshop = laboratory.workshop();
-    const double all = laboratory.request().seconds, reserve = 0.12 * all, last_order = 0.25 * all;
+    const double all = laboratory.request().seconds, reserve = 0.12 * all;
+    double last_order = 0.25 * all;  // what is ordered later would not be used
     std::vector<Member> waiting = tour();
     std::set<Scan> done;
     const auto name = [](const Member& member) {
@@ -370,6 +376,7 @@ void explore(Laboratory& laboratory) {
         if (ready != waiting.end()) {
             const Member member = *ready;
             waiting.erase(ready);
+            last_order = std::max(last_order, reserve + 1.5 * workshop.compile_seconds(member));
             laboratory.request().say("measuring " + name(member));
             work_on(laboratory, {member, member.precision == Precision::quadruple ? 2.0 : 1.5, 0}, reserve);
         } else if (const auto scan = refinement(laboratory, done)) {

@@ -38,5 +38,6 @@ std::vector<Member> first_guess(double goal, std::size_t count);
 
 // The family from coarse to fine, for the trade of speed for accuracy; returns when time is up or all has been seen.
 void explore(Laboratory& laboratory);
+std::vector<Member> first_of_tour();  // the kernels it begins with
 
 }  // namespace lobatto
