@@ -10,9 +10,12 @@
 #include "cli/interruption.hpp"
 #include "cli/output_path.hpp"
 #include "cli/overrides.hpp"
+#include "cli/tradeoff/page.hpp"
+#include "cli/tradeoff/pictures.hpp"
 #include "cli/tradeoff/report.hpp"
 #include "cli/tradeoff/say.hpp"
 #include "cli/tradeoff/search.hpp"
+#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -66,10 +69,15 @@ void tradeoff(const TradeoffOptions& options) {
                    ? fmt::format(" ({} of an earlier run)", laboratory.notebook().found())
                    : "",
                laboratory.until(), laboratory.elapsed(), reference_text(laboratory), front_table(laboratory));
-    write_csv(laboratory, folder + "/tradeoff.csv");
-    write_json(laboratory, folder + "/tradeoff.json");
-    fmt::print("\n{}/ holds tradeoff.csv, tradeoff.json\n", folder);
-    if (interrupted) {
+    write_file(folder + "/tradeoff.csv", csv_of(laboratory));
+    const std::string json = json_of(laboratory);
+    write_file(folder + "/tradeoff.json", json);
+    if (!interrupted) {
+        const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
+        write_file(folder + "/report.html", report_page(laboratory, folder, pictures, json));
+        fmt::print("\n{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
+                   fmt::join(pictures, ".svg, "));
+    } else {
         fmt::print(stderr, "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
         throw CLI::RuntimeError(interrupted_exit);
     }

@@ -18,7 +18,7 @@ namespace lobatto {
 namespace {
 
 constexpr int few_coordinates = 10, some_coordinates = 20;
-constexpr double extended_reach = 3e-16;  // disagreement of two references in long double, about
+constexpr double extended_reach = 3e-13;  // what two references in long double can be asked to agree to
 constexpr double reference_share = 0.4; // of the seconds
 
 // Coordinates of the same unit have the same number.

@@ -32,6 +32,7 @@ public:
     const Scene& scene() const { return scene_; }
     const Reference& reference() const { return reference_; }
     Workshop& workshop() { return workshop_; }
+    const Derivation& derivation() const { return workshop_.derivation(); }
     const Measurer& measurer() const { return *measurer_; }
     const Notebook& notebook() const { return notebook_; }
     bool conserves() const { return conserves_; }

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <numeric>
 #include <string>
 
 #include "runtime/diagnostics.hpp"
+#include "runtime/extrapolation.hpp"
 #include "runtime/polynomial_estimate.hpp"
 
 namespace lobatto {
@@ -17,6 +19,7 @@ namespace {
 constexpr double lost = 0.01;                   // of the amplitude: the motion is another one
 constexpr std::int64_t energies = 128;          // samples at which the energy is looked at
 constexpr int estimates = 48;                   // places where the polynomials are compared
+constexpr std::int64_t looks = 1500;             // steps whose error is looked at
 constexpr int defect_limit = 32;                // coordinates; tangent maps of more take long
 constexpr double timing_seconds = 4e-3;         // of repetitions in all
 constexpr int most_repetitions = 5;
@@ -244,6 +247,49 @@ Timing Measurer::time_in(const Kernel& kernel, const Candidate& candidate) const
     TimedRun<real> run(kernel, start_, candidate, reference_.until, reference_.samples);
     run.go(candidate, interrupted_);
     return {run.status == LOBATTO_OK, run.seconds};
+}
+
+template <class real, class Exact>
+double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candidate) const {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    TimedRun<real> run(kernel, start_, candidate, reference_.until, 1);
+    run.every = std::max<std::int64_t>(1, candidate.steps / looks);
+    run.meetings = candidate.steps / run.every;
+    const std::size_t n = reference_.n, columns = 1 + 2 * n;
+    run.rows.resize(static_cast<std::size_t>(run.meetings) * columns);
+    run.go(candidate, interrupted_);
+    if (run.status != LOBATTO_OK) return infinity;
+
+    const auto until = static_cast<Exact>(reference_.until);
+    const StartIn<Exact> start = start_in<Exact>(start_, exact_, until);
+    LoadedStepper<Exact> stepper(exact_);
+    stepper.prepare(start.parameters, until);
+    const double tolerance = std::is_same_v<Exact, __float128> ? 1e-20 : 3e-17;
+    Extrapolation<Exact> way(stepper, std::vector<Exact>(reference_.scale.begin(), reference_.scale.end()),
+                             static_cast<Exact>(tolerance));
+    way.start(0, start.q, start.p);
+    double worst = 0;
+    for (std::int64_t meeting = 1; meeting <= run.meetings; ++meeting) {
+        if (interrupted_ != nullptr && *interrupted_ != 0) throw Interrupted();
+        if (!way.advance_to(until * static_cast<Exact>(meeting * run.every) / static_cast<Exact>(candidate.steps)))
+            return infinity;
+        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
+        for (std::size_t k = 0; k < 2 * n; ++k) {
+            const double error =
+                std::fabs(static_cast<double>(static_cast<Exact>(row[k]) - way.state()[k])) / reference_.scale[k];
+            if (!(error <= worst)) worst = error;
+        }
+    }
+    return worst;
+}
+
+double Measurer::error_on_steps(const Kernel& kernel, const Candidate& candidate) const {
+    return with_type_of(candidate.member.precision, [&](auto type) {
+        using real = decltype(type);
+        return reference_.precision == Precision::quadruple
+                   ? error_on_steps_in<real, __float128>(kernel, candidate)
+                   : error_on_steps_in<real, long double>(kernel, candidate);
+    });
 }
 
 Measurement Measurer::measure(const Kernel& kernel, const Candidate& candidate, bool all) const {

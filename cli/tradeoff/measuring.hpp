@@ -29,6 +29,9 @@ public:
 
     // Errors and time. With `all` also energy, momenta, drift, defect and estimate, which take a moment longer.
     Measurement measure(const Kernel& kernel, const Candidate& candidate, bool all) const;
+    // The largest error at the candidate's own steps, some 1500 of them, against explicit extrapolation that lands on
+    // each; infinite when either fails. Between the samples of the reference the error may be larger than at them.
+    double error_on_steps(const Kernel& kernel, const Candidate& candidate) const;
     // The time alone, as many runs as there are.
     Timing time_once(const Kernel& kernel, const Candidate& candidate) const;
     // The error and the relative energy error at each of the samples that the candidate meets: rows of t, error, energy.
@@ -41,6 +44,8 @@ public:
 private:
     template <class real>
     Measurement measure_in(const Kernel& kernel, const Candidate& candidate, bool all, Course* course) const;
+    template <class real, class Exact>
+    double error_on_steps_in(const Kernel& kernel, const Candidate& candidate) const;
     template <class real>
     Timing time_in(const Kernel& kernel, const Candidate& candidate) const;
     double exact_energy(double time, const std::vector<double>& high, const std::vector<double>& low) const;

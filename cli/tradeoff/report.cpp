@@ -8,8 +8,6 @@
 
 #include "cli/tradeoff/measurement_json.hpp"
 #include "cli/tradeoff/search.hpp"
-#include "cli/tradeoff/stability_limit.hpp"
-#include "runtime/cache.hpp"
 #include "runtime/output.hpp"
 
 namespace lobatto {
@@ -17,18 +15,6 @@ namespace lobatto {
 namespace {
 
 constexpr double trusted = Laboratory::trusted;
-
-// The fastest of each half decade.
-std::vector<Measurement> thinned(const Laboratory& laboratory) {
-    std::vector<Measurement> rows;
-    double next = 0.3;  // errors above this are of no use
-    for (const Measurement& m : pareto_front(laboratory)) {
-        if (laboratory.figure(m) > next) continue;
-        rows.push_back(m);
-        next = laboratory.figure(m) / std::sqrt(10);
-    }
-    return rows;
-}
 
 std::string tolerance_text(double tolerance) {
     return tolerance > 0 ? fmt::format("{:.0e}", tolerance) : "rounding";
@@ -52,11 +38,22 @@ std::string reference_text(const Laboratory& laboratory) {
     return text;
 }
 
+std::vector<Measurement> front_rows_of(const Laboratory& laboratory) {
+    std::vector<Measurement> rows;
+    double next = 0.3;  // errors above this are of no use
+    for (const Measurement& m : pareto_front(laboratory)) {
+        if (laboratory.figure(m) > next) continue;
+        rows.push_back(m);
+        next = laboratory.figure(m) / std::sqrt(10);
+    }
+    return rows;
+}
+
 std::string front_table(const Laboratory& laboratory) {
     const double until = laboratory.until();
     std::string text = fmt::format("  {:>9}  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}  {:>9}\n", "error", "ns a unit",
                                    "method", "step", "precision", "iterate", "gradients", "energy");
-    for (const Measurement& m : thinned(laboratory))
+    for (const Measurement& m : front_rows_of(laboratory))
         text += fmt::format("  {:>9.1e}  {:>9}  {:<10}  {:>10.4g}  {:<11}  {:>8}  {:>9.3g}  {:>9}\n", m.error,
                             time_a_unit(m.seconds, until), m.candidate.name(),
                             until / static_cast<double>(m.candidate.steps), precision_name(m.candidate.member.precision),
@@ -65,13 +62,13 @@ std::string front_table(const Laboratory& laboratory) {
     return text;
 }
 
-void write_csv(const Laboratory& laboratory, const std::string& path) {
+std::string csv_of(const Laboratory& laboratory) {
     std::string text = csv_header();
     for (const auto& [key, m] : laboratory.notebook().all()) text += csv_row(m, laboratory.until());
-    write_file(path, text);
+    return text;
 }
 
-void write_json(const Laboratory& laboratory, const std::string& path) {
+std::string json_of(const Laboratory& laboratory) {
     const Reference& reference = laboratory.reference();
     nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
     for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(json_of(m));
@@ -90,7 +87,7 @@ void write_json(const Laboratory& laboratory, const std::string& path) {
         {"chaotic", laboratory.is_chaotic()},
         {"front", front},
         {"measurements", measurements}};
-    write_file(path, json.dump(1) + '\n');
+    return json.dump(1) + '\n';
 }
 
 }  // namespace lobatto

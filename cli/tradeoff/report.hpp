@@ -13,9 +13,10 @@ namespace lobatto {
 std::string reference_text(const Laboratory& laboratory);
 
 // Pareto's front, thinned to about two rows a decade.
+std::vector<Measurement> front_rows_of(const Laboratory& laboratory);
 std::string front_table(const Laboratory& laboratory);
 
-void write_csv(const Laboratory& laboratory, const std::string& path);
-void write_json(const Laboratory& laboratory, const std::string& path);
+std::string csv_of(const Laboratory& laboratory);
+std::string json_of(const Laboratory& laboratory);
 
 }  // namespace lobatto
