@@ -73,6 +73,8 @@ void describe(CLI::App& program) {
     add_run(program);
     add_stability(program);
     add_sweep(program);
+    add_tradeoff(program);
+    add_tune(program);
     add_verify(program);
     add_gallery(program);
     add_paper(program);

@@ -26,6 +26,16 @@ Derivation derive(const Scene& scene, bool general) {
     return derivation;
 }
 
+Derivation with_method(const Derivation& derivation, const Method& method) {
+    Derivation other;
+    other.scene = derivation.scene;
+    other.scene.method = method;
+    other.system = derivation.system;
+    other.quadrature = quadrature_of(method);
+    other.structure = find_structure(other.scene, other.system, other.quadrature, derivation.structure.general);
+    return other;
+}
+
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
     const Scene& scene = derivation.scene;
     const Limits limits(scene.path);
