@@ -20,6 +20,8 @@ void add_run(CLI::App& program);
 void add_paper(CLI::App& program);
 void add_stability(CLI::App& program);
 void add_sweep(CLI::App& program);
+void add_tradeoff(CLI::App& program);
+void add_tune(CLI::App& program);
 void add_verify(CLI::App& program);
 
 }  // namespace lobatto

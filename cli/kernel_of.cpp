@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/kernel_of.hpp"
 
+#include <fmt/format.h>
+
 #include <sstream>
 
 #include "cli/support_text.hpp"
@@ -21,6 +23,11 @@ void append_part(std::string& whole, const std::string& text) {
 Kernel built(const KernelSource& source, const Translation& translation, Compiled* compiled) {
     const Compiled object = compile(translation);
     if (compiled != nullptr) *compiled = object;
+    if (object.was_altered)
+        fmt::print(stderr,
+                   "lobatto: the compiled kernel {} was not as it had been built: damaged, changed, or open to others. "
+                   "It was compiled again.\n",
+                   object.object);
     return Kernel::load(object.object, source.digest);
 }
 

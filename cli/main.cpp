@@ -73,6 +73,8 @@ void describe(CLI::App& program) {
     add_run(program);
     add_stability(program);
     add_sweep(program);
+    add_tradeoff(program);
+    add_tune(program);
     add_verify(program);
     add_gallery(program);
     add_paper(program);
@@ -88,6 +90,7 @@ void describe(CLI::App& program) {
 int main(int argc, char** argv) {
     // `lobatto derive scene | head -1` ends quietly, even when the parent process ignores closed pipes.
     std::signal(SIGPIPE, SIG_DFL);
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write(2)
     CLI::App program("Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.",
                      "lobatto");
     try {

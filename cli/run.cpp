@@ -15,6 +15,7 @@
 #include "cli/output_path.hpp"
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
+#include "cli/resume.hpp"
 #include "cli/summary.hpp"
 #include "cli/watch.hpp"
 #include "generator/pipeline.hpp"
@@ -32,6 +33,7 @@ struct RunOptions {
     MethodOption method;
     bool general = false;
     Overrides overrides;
+    bool resume = false;
     bool quiet = false;
 };
 
@@ -108,10 +110,11 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
     }
 }
 
-void print_events(const std::vector<Event>& events, const std::vector<std::int64_t>& counts, const std::string& path) {
+// `counts`: of the states, then of each kind of event.
+void print_events(const std::vector<Event>& events, const std::vector<double>& counts, const std::string& path) {
     for (std::size_t i = 0; i < events.size(); ++i)
-        print_row(i == 0 ? "events" : "",
-                  fmt::format("{} of '{}'{}", counts[i], events[i].text, i + 1 < events.size() ? "" : ", in " + path));
+        print_row(i == 0 ? "events" : "", fmt::format("{} of '{}'{}", counts[1 + i], events[i].text,
+                                                      i + 1 < events.size() ? "" : ", in " + path));
 }
 
 // Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
@@ -145,25 +148,54 @@ void run(const RunOptions& options) {
     }
 
     const TrajectoryHeader header = header_of(scene, source, request);
-    TrajectoryFile file(path, header);
-    std::optional<TrajectoryFile> event_file;
-    std::vector<std::int64_t> event_counts(scene.outputs.events.size(), 0);
-    if (!event_counts.empty()) {
-        event_file.emplace(event_path(options, scene), event_header_of(scene, header));
-        request.events = [&](const EventRecords& records) {
-            event_file->write(records);
-            for (std::int64_t i = 0; i < records.count; ++i)
-                ++event_counts[static_cast<std::size_t>(records.rows[i * records.columns])];
-        };
-    }
+    const std::string run = identity_of(request, header, compiled.object);
+    const std::size_t event_kinds = scene.outputs.events.size();
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
     Watch watch(scene, derivation.structure, stepper, velocity);
-    std::int64_t states = 0;
+    std::vector<double> counts(1 + event_kinds, 0);  // of the states and of each kind of event
+    std::optional<Checkpoint> from;
+    if (options.resume) {
+        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.seen().size());
+        if (from) {
+            std::vector<double> seen(from->watched.begin() + std::ssize(counts), from->watched.end());
+            watch.go_on_after(seen);
+            std::copy_n(from->watched.begin(), counts.size(), counts.begin());
+            request.from = &from->halfway;
+        }
+        if (!options.quiet)
+            print_row("resumed", from ? fmt::format("at t = {:.6g}, after {} steps", from->halfway.result.time,
+                                                    from->halfway.result.steps_done)
+                                      : "nothing was left: from the start");
+    }
+    TrajectoryFile file(path, header, from ? from->sizes[0] : 0);
+    std::optional<TrajectoryFile> event_file;
+    if (event_kinds > 0) {
+        event_file.emplace(event_path(options, scene), event_header_of(scene, header), from ? from->sizes[1] : 0);
+        request.events = [&](const EventRecords& records) {
+            event_file->write(records);
+            for (std::int64_t i = 0; i < records.count; ++i)
+                ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
+        };
+    }
+    const bool keeps_checkpoints = file.is_regular() && (!event_file || event_file->is_regular());
+    if (keeps_checkpoints) {
+        if (!from) remove_checkpoint(path);  // of a run that has just lost its files
+        request.checkpoint = [&](const Halfway& halfway) {
+            Checkpoint checkpoint{run, halfway, {file.size()}, counts};
+            file.sync();
+            if (event_file) {
+                event_file->sync();
+                checkpoint.sizes.push_back(event_file->size());
+            }
+            for (const double number : watch.seen()) checkpoint.watched.push_back(number);
+            write_checkpoint(checkpoint_path(path), checkpoint);
+        };
+    }
     request.sink = [&](const Records& records) {
         file.write(records);
         watch.look(records);
-        states += records.count;
+        counts[0] += static_cast<double>(records.count);
     };
     TrajectoryResult result;
     {
@@ -176,11 +208,12 @@ void run(const RunOptions& options) {
     watch.look_at_end(result);
     file.finish();
     if (event_file) event_file->finish();
+    if (keeps_checkpoints && !result.interrupted) remove_checkpoint(path);
 
     if (!options.quiet) {
         print_table(derivation, stepper, request, result, watch);
-        print_events(scene.outputs.events, event_counts, event_file ? event_path(options, scene) : "");
-        print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
+        print_events(scene.outputs.events, counts, event_file ? event_path(options, scene) : "");
+        print_row("trajectory", fmt::format("{}, {} {}", path, counts[0], counts[0] == 1 ? "state" : "states"));
         if (!steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
@@ -195,7 +228,8 @@ void run(const RunOptions& options) {
             scene.path, path));
     }
     if (result.interrupted) {
-        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.\n", result.time, path);
+        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, path,
+                   keeps_checkpoints ? " The same command with --resume goes on from there." : "");
         throw CLI::RuntimeError(interrupted_exit);
     }
 }
@@ -219,6 +253,9 @@ void add_run(CLI::App& program) {
         ->add_option("--set", options->overrides.set,
                      "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
         ->allow_extra_args(false);
+    command->add_flag(
+        "--resume", options->resume,
+        "go on where the same run was interrupted or killed; its files get the bytes they would have had");
     command->add_flag("--quiet", options->quiet, "Print nothing but errors");
     command->footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
     command->callback([options] { run(*options); });

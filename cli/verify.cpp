@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "cli/commands.hpp"
+#include "cli/exact_start.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/method_option.hpp"
 #include "generator/check.hpp"
@@ -44,61 +45,16 @@ Row at_most(const std::string& claim, double measured, double bound, const std::
     return {claim, number(measured), number(bound), measured <= bound, meaning};
 }
 
-// A value of 60 digits in quadruple precision: the sum of its first three doubles.
-__float128 quadruple(GiNaC::numeric value) {
-    __float128 sum = 0;
-    for (int part = 0; part < 3; ++part) {
-        const double leading = value.to_double();
-        sum += leading;
-        value -= GiNaC::numeric(leading);
-    }
-    return sum;
-}
-
-// The scene's start for a kernel of either precision.
-struct Start60 {
-    std::vector<GiNaC::numeric> parameters, q, rate;
-    GiNaC::numeric step;
-    bool from_velocity = false;
-
-    explicit Start60(const Scene& scene) : from_velocity(scene.start == Start::velocity) {
-        for (const Parameter& parameter : scene.parameters)
-            parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name));
-        for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
-            const std::string& name = scene.coordinates[k].name;
-            q.push_back(scene.evaluate(scene.initial_position[k], "the initial position of " + name));
-            rate.push_back(
-                scene.evaluate(scene.initial_rate[k],
-                               (from_velocity ? "the initial velocity of " : "the initial momentum of ") + name));
-        }
-        step = scene.evaluate(scene.run.step, "the step");
-        if (!step.is_positive())
-            throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
-    }
-};
-
+// The scene's start, parameters and step in the kernel's number type.
 template <class real>
-struct Start {
-    std::vector<real> parameters, q, p;
+struct Start : StartIn<real> {
     real step;
 };
 
-template <class real, class Convert>
-Start<real> start_in(const Start60& start, const Kernel& kernel, const Convert& convert) {
-    const auto all = [&](const std::vector<GiNaC::numeric>& values) {
-        std::vector<real> converted;
-        for (const GiNaC::numeric& value : values) converted.push_back(convert(value));
-        return converted;
-    };
-    Start<real> result{all(start.parameters), all(start.q), all(start.rate), convert(start.step)};
-    LoadedStepper<real> stepper(kernel);
-    const lobatto_status status = stepper.prepare(result.parameters, result.step);
-    if (status != LOBATTO_OK)
-        throw ComputationError(status == LOBATTO_SINGULAR_MASS
-                                   ? "the mass matrix has no inverse for the scene's parameters"
-                                   : "the kernel's coefficients are not finite for the scene's parameters and step");
-    if (start.from_velocity) result.p = stepper.momentum(real(0), result.q, result.p);
-    return result;
+template <class real>
+Start<real> start_with_step(const ExactStart& start, const GiNaC::numeric& step, const Kernel& kernel) {
+    const real h = number_of<real>(step);
+    return {start_in<real>(start, kernel, h), h};
 }
 
 constexpr std::int64_t short_run = 1000, long_run = 20000;  // steps
@@ -232,7 +188,10 @@ void verify(const VerifyOptions& options) {
     const bool with_tangent = scene.coordinates.size() <= tangent_limit;
     scene.outputs.energy = true;
     scene.outputs.tangent = with_tangent;
-    const Start60 exact_start(scene);
+    const ExactStart exact_start(scene);
+    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
+    if (!step.is_positive())
+        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
     const Derivation derivation = derive(scene);
     Programs programs = build_programs(derivation);
     EmitOptions emit_options;
@@ -247,8 +206,8 @@ void verify(const VerifyOptions& options) {
          {check_quadrature(derivation.quadrature), check_equations(derivation), check_programs(derivation, programs)})
         for (const Check& check : checks) rows.push_back(row_of(check));
 
-    const auto start = start_in<double>(exact_start, kernel, [](const GiNaC::numeric& x) { return x.to_double(); });
-    const auto exact = start_in<__float128>(exact_start, exact_kernel, quadruple);
+    const auto start = start_with_step<double>(exact_start, step, kernel);
+    const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
     const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),

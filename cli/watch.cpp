@@ -46,6 +46,20 @@ void Watch::look_at_end(const TrajectoryResult& result) {
     if (closed_) compare(result.time, result.q[0]);
 }
 
+std::vector<double> Watch::seen() const {
+    return {position_error_, static_cast<double>(seen_), static_cast<double>(compared_), static_cast<double>(stride_),
+            discrete_start_, discrete_error_};
+}
+
+void Watch::go_on_after(const std::vector<double>& seen) {
+    position_error_ = seen.at(0);
+    seen_ = std::llround(seen.at(1));
+    compared_ = std::llround(seen.at(2));
+    stride_ = std::llround(seen.at(3));
+    discrete_start_ = seen.at(4);
+    discrete_error_ = seen.at(5);
+}
+
 std::optional<double> Watch::discrete_error() const {
     if (!discrete_) return std::nullopt;
     return discrete_start_ == 0 ? discrete_error_ : discrete_error_ / std::fabs(discrete_start_);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "generator/pipeline.hpp"
 #include "runtime/diagnostics.hpp"
@@ -22,6 +23,10 @@ public:
 
     std::optional<double> discrete_error() const;  // largest |H_d - H_d(0)| / |H_d(0)|, of linear systems
     std::optional<double> position_error() const;  // largest |q - exact q|, where the solution is known in closed form
+    // What it has seen so far, for a later run that goes on.
+    std::vector<double> seen() const;
+    void go_on_after(const std::vector<double>& seen);
+
     bool is_elliptic() const { return closed_ && closed_->kind == ClosedSolution::Kind::pendulum; }
 
 private:

@@ -87,6 +87,7 @@ public:
           system_(derivation.system),
           formulas_(formulas),
           machine_(programs),
+          solves_(programs.solves),
           n_(static_cast<std::size_t>(system_.n)),
           m_(static_cast<std::size_t>(derivation.quadrature.points) - 2) {
         for (std::size_t i = 0; i < system_.parameters.size(); ++i)
@@ -306,6 +307,8 @@ private:
                     for (std::size_t j = 0; j < element.x.size(); ++j) {
                         if (target == slope + "[i" + std::to_string(j) + "] +=")
                             add(element_target(slope, static_cast<std::size_t>(variable(j))), value);
+                        else if (target == slope + "[i" + std::to_string(j) + "] -=")
+                            add(element_target(slope, static_cast<std::size_t>(variable(j))), -value);
                         for (std::size_t column = 0; column < pairs.size() && j == 0; ++column)
                             if (target == second + "[" + name + "_entry[r * " + std::to_string(pairs.size()) + " + " +
                                               std::to_string(column) + "]] +=")
@@ -415,16 +418,7 @@ private:
         compare("emitted stage equations", F, machine_.get("F", N));
         machine_.run("jacobian");
         compare("emitted Jacobian", J, machine_.get("J", N * N));
-        machine_.run("correction");
-        Numbers minus_F;
-        for (const cln::cl_R& value : F) minus_F.push_back(-value);
-        const Numbers delta = machine_.get("delta", N);
-        if (N <= static_cast<std::size_t>(closed_form_limit)) {
-            compare("emitted Newton correction", minus_F, times(J, delta));
-        } else {
-            compare("emitted Newton correction", minus_F, delta);
-            compare("emitted Newton correction", J, machine_.get("J", N * N));
-        }
+        const Numbers delta = correction(F, J);
         machine_.run("carry");
         Numbers carried = W;
         for (std::size_t j = 0; j < m_; ++j)
@@ -434,6 +428,43 @@ private:
             }
         compare("emitted Newton correction", carried, machine_.get("W", N));
         machine_.set("W", W);
+    }
+
+    // J delta = -F, where the program solves it; where it leaves that to the elimination, J and -F themselves. Groups
+    // do not act on one another.
+    Numbers correction(const Numbers& F, const Numbers& J) {
+        const std::size_t N = F.size();
+        machine_.run("correction");
+        Numbers delta(N, cln::cl_R(0));
+        std::vector<bool> is_left(N, false);
+        for (const Solve& solve : solves_) {
+            const std::vector<std::size_t>& left = solve.unknowns;
+            const Numbers right = machine_.get("delta" + solve.mark, left.size()),
+                          matrix = machine_.get("J" + solve.mark, left.size() * left.size());
+            Numbers minus_F, block;
+            for (std::size_t i = 0; i < left.size(); ++i) {
+                minus_F.push_back(-F[left[i]]);
+                for (const std::size_t j : left) block.push_back(J[left[i] * N + j]);
+                is_left[left[i]] = true;
+            }
+            compare("emitted Newton correction", minus_F, right);
+            compare("emitted Newton correction", block, matrix);
+        }
+        for (std::size_t i = 0; i < N; ++i)
+            if (!is_left[i]) delta[i] = machine_.get("delta[" + std::to_string(i) + "]");
+        const Numbers product = times(J, delta);
+        Numbers minus_F, solved;
+        for (std::size_t i = 0; i < N; ++i) {
+            if (is_left[i]) {
+                delta[i] = -F[i];  // any value tells whether it is carried on rightly
+            } else {
+                minus_F.push_back(-F[i]);
+                solved.push_back(product[i]);
+            }
+        }
+        compare("emitted Newton correction", minus_F, solved);
+        machine_.set("delta", delta);
+        return delta;
     }
 
     void arrival(const Discretisation& d) {
@@ -464,6 +495,7 @@ private:
     const System& system_;
     Formulas& formulas_;
     Machine machine_;
+    const std::vector<Solve>& solves_;
     std::size_t n_, m_;
     Numbers mass_;                // n x n, of separable systems
     Numbers p_, force_, energy_;  // at the point: n, n, 1

@@ -247,4 +247,35 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
     return result;
 }
 
+std::vector<RowRun> runs_of(const Element& element) {
+    std::vector<RowRun> runs;
+    for (std::size_t r = 0; r < element.rows.size(); ++r) {
+        bool follows = r > 0;
+        for (std::size_t j = 0; follows && j < element.x.size(); ++j)
+            follows = element.rows[r][j] == element.rows[r - 1][j] + 1;
+        if (follows)
+            ++runs.back().count;
+        else
+            runs.push_back({static_cast<int>(r), 1});
+    }
+    return runs;
+}
+
+bool are_neighbours(const Elements& elements) {
+    std::size_t rows = 0, in_runs = 0;
+    for (const Element& element : elements.repeated) {
+        if (element.target >= 0) return false;
+        rows += element.rows.size();
+        for (const RowRun& run : runs_of(element)) {
+            if (run.count < static_cast<int>(fewest_rows)) continue;
+            in_runs += static_cast<std::size_t>(run.count);
+            const std::vector<int>&here = element.rows[static_cast<std::size_t>(run.begin)],
+                  &first = element.rows.front();
+            for (std::size_t j = 1; j < here.size(); ++j)
+                if (here[j] - here[0] != first[j] - first[0]) return false;
+        }
+    }
+    return rows > 0 && 4 * in_runs >= 3 * rows;
+}
+
 }  // namespace lobatto

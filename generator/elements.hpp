@@ -27,6 +27,14 @@ struct Elements {
 
 constexpr std::size_t fewest_rows = 8;
 
+// Rows that follow one another with each variable the next: their formula can be taken in vector lanes.
+struct RowRun {
+    int begin, count;
+};
+std::vector<RowRun> runs_of(const Element& element);
+// Whether most rows of all formulas stand in long runs, with the same distances between the variables of a row.
+bool are_neighbours(const Elements& elements);
+
 // The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
 Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,
                        const std::vector<GiNaC::ex>& terms, const std::vector<std::pair<int, GiNaC::ex>>& forces);

@@ -55,6 +55,7 @@ public:
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + tables(d_, options_.precision) +
                 (d_.structure.looped ? looped_.tables() : "") + parameters() + coefficients() + prepare(name);
+        for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form)) text += function(declaration);
         if (is_map() && n_ > 1)
             text +=
@@ -276,8 +277,21 @@ private:
         if (declaration.takes_time && !d_.system.autonomous) parameters.emplace_back(type("real"), "time");
         for (const auto& [of, parameter] : declaration.parameters) parameters.emplace_back(type(of), parameter);
         return "\n" + wrapped(std::string("    // ") + declaration.comment, "    //     ") +
-               (any ? "    template <class given, class number>\n" : "") +
+               (any ? fmt::format("    template <{}class given, class number>\n",
+                                  takes_how(declaration) ? "class how = lobatto::OneByOne, " : "")
+                    : "") +
                signature(type(declaration.result), declaration.program, parameters, text) + text + "    }\n";
+    }
+
+    std::string row_function(const RowFunction& row) const {
+        std::vector<std::pair<std::string, const char*>> parameters{{"const CoefficientsOf<given>&", "k"}};
+        if (!d_.system.autonomous) parameters.emplace_back("clock", "time");
+        parameters.emplace_back(fmt::format("lobatto::Rows<number, {}, in_lanes>&", row.variables), "rows");
+        return fmt::format(
+                   "\n    // What {} gives for a row, or for rows side by side.\n"
+                   "    template <class given, {}class number, bool in_lanes>\n",
+                   row.name, d_.system.autonomous ? "" : "class clock, ") +
+               "    LOBATTO_INLINE\n" + signature("void", row.name, parameters, row.body) + row.body + "    }\n";
     }
 
     // The eliminations that the closed forms leave, after the statements that fill them.
@@ -296,6 +310,10 @@ private:
         const std::size_t last = statements.rfind("        return ");
         if (last == std::string::npos) return before + statements + after + "        return true;\n";
         return before + statements.substr(0, last) + after + statements.substr(last);
+    }
+    bool takes_how(const Declaration& declaration) const {
+        return d_.structure.neighbours && has_lanes(options_.precision) &&
+               std::string(declaration.program) == "acceleration";
     }
     bool forced() const {
         return std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),

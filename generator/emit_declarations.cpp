@@ -149,6 +149,7 @@ bool is_member_name(const std::string& name) {
                                                   "any_number",
                                                   "costly",
                                                   "diagonal_part",
+                                                  "neighbours",
                                                   "parameter_count",
                                                   "entries",
                                                   "entry_row",

@@ -35,7 +35,8 @@ LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, P
       p_(programs),
       precision_(precision),
       names_(std::move(names)),
-      general_(derivation.structure.form == Form::general) {}
+      general_(derivation.structure.form == Form::general),
+      neighbours_(derivation.structure.neighbours && has_lanes(precision)) {}
 
 const Program& LoopedText::program(const std::string& name) const {
     return *std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
@@ -65,9 +66,18 @@ std::string LoopedText::tables() const {
                                     name, canonical_text(element.term), element.rows.size(), general_ ? "z" : "q"),
                         "    //     ");
         text += integer_table(name + "_x", variables) + integer_table(name + "_entry", positions);
+        if (neighbours_) {
+            std::vector<int> runs;
+            for (const RowRun& run : runs_of(element)) runs.insert(runs.end(), {run.begin, run.count});
+            text +=
+                "    // Runs of rows, (first, how many), in which each variable is the one of the row before plus "
+                "one.\n" +
+                integer_table(name + "_run", runs);
+        }
         if (!element.a.empty() && !has_parameters(element)) {
             std::vector<GiNaC::ex> values;
-            for (const auto& row : element.coefficients) values.insert(values.end(), row.begin(), row.end());
+            for (std::size_t j = 0; j < element.a.size(); ++j)
+                for (const auto& row : element.coefficients) values.push_back(row[j]);
             text += number_table(name + "_a", values, precision_);
         }
     }
@@ -148,13 +158,78 @@ std::string LoopedText::loops(const std::string& part, const char* variables) co
         for (std::size_t j = 0; j < element.a.size(); ++j) {
             const std::string value = fmt::format("a{}", j);
             if (mentions(inside, value))
-                begin += fmt::format("            const auto {} = {}{}_a[r * {} + {}];\n", value,
-                                     has_parameters(element) ? "k." : "", name, element.a.size(), j);
+                begin += fmt::format("            const auto {} = {}{}_a[{} + r];\n", value,
+                                     has_parameters(element) ? "k." : "", name, j * element.rows.size());
         }
         text += fmt::format("        for (int r = 0; r < {}; ++r) {{  // {}\n{}{}        }}\n", element.rows.size(),
                             name, begin, inside);
     }
     return text;
+}
+
+// Of an element's program the outputs stand in W[i0], W[i1], ...
+static std::size_t variable_of(const Output& output) {
+    return std::stoul(output.target.substr(output.target.find("[i") + 2));
+}
+
+std::vector<RowFunction> LoopedText::row_functions() const {
+    std::vector<RowFunction> result;
+    for (std::size_t number = 0; neighbours_ && number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        const std::string name = element_name(number);
+        std::vector<Statement> list;
+        for (const Output& output : program(name + "_slope").outputs)
+            list.push_back(
+                {fmt::format("rows.result[{}]{}", variable_of(output), output.target.ends_with("-=") ? " -=" : ""),
+                 output.value});
+        const std::string inside = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+        std::string begin;
+        for (std::size_t j = 0; j < element.x.size(); ++j)
+            if (const std::string value = fmt::format("x{}", j); mentions(inside, value))
+                begin += fmt::format("        const auto {} = rows.x[{}];\n", value, j);
+        for (std::size_t j = 0; j < element.a.size(); ++j)
+            if (const std::string value = fmt::format("a{}", j); mentions(inside, value))
+                begin += fmt::format("        const auto {} = rows.of({}{}_a + {});\n", value,
+                                     has_parameters(element) ? "k." : "", name, j * element.rows.size());
+        result.push_back({name, static_cast<int>(element.x.size()), begin + inside});
+    }
+    return result;
+}
+
+// W = M^-1 grad V along the rows, in the way `how`.
+std::string LoopedText::along_rows() const {
+    const std::string time = d_.system.autonomous ? "" : "time, ";
+    const auto covers = [&](const Element& element) {
+        const std::vector<RowRun> runs = runs_of(element);
+        const auto [least, most] = std::minmax_element(element.rows.front().begin(), element.rows.front().end());
+        return runs.size() == 1 && *least == 0 && *most <= 2 && *most + runs.front().count == d_.system.n;
+    };
+    std::string text;
+    bool is_first = true;
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        const std::string name = element_name(number);
+        const bool sets = is_first && covers(element);
+        if (is_first && !sets) text += "        how::template clear<coordinates>(W);\n";
+        is_first = false;
+        text +=
+            wrapped(fmt::format("        how::template {}<{}{}, {}_x, {}_run>(q, W, [&](auto& rows) LOBATTO_FORMULA {{ "
+                                "{}(k, {}rows); }});",
+                                sets ? "set_rows" : "add_rows", sets ? "coordinates, " : "", element.x.size(), name,
+                                name, name, time),
+                    "            ");
+    }
+    std::vector<Statement> list;
+    for (const Output& output : program("rest_slope").outputs)
+        list.push_back(
+            {"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W) +=", output.value});
+    text += FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+    const bool unit_masses = [&] {
+        for (int i = 0; i < d_.system.n; ++i)
+            if (!(d_.system.mass(i, i) - 1).is_zero()) return false;
+        return true;
+    }();
+    return unit_masses ? text : text + "        how::template scale<coordinates>(W, k.inverse_mass);\n";
 }
 
 std::string LoopedText::body(const std::string& function) const {
@@ -165,18 +240,20 @@ std::string LoopedText::body(const std::string& function) const {
         const std::string clear = coordinates + "W[i] = number(0);\n",
                           scale = coordinates + "W[i] *= k.inverse_mass[i];\n";
         if (function == "node")
-            return clear + clear_entries + "S[e] = number(0);\n" + statements("rest_node", "") + loops("node", "q") +
+            return clear + clear_entries + "S[e] = number(0);\n" + loops("node", "q") + statements("rest_node", "") +
                    scale + clear_entries + "S[e] *= k.inverse_mass[entry_row[e]];\n";
-        if (function == "acceleration") return clear + statements("rest_slope", "") + loops("slope", "q") + scale;
+        if (function == "acceleration" && neighbours_) return along_rows();
+        if (function == "acceleration") return clear + loops("slope", "q") + statements("rest_slope", "") + scale;
         if (function == "quadratic_part")
             return !d_.structure.absorbed && !d_.structure.diagonal_part
                        ? ""
-                       : clear_entries + "S0[e] = real(0);\n" + statements("rest_quadratic", "") +
-                             loops("quadratic", "q") + clear_entries + "S0[e] *= k.inverse_mass[entry_row[e]];\n";
+                       : clear_entries + "S0[e] = real(0);\n" + loops("quadratic", "q") +
+                             statements("rest_quadratic", "") + clear_entries +
+                             "S0[e] *= k.inverse_mass[entry_row[e]];\n";
         if (function == "energy" && d_.scene.outputs.energy)
             return "        number sum = number(0);\n" + coordinates +
-                   "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + statements("rest_energy", "") +
-                   loops("energy", "q") + "        return sum;\n";
+                   "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + loops("energy", "q") +
+                   statements("rest_energy", "") + "        return sum;\n";
         if (function == "momentum") return coordinates + "p[i] = k.mass[i] * velocity[i];\n";
         if (function == "velocity") return coordinates + "velocity[i] = k.inverse_mass[i] * p[i];\n";
         return "";
@@ -186,8 +263,8 @@ std::string LoopedText::body(const std::string& function) const {
                              coordinates + "z[coordinates + i] = q[i];\n";
     const std::string slope = join + "        number g[2 * coordinates];\n        slope(k, " + time + "z, g);\n";
     if (function == "node")
-        return clear + clear_entries + "H[e] = number(0);\n" + statements("rest_node", "") + loops("node", "z");
-    if (function == "slope") return clear + statements("rest_slope", "") + loops("slope", "z");
+        return clear + clear_entries + "H[e] = number(0);\n" + loops("node", "z") + statements("rest_node", "");
+    if (function == "slope") return clear + loops("slope", "z") + statements("rest_slope", "");
     if (function == "slopes")
         return slope + coordinates + "Lv[i] = g[i];\n" + coordinates + "Lq[i] = g[coordinates + i];\n";
     if (function == "momentum") return slope + coordinates + "p[i] = g[i];\n";
@@ -199,7 +276,7 @@ std::string LoopedText::body(const std::string& function) const {
                coordinates + "Lv[i] = g[i];\n" + coordinates +
                "Lq[i] = g[coordinates + i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
     if (function == "energy" && d_.scene.outputs.energy)
-        return join + "        number sum = number(0);\n" + statements("rest_energy", "") + loops("energy", "z") +
+        return join + "        number sum = number(0);\n" + loops("energy", "z") + statements("rest_energy", "") +
                "        return sum;\n";
     return "";
 }

@@ -33,7 +33,7 @@ std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
     return result;
 }
 
-std::string separable_shapes(const Structure& structure, int nodes) {
+std::string separable_shapes(const Structure& structure, int nodes, Precision precision) {
     std::string text;
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
     if (structure.form == Form::separable) {
@@ -42,6 +42,9 @@ std::string separable_shapes(const Structure& structure, int nodes) {
         line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part),
              structure.diagonal_part ? "taken into the stage map: the constant part of M^-1 V''"
                                      : "nothing is taken into the stage map");
+        line(text, fmt::format("bool neighbours = {}", structure.neighbours && has_lanes(precision)),
+             structure.neighbours ? "formulas go along neighbouring coordinates, which lie in lanes"
+                                  : "coordinates are taken one by one");
         line(text, fmt::format("bool absorbed = {}", structure.absorbed),
              structure.absorbed ? "Newton's iteration has the Jacobian of V's quadratic part"
                                 : "Newton's iteration has its own Jacobians");
@@ -183,8 +186,12 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     for (const Event& event : outputs.events) directions.push_back(event.direction);
     text += integer_table("event_direction", directions);
     if (structure.form == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
-    text += separable_shapes(structure, d.quadrature.points);
+    text += separable_shapes(structure, d.quadrature.points, precision);
     return structure.form == Form::separable && !structure.unrolled ? text + order_of_unknowns(structure) : text;
+}
+
+bool has_lanes(Precision precision) {
+    return precision == Precision::single || precision == Precision::double_;
 }
 
 bool has_tangent(const Derivation& d) {

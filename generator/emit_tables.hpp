@@ -17,6 +17,9 @@ struct Derivation;
 constexpr int tangent_limit = 64;
 bool has_tangent(const Derivation& derivation);
 
+// Whether vector registers know these numbers.
+bool has_lanes(Precision precision);
+
 std::string shapes(const Derivation& derivation, Precision precision, const std::string& name,
                    const std::string& digest);
 std::string tables(const Derivation& derivation, Precision precision);

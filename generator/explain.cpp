@@ -14,6 +14,8 @@ namespace {
 
 using GiNaC::ex;
 
+constexpr int most_swept = 16;  // coordinates of the general form: `most_full` of kernel_galerkin.hpp
+
 bool holds_any(const SparseMatrix& matrix, const std::vector<GiNaC::symbol>& symbols) {
     return std::any_of(matrix.entries().begin(), matrix.entries().end(), [&](const auto& entry) {
         return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return entry.second.has(s); });
@@ -158,10 +160,11 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    const char* const swept = "by sweeps over all points at once; where they do not contract, ";
-    std::string text = derivation.structure.linear                    ? "once a step, without iteration; "
-                       : derivation.structure.form == Form::separable ? swept
-                                                                      : "";
+    const bool swept = !derivation.structure.general &&
+                       (derivation.structure.form == Form::separable || derivation.system.n <= most_swept);
+    std::string text = derivation.structure.linear ? "once a step, without iteration; "
+                       : swept                     ? "by sweeps over all points at once; where they do not contract, "
+                                                   : "";
     if (!derivation.structure.linear)
         text +=
             derivation.structure.absorbed ? "by iterations with one matrix for all steps; " : "by Newton's iteration; ";

@@ -115,9 +115,10 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     // Local names: scene names for inputs such as q[0], then temporaries.
     std::set<std::string> taken;
     for (const Input& input : graph.inputs()) taken.insert(input.code.substr(0, input.code.find('[')));
-    for (const char* name : {"k",  "p",     "h",  "q",  "u",  "v",        "W",    "S",          "Q",        "F", "J",
-                             "W0", "W1",    "q1", "p1", "u1", "W_before", "base", "delta",      "velocity", "z", "g",
-                             "H",  "value", "Lv", "Lq", "M",  "S0",       "time", "not_finite", "Status"})
+    for (const char* name :
+         {"k",  "p",     "h",    "q",   "u",  "v",        "W",    "S",     "Q",        "F",          "J",
+          "W0", "W1",    "q1",   "p1",  "u1", "W_before", "base", "delta", "velocity", "z",          "g",
+          "H",  "value", "rows", "how", "Lv", "Lq",       "M",    "S0",    "time",     "not_finite", "Status"})
         taken.insert(name);
     const auto take = [&taken](const std::string& name) {  // false when it has another meaning
         return !is_member_name(name) && taken.insert(name).second;
@@ -156,7 +157,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         else if (statement.target == "return finite")
             text_ += wrapped(fmt::format("        return lobatto::is_finite({});", text_of(statement.value)),
                              "            ");
-        else if (statement.target.ends_with("+="))
+        else if (statement.target.ends_with("+=") || statement.target.ends_with("-="))
             text_ += wrapped(fmt::format("        {} {};", statement.target, text_of(statement.value)), "            ");
         else
             text_ +=

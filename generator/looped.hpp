@@ -18,6 +18,13 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element
 // Whether coefficients that vary are run-time parameters, not numbers.
 bool has_parameters(const Element& element);
 
+// A formula as a function of one row or of rows side by side.
+struct RowFunction {
+    std::string name;
+    int variables;
+    std::string body;
+};
+
 // What the emitter asks for: constant tables, fields of Coefficients, their values, and the body of a function.
 class LoopedText {
 public:
@@ -28,6 +35,7 @@ public:
     std::vector<Statement> prepared() const;  // values of those fields
     std::string after_prepare() const;        // what follows them
     std::string body(const std::string& function) const;
+    std::vector<RowFunction> row_functions() const;  // where neighbouring coordinates lie in lanes
 
 private:
     const Program& program(const std::string& name) const;
@@ -38,7 +46,8 @@ private:
     const Programs& p_;
     Precision precision_;
     Naming names_;
-    bool general_;
+    std::string along_rows() const;
+    bool general_, neighbours_;
 };
 
 }  // namespace lobatto

@@ -2,17 +2,21 @@
 // The one place that calls the stages in order.
 #include "generator/pipeline.hpp"
 
+#include "generator/limits.hpp"
 #include "generator/programs.hpp"
 #include "generator/start.hpp"
 
 namespace lobatto {
 
 const Discretisation& Derivation::discretisation() const {
-    if (!discretisation_) discretisation_ = std::make_shared<const Discretisation>(discretise(system, quadrature));
+    if (discretisation_) return *discretisation_;
+    const Limits limits(scene.path);
+    discretisation_ = std::make_shared<const Discretisation>(discretise(system, quadrature));
     return *discretisation_;
 }
 
 Derivation derive(const Scene& scene, bool general) {
+    const Limits limits(scene.path);
     Derivation derivation;
     derivation.scene = scene;
     derivation.system = build_system(scene);
@@ -22,8 +26,19 @@ Derivation derive(const Scene& scene, bool general) {
     return derivation;
 }
 
+Derivation with_method(const Derivation& derivation, const Method& method) {
+    Derivation other;
+    other.scene = derivation.scene;
+    other.scene.method = method;
+    other.system = derivation.system;
+    other.quadrature = quadrature_of(method);
+    other.structure = find_structure(other.scene, other.system, other.quadrature, derivation.structure.general);
+    return other;
+}
+
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
     const Scene& scene = derivation.scene;
+    const Limits limits(scene.path);
     try {
         return emit_kernel(derivation, build_programs(derivation), options);
     } catch (const DomainError& error) {

@@ -35,6 +35,8 @@ private:
 
 // `general`: with every shortcut of Structure switched off.
 Derivation derive(const Scene& scene, bool general = false);
+// The same system by another member of the family: only what depends on it is found anew.
+Derivation with_method(const Derivation& derivation, const Method& method);
 KernelSource emit(const Derivation& derivation, const EmitOptions& options = {});
 
 }  // namespace lobatto

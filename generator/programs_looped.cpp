@@ -138,9 +138,15 @@ private:
         if (is_force) gradient[static_cast<std::size_t>(element.target)] = term;
         const ConstantPart constant_part = free_of(element.x);
         Program node{name + "_node", {}}, slope_only{name + "_slope", {}}, quadratic{name + "_quadratic", {}};
-        for (std::size_t j = 0; j < gradient.size(); ++j)
+        Ids slopes;
+        for (std::size_t j = 0; j < gradient.size(); ++j) {
+            // Action and reaction: the same value, added and taken away.
+            std::size_t i = 0;
+            while (i < j && !(gradient[i] + gradient[j]).expand().is_zero()) ++i;
+            slopes.push_back(i < j ? slopes[i] : convert(gradient[j]));
             if (!gradient[j].is_zero())
-                slope_only.outputs.push_back({add_to(fmt::format("{}[i{}]", slope(), j)), convert(gradient[j])});
+                slope_only.outputs.push_back({fmt::format("{}[i{}] {}=", slope(), j, i < j ? '-' : '+'), slopes[j]});
+        }
         node.outputs = slope_only.outputs;
         int column = 0;
         for (const auto& [i, j] : pairs_of(element)) {
@@ -168,8 +174,8 @@ private:
         // Coefficients that are parameters are put into an array by prepare().
         Program table{name + "_a", {}};
         if (has_parameters(element))
-            for (const auto& row : element.coefficients)
-                for (const ex& value : row) table.outputs.push_back({"", convert(value)});
+            for (std::size_t j = 0; j < element.a.size(); ++j)
+                for (const auto& row : element.coefficients) table.outputs.push_back({"", convert(row[j])});
         p_.programs.push_back(std::move(table));
     }
 

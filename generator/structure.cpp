@@ -204,6 +204,7 @@ private:
         if (result_.form == Form::linear_map) return;
         repetition();
         absorption();
+        neighbourhood();
         find("small enough to write out", result_.unrolled,
              result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
                                             interior_, unrolled_limit)
@@ -256,19 +257,17 @@ private:
     void repetition() {
         const bool general = result_.form == Form::general;
         if (result_.form == Form::linear_map || (!general && result_.unrolled)) return;
-        GiNaC::exmap at_rest;
-        for (const auto& velocity : system_.v) at_rest[velocity] = 0;
         std::vector<ex> terms;
         std::vector<std::pair<int, ex>> forces;
-        for (const ex& term : system_.terms) {
-            const ex value = general ? term : -term.subs(at_rest, GiNaC::subs_options::no_pattern);
-            if (!value.is_zero()) terms.push_back(value);
-        }
+        for (const ex& term : general ? system_.terms : all_at(system_.terms, system_.v, 0))
+            if (!term.is_zero()) terms.push_back(general ? term : -term);
         std::vector<GiNaC::symbol> all = system_.q;
         all.insert(all.end(), system_.v.begin(), system_.v.end());
-        for (int k = 0; k < n_; ++k)
-            for (const ex& term : terms_of(system_.outer_force[static_cast<std::size_t>(k)], all))
-                if (!term.is_zero()) forces.emplace_back(general ? n_ + k : k, term);
+        for (int k = 0; k < n_; ++k) {
+            const ex& force = system_.outer_force[static_cast<std::size_t>(k)];
+            if (force.is_zero()) continue;
+            for (const ex& term : terms_of(force, all)) forces.emplace_back(general ? n_ + k : k, term);
+        }
         const std::size_t count = terms.size() + forces.size();
         if (count < looped_from) return;
         Elements elements = find_elements(system_, general ? result_.routhian.z : system_.q, terms, forces);
@@ -329,6 +328,15 @@ private:
         else if (!diagonal)
             reason = "the constant part of V'' couples coordinates, and the rest is no small part of the forces";
         find("quadratic part absorbed", result_.diagonal_part || result_.absorbed, reason);
+    }
+
+    void neighbourhood() {
+        if (result_.form != Form::separable || !result_.looped || result_.linear) return;
+        result_.neighbours = !result_.general && !result_.diagonal_part && are_neighbours(result_.elements);
+        find("neighbouring coordinates", result_.neighbours,
+             result_.neighbours      ? "formulas go along coordinates that stand side by side: vector lanes hold these"
+             : result_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
+                                     : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
     }
 
     // h^2 |A| |entries|, where those of M^-1 V'' stand, at the start; norms of largest row sums.

@@ -53,6 +53,13 @@ private:
     std::map<ex, std::size_t, GiNaC::ex_is_less> index_;
 };
 
+// GiNaC goes through the whole of a substitution at every sum and product: only what occurs is put into it.
+ex at(const ex& expression, const Symbols& variables, const Occurrences& occurrences, const ex& value) {
+    GiNaC::exmap found;
+    for (const std::size_t i : occurrences.in(expression)) found[variables[i]] = value;
+    return expression.subs(found, GiNaC::subs_options::no_pattern);
+}
+
 void append_terms(const ex& expression, const Occurrences& occurrences, std::vector<ex>& terms) {
     if (GiNaC::is_a<GiNaC::add>(expression)) {
         for (const ex& term : expression) append_terms(term, occurrences, terms);
@@ -212,6 +219,13 @@ std::vector<ex> terms_of(const ex& expression, const Symbols& variables) {
     return terms;
 }
 
+std::vector<ex> all_at(const std::vector<ex>& expressions, const Symbols& variables, const ex& value) {
+    const Occurrences occurrences(variables);
+    std::vector<ex> result;
+    for (const ex& expression : expressions) result.push_back(at(expression, variables, occurrences, value));
+    return result;
+}
+
 std::vector<ex> gradient_of(const std::vector<ex>& terms, const Symbols& variables) {
     const Occurrences occurrences(variables);
     std::vector<exvector> parts(variables.size());
@@ -273,17 +287,12 @@ System build_system(const Scene& scene) {
     const std::vector<Dependence::Kind> kinds = dependence.of(looked_at);
 
     // A value that does not depend on what its formula mentions is written without it.
-    GiNaC::exmap origin;
-    for (const auto& symbol : all) origin[symbol] = 0;
     const Occurrences of_motion(all);
-    const auto constant_form = [&](const ex& value) -> ex {
-        if (of_motion.in(value).empty()) return value;
+    const auto constant_form = [&](const ex& value) {
         try {
-            return value.subs(origin, GiNaC::subs_options::no_pattern);
+            return at(value, all, of_motion, 0);
         } catch (const std::exception&) {  // a pole at the origin: one away from it
-            GiNaC::exmap elsewhere;
-            for (const auto& symbol : all) elsewhere[symbol] = GiNaC::numeric(1, 2);
-            return value.subs(elsewhere, GiNaC::subs_options::no_pattern);
+            return at(value, all, of_motion, GiNaC::numeric(1, 2));
         }
     };
     const auto coordinate_of = [&](std::size_t k) { return system.q[k].get_name(); };
@@ -328,13 +337,9 @@ System build_system(const Scene& scene) {
         if (event.value.has(system.t)) system.autonomous = false;  // events are given the time with everything else
     check_mass(scene, system);
 
-    GiNaC::exmap at_rest;
-    for (const auto& velocity : system.v) at_rest[velocity] = 0;
     // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
     if (system.separable) {
-        std::vector<ex> at_zero;
-        for (const ex& momentum : system.momentum)
-            at_zero.push_back(momentum.subs(at_rest, GiNaC::subs_options::no_pattern));
+        const std::vector<ex> at_zero = all_at(system.momentum, system.v, 0);
         const std::vector<Dependence::Kind> rest = dependence.of(at_zero);
         for (std::size_t k = 0; k < rest.size(); ++k)
             if (!rest[k].zero && system.separable)
@@ -342,7 +347,7 @@ System build_system(const Scene& scene) {
     }
     if (!system.separable) return system;
     system.mass = system.momentum_v;
-    system.potential = -system.lagrangian.subs(at_rest, GiNaC::subs_options::no_pattern);
+    system.potential = -sum_of(all_at(system.terms, system.v, 0));
     system.hessian = SparseMatrix(system.n, system.n);
     for (const ex& force : system.force) system.gradient.push_back(-force);
     for (const auto& [place, value] : system.force_q.entries()) system.hessian.put(place.first, place.second, -value);

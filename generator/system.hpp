@@ -54,5 +54,8 @@ std::vector<GiNaC::ex> gradient_of(const std::vector<GiNaC::ex>& terms, const st
 SparseMatrix derivative_of(const std::vector<GiNaC::ex>& vector, const std::vector<GiNaC::symbol>& variables);
 // An expression as the terms of its sum; factors free of the given symbols are distributed over inner sums.
 std::vector<GiNaC::ex> terms_of(const GiNaC::ex& expression, const std::vector<GiNaC::symbol>& variables);
+// Each expression with all the variables at one value.
+std::vector<GiNaC::ex> all_at(const std::vector<GiNaC::ex>& expressions, const std::vector<GiNaC::symbol>& variables,
+                              const GiNaC::ex& value);
 
 }  // namespace lobatto

@@ -220,6 +220,12 @@ bool CacheEntry::is_valid() const {
     return sealed_key && object && *sealed_key == seal_of(*object) + key_;
 }
 
+bool CacheEntry::is_there() const {
+    std::error_code ignored;
+    return fs::exists(fs::symlink_status(object_path(), ignored)) &&
+           fs::exists(fs::symlink_status(stem_ + ".key", ignored));
+}
+
 void CacheEntry::publish(const std::string& file) const {
     const std::string built = building_path() + "/" + file;
     ::chmod(built.c_str(), 0700);  // whatever the umask was

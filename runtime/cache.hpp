@@ -31,6 +31,9 @@ public:
     // it.
     bool is_valid() const;
 
+    // Whether object and key are there at all. Under the lock, an entry that is there and not valid was altered.
+    bool is_there() const;
+
     // Puts the object, built as `file` in the building folder, into place.
     void publish(const std::string& file) const;
 

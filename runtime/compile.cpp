@@ -61,6 +61,7 @@ Compiled compile(const Translation& translation) {
 
     const CacheEntry::Lock lock(entry);
     if (entry.is_valid()) return {entry.object_path(), command, true, 0};  // built by another while we waited
+    const bool was_altered = entry.is_there();
 
     request.folder = entry.building_path();
     request.environment = {{"TMPDIR", request.folder}};  // what a killed compiler leaves is removed with the folder
@@ -88,7 +89,7 @@ Compiled compile(const Translation& translation) {
                                        first_lines(result.output), kept));
     }
     entry.publish(object);
-    return {entry.object_path(), command, false, elapsed.count()};
+    return {entry.object_path(), command, false, elapsed.count(), was_altered};
 }
 
 }  // namespace lobatto

@@ -20,6 +20,7 @@ struct Compiled {
     std::string command;  // the command that made it
     bool from_cache = false;
     double seconds = 0;  // spent compiling; 0 on a hit
+    bool was_altered = false;  // an object in the cache was not as it had been built, or others could write to it
 };
 
 // Compiles, or finds in the cache. Safe with any number of processes and threads at once. Throws MachineError with the

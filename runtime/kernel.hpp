@@ -10,6 +10,7 @@
 #include "kernel_galerkin.hpp"
 #include "kernel_general.hpp"
 #include "kernel_linear.hpp"
+#include "kernel_neighbours.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_pack.hpp"
 #include "kernel_separable.hpp"

@@ -13,8 +13,9 @@
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
 //   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of kernel_separable.hpp are the
 //   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of kernel_solve.hpp order the
-//   unknowns, and `absorbed` says that quadratic_part(k, S0) gives a constant part of S to iterate with.
-//   Gauss's nodes stand between two ends of weight zero.
+//   unknowns, `neighbours` that acceleration can go SideBySide (kernel_neighbours.hpp), and `absorbed` says that
+//   quadratic_part(k, S0) gives a constant part of S to iterate with. Gauss's nodes stand between two ends of weight
+//   zero.
 // Form::general: see kernel_general.hpp.
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
@@ -134,6 +135,19 @@ struct Motion {
 // that fails leaves the state of the last good one.
 template <class K, Form form = K::form>
 struct Stepper;
+
+// When to try sweeps: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.
+struct Pause {
+    std::int32_t left{};   // steps
+    std::int32_t next{1};  // how many, the next time that sweeps fail
+
+    bool is_over() { return left == 0 || --left == 0; }  // asked once a step
+    void succeed() { next = 1; }
+    void fail() {
+        left = next;
+        next = next < 64 ? 2 * next : 64;
+    }
+};
 
 // Room for a step's arrays: on the stack while they are few, else in the stepper.
 template <class Arrays>

@@ -33,7 +33,8 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
     }
 }
 
-// How the lanes of each form move by one step: start(q, p, lane), step(k, time, going), and the state of a lane.
+// How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
+// going) moves the lanes that are going, and answers which have moved; momentum(single, lane, p) reads one.
 template <class K, class T, Form form = K::form>
 struct Lanes;
 

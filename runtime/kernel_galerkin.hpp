@@ -83,16 +83,14 @@ struct GalerkinSweeps {
     V ahead[r][parts], node_time[parts];
     real h{};
     real tolerance{};  // of increments, relative; 0: to rounding
-    bool has_history{};
-    T v[n * r];     // velocities at the nodes of the last step
-    T kappa[n];     // of the last step
-    T evaluations;  // of the last step
-    T increment;    // the last one of the last step, relative
+    T v[n * r];        // velocities at the nodes of the last step
+    T kappa[n];        // of the last step
+    T evaluations;     // of the last step
+    T increment;       // the last one of the last step, relative
     Workspace<Arrays> workspace;
 
     void prepare(real step) {
         h = step;
-        has_history = false;
         for (int i = 0; i < parts * width; ++i) {
             const bool is_node = i < r;
             const int node = is_node ? i : r - 1;
@@ -109,7 +107,6 @@ struct GalerkinSweeps {
 
     // Begins with this velocity.
     void begin(const real* velocity, int lane = 0) {
-        has_history = false;
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity[c]);
@@ -132,7 +129,6 @@ struct GalerkinSweeps {
     // The memory of a step taken otherwise.
     template <class Velocity>
     void recall(const Velocity& velocity, int lane = 0) {
-        has_history = true;
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c)
             for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity(c, i));
@@ -201,7 +197,7 @@ private:
         evaluations = T(real(0));
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
             evaluations = select(going, evaluations + T(real(1)), evaluations);
-            const T e = sweep(k, time, q, p, kappa_now, going, a);
+            const T e = sweep(k, time, q, p, kappa_now, a);
             if (evaluation > 4) going = going & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * small));
             // Or no longer shrinking: the rounding of what it is computed from.
             const Going done =
@@ -214,13 +210,12 @@ private:
             if (!any(going)) break;
             e_before = e;
         }
-        if (any(solved)) has_history = true;
         return solved;
     }
 
     // One sweep; the largest change of a velocity, relative.
     template <class Given>
-    LOBATTO_INLINE T sweep(const Given& k, real time, const T* q, const T* p, T* kappa_now, Going going, Arrays& a) {
+    LOBATTO_INLINE T sweep(const Given& k, real time, const T* q, const T* p, T* kappa_now, Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V packed[entries];
@@ -267,7 +262,6 @@ private:
 #pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) a.Q[part * n + c] = sum_of(V(q[c]), position_map, part, flat);
         }
-        (void)going;
         if constexpr (in_lanes)
             return fabs(largest(worst));
         else

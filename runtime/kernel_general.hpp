@@ -135,8 +135,7 @@ struct Stepper<K, Form::general> : Motion<K> {
     static constexpr bool is_swept = K::any_number && !K::linear && N > 0 && n <= most_full;
     struct Swept {
         GalerkinSweeps<K, real> sweeps;
-        std::int32_t pause{};   // steps that are left to Newton's iteration
-        std::int32_t pauses{};  // how many, the next time that sweeps fail
+        Pause pause;
     };
 
     real p[n]{};                // momentum
@@ -374,16 +373,16 @@ private:
 
     template <class AnySwept>
     void begin_sweeps(AnySwept& any, const real* v) {
-        any.pause = 0;
-        any.pauses = 1;
+        any.pause = Pause();
         any.sweeps.begin(v);
     }
 
     // A step by sweeps; where they fail, all is made ready for Newton's iteration.
     template <class AnySwept>
     bool sweep(AnySwept& any) {
-        if (any.pause > 0 && --any.pause == 0) any.sweeps.recall([this](int c, int i) { return node_velocity(c, i); });
-        if (any.pause > 0) return false;
+        const bool paused = any.pause.left > 0;
+        if (!any.pause.is_over()) return false;
+        if (paused) any.sweeps.recall([this](int c, int i) { return node_velocity(c, i); });
         real q1[n], p1[n];
         for (int k = 0; k < n; ++k) {
             q1[k] = q[k];
@@ -398,15 +397,14 @@ private:
             }
             iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
             increment = any.sweeps.increment;
-            any.pauses = 1;
+            any.pause.succeed();
             is_current = false;
             has_history = true;
             ++this->steps;
             return true;
         }
         refresh();
-        any.pause = any.pauses;
-        any.pauses = any.pauses < 64 ? 2 * any.pauses : 64;
+        any.pause.fail();
         return false;
     }
 

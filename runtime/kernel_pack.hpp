@@ -13,6 +13,7 @@
 #include "kernel_numbers.hpp"
 
 #define LOBATTO_INLINE [[gnu::always_inline]] inline
+#define LOBATTO_FORMULA __attribute__((always_inline))             // behind the parameters of a function object
 #define LOBATTO_EACH(i) [&](int i) __attribute__((always_inline))  // a function of the number of a register
 
 namespace lobatto {
@@ -30,9 +31,9 @@ constexpr int register_bytes = 16;
 template <class real>
 constexpr int native_lanes = 1;
 template <>
-constexpr int native_lanes<float> = register_bytes / 4;
+inline constexpr int native_lanes<float> = register_bytes / 4;
 template <>
-constexpr int native_lanes<double> = register_bytes / 8;
+inline constexpr int native_lanes<double> = register_bytes / 8;
 
 // One register, or a part of one: a compiler's vector. A comparison of two gives integers of the same size, -1 where it
 // holds and 0 elsewhere. One lane is the plain number, and its comparison a bool.
@@ -567,6 +568,52 @@ struct RealOf<Pack<real, width>> {
 };
 template <class T>
 using real_of = typename RealOf<T>::type;
+
+// The last `places` lanes of `before` and then the first of `values`: a step of `places` to the right. One register.
+template <int places, class real, int width, int... lanes>
+LOBATTO_INLINE Pack<real, width> moved_on(const Pack<real, width>& before, const Pack<real, width>& values,
+                                          std::integer_sequence<int, lanes...>) {
+    Pack<real, width> result;
+#if __has_builtin(__builtin_shufflevector)
+    result.part[0] = __builtin_shufflevector(before.part[0], values.part[0], (width - places + lanes)...);
+#else
+    ((result.part[0][lanes] = lanes < places ? before.part[0][(width - places + lanes) % width]
+                                             : values.part[0][(lanes - places + width) % width]),
+     ...);
+#endif
+    return result;
+}
+template <int places, class real, int width>
+LOBATTO_INLINE Pack<real, width> moved_on(const Pack<real, width>& before, const Pack<real, width>& values) {
+    static_assert(places >= 0 && places <= width && Pack<real, width>::count == 1);
+    if constexpr (places == 0)
+        return values;
+    else if constexpr (places == width)
+        return before;
+    else
+        return moved_on<places>(before, values, std::make_integer_sequence<int, width>());
+}
+
+// x in one lane; zero in the others.
+template <int lane, int width, class real>
+LOBATTO_INLINE Pack<real, width> only_lane(real x) {
+    Pack<real, width> result = Pack<real, width>(real(0));
+    result.set(lane, x);
+    return result;
+}
+
+// The first `count` lanes; zero in the others.
+template <class real, int width, int... lanes>
+LOBATTO_INLINE Pack<real, width> first_lanes(const Pack<real, width>& values, int count,
+                                             std::integer_sequence<int, lanes...>) {
+    const real numbers[width] = {real(lanes)...};
+    return select(Pack<real, width>::load(numbers) < Pack<real, width>(real(count)), values,
+                  Pack<real, width>(real(0)));
+}
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> first_lanes(const Pack<real, width>& values, int count) {
+    return first_lanes(values, count, std::make_integer_sequence<int, width>());
+}
 
 }  // namespace lobatto
 

@@ -11,6 +11,7 @@
 
 #include "kernel_contract.hpp"
 #include "kernel_linear.hpp"
+#include "kernel_neighbours.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_solve.hpp"
 #include "kernel_sweeps.hpp"
@@ -183,6 +184,15 @@ struct FrozenJacobian {
     bool usable;
 };
 
+// Whether sweeps have neighbouring coordinates in lanes, not nodes.
+template <class K>
+constexpr bool along_coordinates() {
+    if constexpr (K::any_number && !K::linear)
+        return K::neighbours;
+    else
+        return false;
+}
+
 template <class K>
 struct Stepper<K, Form::separable> : Motion<K> {
     using typename Motion<K>::real;
@@ -203,6 +213,7 @@ struct Stepper<K, Form::separable> : Motion<K> {
     }
     static constexpr bool is_frozen = N > 0 && !K::unrolled && (K::linear || absorbs());
     static constexpr bool is_swept = N > 0 && K::any_number && !K::linear;
+    static constexpr bool along_coordinates = lobatto::along_coordinates<K>();
 
     struct Nothing {};
     struct Arrays {
@@ -212,9 +223,8 @@ struct Stepper<K, Form::separable> : Motion<K> {
     };
 
     struct Swept {
-        Sweeps<K, real> sweeps;
-        std::int32_t pause{};   // steps that are left to Newton's iteration
-        std::int32_t pauses{};  // how many, the next time that sweeps fail
+        std::conditional_t<along_coordinates, NeighbourSweeps<K>, Sweeps<K, real>> sweeps;
+        Pause pause;
     };
 
     real u[n]{};                        // M^-1 p
@@ -339,7 +349,7 @@ struct Stepper<K, Form::separable> : Motion<K> {
     // W at node i of the last step; node s - 1 is where the motion is now.
     real node_acceleration(int i, int k) const {
         if constexpr (is_swept) {
-            if (!is_current) return swept.sweeps.w[k * s + i];
+            if (!is_current) return swept.sweeps.acceleration(i, k);
         }
         return W[i * n + k];
     }
@@ -384,50 +394,69 @@ struct Stepper<K, Form::separable> : Motion<K> {
 private:
     template <class AnySwept>
     void begin_sweeps(AnySwept& any) {
-        any.pause = 0;
-        any.pauses = 1;
-        any.sweeps.begin(q, W + (s - 1) * n);
+        any.pause = Pause();
+        if constexpr (along_coordinates)
+            any.sweeps.begin(q, u, W + (s - 1) * n);
+        else
+            any.sweeps.begin(q, W + (s - 1) * n);
     }
 
     // A step by sweeps; where they fail, all is made ready for Newton's iteration.
     template <class AnySwept>
     bool sweep(AnySwept& any) {
-        if (any.pause > 0) {
-            --any.pause;
-            if (any.pause == 0)
-                any.sweeps.recall([this](int i, int k) { return node_acceleration(i, k); },
-                                  [this](int i, int k) { return node_position(i, k); });
+        const bool paused = any.pause.left > 0;
+        if (!any.pause.is_over()) return false;
+        if (paused) {
+            const auto acceleration = [this](int i, int k) { return node_acceleration(i, k); };
+            if constexpr (along_coordinates)
+                any.sweeps.recall(q, u, acceleration);
+            else
+                any.sweeps.recall(acceleration, [this](int i, int k) { return node_position(i, k); });
         }
-        if (any.pause == 0) {
+        any.sweeps.tolerance = this->tolerance;
+        if (sweeps_step(any.sweeps)) {
+            iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
+            increment = any.sweeps.increment;
+            any.pause.succeed();
+            is_current = false;
+            has_history = true;
+            ++this->steps;
+            return true;
+        }
+        if (!is_current)
+            for (int i = 0; i < s; ++i)
+                for (int k = 0; k < n; ++k) W[i * n + k] = any.sweeps.acceleration(i, k);
+        is_current = true;
+        any.pause.fail();
+        return false;
+    }
+
+    // q and u move on where the sweeps succeed, and leave their values in q_before and u_before.
+    template <class AnySweeps>
+    bool sweeps_step(AnySweeps& sweeps) {
+        if constexpr (along_coordinates) {
+            if (!sweeps.step(coefficients, this->time())) return false;
+            for (int k = 0; k < n; ++k) {
+                q_before[k] = q[k];
+                u_before[k] = u[k];
+                q[k] = sweeps.q[sweeps.now][k];
+                u[k] = sweeps.u[sweeps.now][k];
+            }
+        } else {
             real q1[n], u1[n];
             for (int k = 0; k < n; ++k) {
                 q1[k] = q[k];
                 u1[k] = u[k];
             }
-            any.sweeps.tolerance = this->tolerance;
-            if (any.sweeps.step(coefficients, this->time(), q1, u1, true)) {
-                for (int k = 0; k < n; ++k) {
-                    q_before[k] = q[k];
-                    u_before[k] = u[k];
-                    q[k] = q1[k];
-                    u[k] = u1[k];
-                }
-                iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
-                increment = any.sweeps.increment;
-                any.pauses = 1;
-                is_current = false;
-                has_history = true;
-                ++this->steps;
-                return true;
+            if (!sweeps.step(coefficients, this->time(), q1, u1, true)) return false;
+            for (int k = 0; k < n; ++k) {
+                q_before[k] = q[k];
+                u_before[k] = u[k];
+                q[k] = q1[k];
+                u[k] = u1[k];
             }
-            if (!is_current)
-                for (int i = 0; i < s; ++i)
-                    for (int k = 0; k < n; ++k) W[i * n + k] = any.sweeps.w[k * s + i];
-            is_current = true;
-            any.pause = any.pauses;
-            any.pauses = any.pauses < 64 ? 2 * any.pauses : 64;
         }
-        return false;
+        return true;
     }
 
     Status step_in(Arrays& a) {

@@ -148,6 +148,9 @@ struct Sweeps {
             usable.set(lane, good);
     }
 
+    // W at node i of the last step.
+    T acceleration(int i, int c) const { return w[c * s + i]; }
+
     // Begins at q with W(q) = W0.
     void begin(const real* q, const real* W0, int lane = 0) {
         has_history = false;

@@ -92,6 +92,17 @@ LoadedStepper<real>& LoadedStepper<real>::operator=(const LoadedStepper& other) 
 }
 
 template <class real>
+std::string LoadedStepper<real>::memory() const {
+    return {static_cast<const char*>(stepper_), static_cast<std::size_t>(kernel_->stepper_bytes)};
+}
+
+template <class real>
+void LoadedStepper<real>::restore(const std::string& memory) {
+    assert(std::ssize(memory) == kernel_->stepper_bytes);
+    std::memcpy(stepper_, memory.data(), memory.size());
+}
+
+template <class real>
 lobatto_status LoadedStepper<real>::prepare(const std::vector<real>& parameters, real step) {
     assert(std::ssize(parameters) == kernel_->parameters);
     return static_cast<lobatto_status>(kernel_->prepare(stepper_, parameters.data(), &step));

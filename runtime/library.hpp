@@ -80,6 +80,10 @@ public:
     lobatto_status tangent(real time, const std::vector<real>& q, const std::vector<real>& p, std::vector<real>& q1,
                            std::vector<real>& p1, std::vector<real>& T) const;
 
+    // Everything a stepper knows, for a later process with the same object: stepper_bytes bytes, which hold no address.
+    std::string memory() const;
+    void restore(const std::string& memory);  // of a stepper of this size, prepared
+
     const Kernel& kernel() const { return kernel_; }
 
 private:

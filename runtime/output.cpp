@@ -24,30 +24,46 @@ std::string exact_text(double value) {
     return text;
 }
 
-TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header)
-    : file_(path, "the trajectory"), energy_(header.energy), columns_(header.columns.size() - (header.energy ? 1 : 0)) {
-    text_ = fmt::format("# lobatto {}\n# scene: {}\n# method: {}\n# kernel: {}\n",
-                        header.events.empty() ? "trajectory" : "events", header.scene, header.method, header.kernel);
+std::string text_of(const TrajectoryHeader& header) {
+    std::string text =
+        fmt::format("# lobatto {}\n# scene: {}\n# method: {}\n# kernel: {}\n",
+                    header.events.empty() ? "trajectory" : "events", header.scene, header.method, header.kernel);
     const char* separator = "# parameters: ";
     for (const auto& [name, value] : header.parameters) {
-        text_ += fmt::format("{}{} = {}", separator, name, exact_text(value));
+        text += fmt::format("{}{} = {}", separator, name, exact_text(value));
         separator = ", ";
     }
-    if (!header.parameters.empty()) text_ += '\n';
+    if (!header.parameters.empty()) text += '\n';
     for (std::size_t i = 0; i < header.events.size(); ++i)
-        text_ += fmt::format("# event {}: {}\n", i + 1, header.events[i]);
+        text += fmt::format("# event {}: {}\n", i + 1, header.events[i]);
     separator = "# columns: ";
     for (const auto& [name, unit] : header.columns) {
-        text_ += separator + (unit.empty() ? name : fmt::format("{} [{}]", name, unit));
+        text += separator + (unit.empty() ? name : fmt::format("{} [{}]", name, unit));
         separator = ", ";
     }
     separator = "\n";
     for (const auto& [name, unit] : header.columns) {
-        text_ += separator + name;
+        text += separator + name;
         separator = ",";
     }
-    text_ += '\n';
-    flush();
+    return text + '\n';
+}
+
+TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header, std::int64_t kept)
+    : file_(path, "the trajectory", kept),
+      energy_(header.energy),
+      columns_(header.columns.size() - (header.energy ? 1 : 0)),
+      text_(text_of(header)) {
+    if (kept == 0) {
+        flush();
+    } else {
+        if (file_.read(0, text_.size()) != text_ || file_.read(kept - 1, 1) != "\n")
+            throw MachineError(
+                fmt::format("cannot go on with the trajectory in {}: it is not what the run had written. Run without "
+                            "--resume to begin anew",
+                            path));
+        text_.clear();
+    }
 }
 
 void TrajectoryFile::write(const Records& records) {

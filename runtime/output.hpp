@@ -2,6 +2,7 @@
 // Trajectories as CSV files that round-trip: every number is the shortest text that reads back to the same bits.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,16 +24,23 @@ struct TrajectoryHeader {
     std::vector<std::string> events;  // of a file of events, whose first column counts them from 1: what they are
 };
 
+// The lines before the first row.
+std::string text_of(const TrajectoryHeader& header);
+
 // Rows go into a PartialFile as whole lines, block by block, so that a killed run leaves readable rows.
 class TrajectoryFile {
 public:
-    // All functions throw MachineError, which names the path, when the machine refuses.
-    TrajectoryFile(const std::string& path, const TrajectoryHeader& header);
+    // `kept`: the bytes of an earlier file with this header after which it goes on; 0 for a new one. All functions
+    // throw MachineError, which names the path, when the machine refuses.
+    TrajectoryFile(const std::string& path, const TrajectoryHeader& header, std::int64_t kept = 0);
 
     // Rows may be longer than the file's: the momenta, which come last, are not kept then.
     void write(const Records& records);
     void write(const EventRecords& records);
     void finish() { file_.finish(); }
+    void sync() { file_.sync(); }
+    std::int64_t size() const { return file_.size(); }
+    bool is_regular() const { return file_.is_regular(); }
 
 private:
     void append(const double* row, std::size_t count);

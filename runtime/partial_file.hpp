@@ -2,6 +2,7 @@
 // A file that appears under its name only when it is complete.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -12,26 +13,32 @@ namespace lobatto {
 // regular file (a pipe, a device) is written to directly.
 class PartialFile {
 public:
-    // `what` it holds, for errors: "the trajectory". All functions throw MachineError, which names the path, when the
-    // machine refuses.
-    PartialFile(const std::string& path, const std::string& what);
+    // `what` it holds, for errors: "the trajectory". `kept`: how many bytes of NAME.partial, or else of NAME, stay, to
+    // go on after them. All functions throw MachineError, which names the path, when the machine refuses; what stands
+    // in the file then ends where a `write` ended.
+    PartialFile(const std::string& path, const std::string& what, std::int64_t kept = 0);
     ~PartialFile();  // without `finish`: NAME.partial stays
     PartialFile(const PartialFile&) = delete;
     PartialFile& operator=(const PartialFile&) = delete;
 
     bool is_regular() const { return partial_ != path_; }
+    std::int64_t size() const { return size_; }
+    std::string read(std::int64_t offset, std::size_t count) const;  // shorter where there is less; regular files only
     void write(std::string_view bytes);
+    void sync();                                  // to the disk
     void write_at_begin(std::string_view bytes);  // over what is there; regular files only
     void finish();
 
 private:
     [[noreturn]] void fail(const std::string& path, int error) const;
     int open_locked() const;
+    void keep(std::int64_t kept);
 
     std::string path_;     // the destination
     std::string partial_;  // what is being written; the same as path_ for a pipe or device
     std::string what_;
     int descriptor_ = -1;
+    std::int64_t size_ = 0;
 };
 
 }  // namespace lobatto

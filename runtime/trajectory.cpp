@@ -29,6 +29,8 @@ double processor_seconds() {
 constexpr std::int64_t rows_at_once = 4096;  // the records in memory, however long the run
 constexpr double block_seconds = 0.02;       // of a block of steps: an interruption is noticed within about twice this
 constexpr double progress_seconds = 0.1;
+constexpr double checkpoint_seconds = 0.1;   // between two checkpoints, unless
+constexpr double checkpoint_part = 1.0 / 50;  // of the time would go into them
 
 // Watches the kept states go by: their energies, and the sink.
 class Keeper {
@@ -83,6 +85,29 @@ private:
     std::vector<double> q_, p_, energies_;
 };
 
+// Hands out checkpoints, at the right times.
+class Checkpoints {
+public:
+    explicit Checkpoints(const TrajectoryRequest& request) : request_(request) {}
+
+    void look(const LoadedStepper<double>& stepper, const TrajectoryResult& result) {
+        if (!request_.checkpoint || seconds_since(last_) < pause_) return;
+        const Clock::time_point start = Clock::now();
+        request_.checkpoint({result, stepper.memory()});
+        last_ = Clock::now();
+        pause_ = std::max(checkpoint_seconds, seconds_since(start) / checkpoint_part);
+    }
+    void at_once(const LoadedStepper<double>& stepper, const TrajectoryResult& result) {
+        pause_ = 0;
+        look(stepper, result);
+    }
+
+private:
+    const TrajectoryRequest& request_;
+    Clock::time_point last_ = Clock::now();
+    double pause_ = checkpoint_seconds;
+};
+
 std::string list(const std::vector<double>& values) {
     return fmt::format("({:.6g})", fmt::join(values, ", "));
 }
@@ -100,7 +125,14 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     if (result.status != LOBATTO_OK) return result;
 
     Keeper keeper(stepper, request, result);
-    keeper.keep_last();
+    if (request.from == nullptr) {
+        keeper.keep_last();
+    } else {
+        result = request.from->result;
+        result.interrupted = false;
+        stepper.restore(request.from->stepper);
+    }
+    Checkpoints checkpoints(request);
 
     const std::int64_t rows_of_step = 1 + request.dense;
     const std::int64_t rows = std::clamp<std::int64_t>(request.steps / request.every, 1,
@@ -115,7 +147,10 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
         result.interrupted = request.interrupted != nullptr && *request.interrupted != 0;
-        if (result.interrupted) break;
+        if (result.interrupted) {
+            checkpoints.at_once(stepper, result);
+            break;
+        }
 
         lobatto_advance call{};
         call.tolerance = request.tolerance;
@@ -150,6 +185,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             last_progress = Clock::now();
             request.progress(result.steps_done);
         }
+        if (result.status == LOBATTO_OK) checkpoints.look(stepper, result);
     }
     if (result.steps_done % request.every != 0) keeper.keep_last();
     return result;

@@ -28,21 +28,6 @@ struct EventRecords {
     int columns = 0;  // 2 + 2n
 };
 
-struct TrajectoryRequest {
-    std::vector<double> parameters;  // scene order
-    std::vector<double> q, p;        // n each
-    double time = 0;
-    double step = 0;         // h; may be negative
-    double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
-    std::int64_t steps = 0;  // >= 0
-    std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
-    int dense = 0;           // states between two steps, on the step's polynomial; above 0 needs every = 1
-    std::function<void(const Records&)> sink;         // called for each block, in order
-    std::function<void(const EventRecords&)> events;  // likewise; nothing: events are not sought
-    std::function<void(std::int64_t done)> progress;  // called about ten times a second
-    const volatile int* interrupted = nullptr;        // stop between blocks once it is not zero
-};
-
 struct TrajectoryResult {
     lobatto_status status = LOBATTO_OK;
     bool interrupted = false;
@@ -59,6 +44,32 @@ struct TrajectoryResult {
     double energy_error_largest = 0;  // max over the kept states at steps |H - H(0)|, absolute; H in double, so about
                                       // |H| 2^-53 of it is rounding
     double energy_error_final = 0;    // H - H(0) at the last good state
+};
+
+// Where a run stood between two steps: what it had found, and all that its stepper knew.
+struct Halfway {
+    TrajectoryResult result;
+    std::string stepper;  // LoadedStepper::memory
+};
+
+struct TrajectoryRequest {
+    std::vector<double> parameters;  // scene order
+    std::vector<double> q, p;        // n each
+    double time = 0;
+    double step = 0;         // h; may be negative
+    double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
+    std::int64_t steps = 0;  // >= 0
+    std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
+    int dense = 0;           // states between two steps, on the step's polynomial; above 0 needs every = 1
+    std::function<void(const Records&)> sink;         // called for each block, in order
+    std::function<void(const EventRecords&)> events;  // likewise; nothing: events are not sought
+    std::function<void(std::int64_t done)> progress;  // called about ten times a second
+    const volatile int* interrupted = nullptr;        // stop between blocks once it is not zero
+    // Called about ten times a second, less often where it takes longer than a fiftieth of the time, and when the run
+    // is interrupted; all that came before has gone to the sinks. Going on from there gives the bits of a run that was
+    // never stopped.
+    std::function<void(const Halfway&)> checkpoint;
+    const Halfway* from = nullptr;  // where to go on; of a run with this request and this kernel's object
 };
 
 TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request);

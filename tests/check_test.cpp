@@ -52,6 +52,26 @@ TEST_CASE("a linear system of one coordinate is checked in closed form, forces t
     CHECK(failures(checks) == Claims{});
 }
 
+// Four unknowns, all together too many for closed formulas: in groups of two and two, one and three, four.
+TEST_CASE("the corrections of independent groups are checked, in closed form and left to elimination") {
+    const std::string a = "a = { position = 0.5, velocity = 0.25 }\n", b = "b = { position = 1, velocity = 0 }\n",
+                      c = "c = { position = 0.25, velocity = 0 }\n", d = "d = { position = 0.75, velocity = 0 }\n";
+    for (const Scene& scene :
+         {test::scene_of("a'^2/2 + b'^2 - a^4/4 - cos(b)", a + b, 4),
+          test::scene_of("a'^2/2 + b'^2/2 + c'^2/2 + d'^2/2 - a^4/4 - (b - c)^4 - (c - d)^4", a + b + c + d, 3),
+          test::scene_of("a'^2/2 + b'^2/2 + c'^2/2 + d'^2/2 - (a - b)^4 - (b - c)^4 - (c - d)^4", a + b + c + d, 3)}) {
+        const Derivation derivation = derive(scene);
+        CHECK(derivation.structure.unrolled);
+        Programs programs = optimised(derivation);
+        CHECK(failures(check_programs(derivation, programs)) == Claims{});
+        for (Program& program : programs.programs)
+            if (program.name == "correction")
+                for (Output& output : program.outputs)
+                    if (output.target == "delta[1]") output.value = programs.graph.negate(output.value);
+        CHECK(failures(check_programs(derivation, programs)) == Claims{"emitted Newton correction"});
+    }
+}
+
 TEST_CASE("what expansion cannot show is measured at 60 digits") {
     const Derivation derivation =
         derive(test::scene_of("(x'^2 + y'^2)/2 - sqrt(1 + x^2 + y^2)^3*exp(x*y)",

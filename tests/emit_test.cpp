@@ -175,7 +175,7 @@ TEST_CASE("node computes nothing that depends on parameters and step size only")
     CHECK_FALSE(std::regex_search(node, std::regex(R"(k\.\w+ [*/] k\.\w+)")));
 }
 
-TEST_CASE("names that are C++ keywords compile") {
+TEST_CASE("names that are C++ keywords compile" * doctest::test_suite("slow")) {
     check_compiles({"keywords",
                     "double*new'^2/2 - struct*cos(new) - operator*new^4 - real*new^3/(1 + new^2)",
                     {"new"},
@@ -183,7 +183,7 @@ TEST_CASE("names that are C++ keywords compile") {
                    {3, 4});
 }
 
-TEST_CASE("names of macros compile, and names that differ by an underscore stay apart") {
+TEST_CASE("names of macros compile, and names that differ by an underscore stay apart" * doctest::test_suite("slow")) {
     check_compiles({"NAN",
                     "M_PI*q'^2/2 - INFINITY*q^4 - INT64_MAX*cos(q) - real*q^6 - real_*sin(q)",
                     {"q"},
@@ -198,7 +198,7 @@ TEST_CASE("a derivative that cancels to nothing is no disagreement between passe
         {4});
 }
 
-TEST_CASE("two standalone headers can be included in one program") {
+TEST_CASE("two standalone headers can be included in one program" * doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     EmitOptions options;
     options.standalone_support = kernel_hpp_text;
@@ -215,7 +215,7 @@ TEST_CASE("two standalone headers can be included in one program") {
         "");
 }
 
-TEST_CASE("names that the emitted code uses itself compile") {
+TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suite("slow")) {
     check_compiles({"collide",
                     "q1*t1'^2/2 + k1'^2/2 - V*sin(t1)*cos(t1)*z^2 - inverse_m*m*k1^3*t1^2 - p*k*S*h2_A22*exp(k1) - "
                     "Phi_minus_I*W*delta*k1",
@@ -251,19 +251,20 @@ TEST_CASE("a parameter named as a local of prepare does not take the local's pla
                    {4, 5});
 }
 
-TEST_CASE("scenes at the edge of what there is to emit compile, with every number of points") {
+TEST_CASE("scenes at the edge of what there is to emit compile, with every number of points" *
+          doctest::test_suite("slow")) {
     check_compiles({"no_parameters", "q'^2/2 - q^4/4", {"q"}, {}});
     check_compiles({"free", "m*q'^2/2", {"q"}, {"m"}});
     check_compiles({"constant_force", "m*q'^2/2 - m*g*q", {"q"}, {"m", "g"}});
 }
 
-TEST_CASE("two coordinates with a coupled mass matrix compile, linear and not") {
+TEST_CASE("two coordinates with a coupled mass matrix compile, linear and not" * doctest::test_suite("slow")) {
     check_compiles(coupled);
     check_compiles({"springs", "m*x'^2/2 + x'*y'/3 + y'^2/2 - k*x^2 - x*y", {"x", "y"}, {"m", "k"}}, {2, 4});
     CHECK(body(kernel(coupled).header, "correction").find("lobatto::solve<4, 1>(J, delta)") != std::string::npos);
 }
 
-TEST_CASE("every function a scene may use compiles") {
+TEST_CASE("every function a scene may use compiles" * doctest::test_suite("slow")) {
     check_compiles({"functions_all",
                     "q'^2/2 - sqrt(1 + q^2)*tan(q/4) - exp(q)*log(2 + q^2) - sinh(q)*cosh(q)*tanh(q) - "
                     "asin(q/9)*acos(q/9)*atan(q) - (2 + q)^(a/3)",

@@ -49,7 +49,7 @@ TEST_CASE("three fresh processes emit the bytes of generated/") {
     }
 }
 
-TEST_CASE("g++ and clang++ take the kernels of generated/ without a warning") {
+TEST_CASE("g++ and clang++ take the kernels of generated/ without a warning" * doctest::test_suite("slow")) {
     for (const std::string compiler : {"g++", "clang++"}) {
         // A missing clang++ fails here: `./lobatto test` installs it.
         INFO(compiler);
@@ -66,7 +66,8 @@ TEST_CASE("g++ and clang++ take the kernels of generated/ without a warning") {
     }
 }
 
-TEST_CASE("standalone kernels of every precision compile with nothing else, run, and agree") {
+TEST_CASE("standalone kernels of every precision compile with nothing else, run, and agree" *
+          doctest::test_suite("slow")) {
     // q after ten steps of 0.05 from q = 1, p = 0: what each precision may differ by, in its own epsilon, is below
     // 2e-6.
     struct Case {

@@ -107,6 +107,9 @@ const Kernel& kernel_for(const TestMotion& motion) {
 
 }  // namespace
 
+// What computes here are kernels, which no sanitiser looks into.
+TEST_SUITE_BEGIN("slow");
+
 TEST_CASE("a trajectory in a lane is the trajectory that runs alone") {
     for (const InLanes& in : all) {
         const Kernel& kernel = kernel_for(in.motion);
@@ -333,3 +336,5 @@ TEST_CASE("lanes give the same bits in any width, on every instruction set, from
     else
         compiled("g++", "x86-64-v4");
 }
+
+TEST_SUITE_END();

@@ -1,14 +1,24 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The test program's main, and the notes by which the launcher counts tests even when one of them takes the program
-// down.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+// The test program's main: several files of tests at a time, and the notes by which the launcher counts tests even when
+// one of them takes the program down.
+#define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
 
-#include <cstdlib>
-#include <fstream>
-#include <string>
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "tests/support.hpp"
 
 namespace {
+
+using lobatto::test::EnvironmentVariable;
+
+std::set<std::string> files_asked_for;  // by the last query
 
 // Keeps one line in the file $LOBATTO_TEST_NOTES: tests passed, tests failed, the test that is running (nothing between
 // tests).
@@ -23,8 +33,10 @@ public:
         ++(test.testCaseSuccess ? passed_ : failed_);
         write("");
     }
+    void report_query(const doctest::QueryData& query) override {
+        for (unsigned i = 0; i < query.num_data; ++i) files_asked_for.insert(query.data[i]->m_file.c_str());
+    }
 
-    void report_query(const doctest::QueryData&) override {}
     void test_run_start() override {}
     void test_run_end(const doctest::TestRunStats&) override {}
     void test_case_reenter(const doctest::TestCaseData&) override {}
@@ -45,6 +57,107 @@ private:
     int failed_ = 0;
 };
 
+// One file's tests in a process of their own, their output in `log`.
+struct Worker {
+    std::string file, notes, log;
+};
+
+class Workers {
+public:
+    Workers(int argc, char** argv, int at_once) : argc_(argc), argv_(argv), at_once_(at_once) {}
+
+    int run() {
+        // Files of the same name do not occur. The longest texts first: they tend to run longest.
+        std::vector<std::string> files = asked_for();
+        const auto length = [](const std::string& file) {
+            std::error_code unknown;
+            const auto source = LOBATTO_SOURCE_DIR "/tests" / std::filesystem::path(file).filename();
+            return std::filesystem::file_size(source, unknown);
+        };
+        std::stable_sort(files.begin(), files.end(),
+                         [&](const std::string& a, const std::string& b) { return length(a) > length(b); });
+        for (const std::string& file : files) {
+            if (std::ssize(running_) == at_once_) wait_for_one();
+            start(file);
+        }
+        while (!running_.empty()) wait_for_one();
+        return failed_ > 0;
+    }
+
+private:
+    std::vector<std::string> asked_for() const {
+        std::vector<const char*> arguments(argv_, argv_ + argc_);
+        arguments.push_back("--list-test-cases");
+        doctest::Context query(static_cast<int>(arguments.size()), arguments.data());
+        std::ostringstream nowhere;
+        query.setCout(&nowhere);
+        query.run();
+        return {files_asked_for.begin(), files_asked_for.end()};
+    }
+
+    void start(const std::string& file) {
+        const std::string name = std::filesystem::path(file).stem();
+        const Worker worker{name, folder_ / (name + ".notes"), folder_ / (name + ".log")};
+        const pid_t pid = ::fork();
+        if (pid < 0) throw std::runtime_error("cannot fork");
+        if (pid == 0) {
+            const int log = ::open(worker.log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+            ::dup2(log, 1);
+            ::dup2(log, 2);
+            ::close(log);
+            ::setenv("LOBATTO_TEST_NOTES", worker.notes.c_str(), 1);
+            doctest::Context context(argc_, argv_);
+            context.addFilter("source-file", file.c_str());
+            context.setOption("minimal", true);
+            std::exit(context.run());
+        }
+        running_[pid] = worker;
+    }
+
+    void wait_for_one() {
+        int status = 0;
+        const pid_t pid = ::wait(&status);
+        const Worker worker = running_.at(pid);
+        running_.erase(pid);
+        std::fputs(lobatto::test::read_file(worker.log).c_str(), stdout);
+        int passed = 0, failed = 0;
+        std::string test;
+        std::ifstream notes(worker.notes);
+        notes >> passed >> failed;
+        std::getline(notes >> std::ws, test);
+        const bool crashed = !test.empty() || (status != 0 && failed == 0);
+        if (crashed) {
+            ++failed;
+            std::printf("%s ended with %s %s\n", worker.file.c_str(),
+                        WIFSIGNALED(status) ? ::strsignal(WTERMSIG(status)) : "an exit code",
+                        test.empty() ? "outside any test" : ("inside the test \"" + test + "\"").c_str());
+        }
+        passed_ += passed;
+        failed_ += failed;
+        std::printf("%-28s %3d passed, %d failed\n", worker.file.c_str(), passed, failed);
+        std::fflush(stdout);
+        if (const char* path = std::getenv("LOBATTO_TEST_NOTES"))
+            std::ofstream(path) << passed_ << ' ' << failed_ << " \n";
+    }
+
+    int argc_;
+    char** argv_;
+    std::ptrdiff_t at_once_;
+    lobatto::test::TemporaryFolder folder_;
+    std::map<pid_t, Worker> running_;
+    int passed_ = 0, failed_ = 0;
+};
+
 }  // namespace
 
 DOCTEST_REGISTER_LISTENER("notes", 1, Notes);
+
+// $LOBATTO_TEST_WORKERS: how many files' tests run at a time, each file in a process of its own. Kernels that no test
+// keeps to itself go to one cache that goes away with the run.
+int main(int argc, char** argv) {
+    const lobatto::test::TemporaryFolder cache;
+    const EnvironmentVariable shared("LOBATTO_CACHE_DIR", cache.string());
+    const char* const workers = std::getenv("LOBATTO_TEST_WORKERS");
+    if (workers != nullptr && std::atoi(workers) > 1) return Workers(argc, argv, std::atoi(workers)).run();
+    return doctest::Context(argc, argv).run();
+}

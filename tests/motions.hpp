@@ -94,6 +94,28 @@ inline Motion chain() {
     return chain;
 }
 
+// A driven ring of pendulums in 5 rows of 9: each is coupled to the next, to the one after, and to the next row;
+// lengths, masses and couplings differ. Rows of formulas in runs, runs that end, far and near neighbours.
+inline Motion lattice() {
+    Motion lattice{
+        "time = \"t\"\nlagrangian = \"sum(i = 1 .. n, (1 + i/n)*x[i]'^2/2 + g*(1 + mod(i, 4))*cos(x[i])) - sum(i = 1 "
+        ".. n, "
+        "(k + i/50)*sin((x[i] - x[mod(i, n) + 1])/2)^2) - sum(i = 1 .. n - 2, (x[i] - x[i+2])^4/8) - sum(i = 1 .. n - "
+        "9, "
+        "k*(x[i] - x[i+9])^2/4 + x[i]*x[i+9]^3/30) + a*x[1]*cos(2*t) + a*sum(i = 2 .. n - 1, x[i]*sin(t))\"\n"
+        "[coordinates]\nx = { count = \"n\", position = \"i/40\", velocity = 0 }\n[parameters]\n"
+        "n = { value = 45, constant = true }\ng = 0.5\nk = 1.25\na = 0.2\n",
+        {0.5, 1.25, 0.2},
+        {},
+        {},
+        0.1};
+    for (int i = 1; i <= 45; ++i) {
+        lattice.q.push_back(i % 7 * 0.2 - 0.5);
+        lattice.v.push_back(i % 3 * 0.1);
+    }
+    return lattice;
+}
+
 // `method`: the lines under [method]; `output`: those under [output].
 inline Derivation derivation_of(const Motion& motion, const std::string& method, const std::string& output = "",
                                 bool general = false) {
@@ -104,8 +126,6 @@ inline Derivation derivation_of(const Motion& motion, const std::string& method,
 
 // Without sweeps: each step by Newton's iteration alone.
 inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
-    static const TemporaryFolder folder;
-    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     EmitOptions options;
     options.precision = precision;
     KernelSource source = emit(derivation, options);
@@ -116,8 +136,6 @@ inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
 }
 
 inline Kernel ensemble_kernel_in_own_cache(const Derivation& derivation) {
-    static const TemporaryFolder folder;
-    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     return ensemble_kernel_of(emit(derivation), Precision::double_);
 }
 

@@ -66,7 +66,8 @@ TEST_CASE("the s-point kernel converges at order 2, 4, 6, 8 to the pendulum's el
     }
 }
 
-TEST_CASE("the order is 2, 4, 6, 8 for s = 2 ... 5 with two coordinates and a mass matrix that is not diagonal") {
+TEST_CASE("the order is 2, 4, 6, 8 for s = 2 ... 5 with two coordinates and a mass matrix that is not diagonal" *
+          doctest::test_suite("slow")) {
     for (int points = 2; points <= 5; ++points) {
         const Kernel kernel = quadruple_kernel(test::coupled_scene(points));
         const Convergence convergence = measure_order(kernel, coupled_start, 0.1);
@@ -142,7 +143,8 @@ const std::vector<Motion> motions = {henon_heiles, double_pendulum, relativistic
 
 }  // namespace
 
-TEST_CASE("every form of kernel has its method's order: Lobatto's 2 s - 2, Gauss's 2 s, forces and time included") {
+TEST_CASE("every form of kernel has its method's order: Lobatto's 2 s - 2, Gauss's 2 s, forces and time included" *
+          doctest::test_suite("slow")) {
     check_order(henon_heiles, {Family::lobatto, 8});
     check_order(henon_heiles, {Family::gauss, 3});
     check_order(double_pendulum, {Family::lobatto, 6});

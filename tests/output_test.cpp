@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -159,6 +160,24 @@ TEST_CASE("a full disk, a missing folder and a folder in the way are named") {
               ": No such file or directory. Create its folder first, or choose another place with -o");
     CHECK(error_of(folder.path) ==
           "cannot write the trajectory to " + folder.path + ": Is a directory. Choose another place with -o");
+}
+
+TEST_CASE("a folder that may only be read is named") {
+    const Folder folder;
+    ::chmod(folder.path.c_str(), 0555);
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+        if (::geteuid() == 0 && ::seteuid(65534) != 0) ::_exit(2);  // root may write everywhere
+        ::_exit(error_of(folder / "a.csv") == "cannot write the trajectory to " + folder / "a.csv.partial" +
+                                                  ": Permission denied. Choose another place with -o"
+                    ? 0
+                    : 1);
+    }
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    ::chmod(folder.path.c_str(), 0755);
+    CHECK(status == 0);
+    CHECK(std::filesystem::is_empty(folder.path));
 }
 
 TEST_CASE("a file without momenta and energy keeps the beginning of each row") {

@@ -22,13 +22,6 @@ std::vector<Finding> all_findings() {
     return findings;
 }
 
-template <class Work>
-auto in_own_cache(Work work) {
-    static const test::TemporaryFolder folder;
-    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
-    return work();
-}
-
 // The formula with one number or sign changed; digits inside names are left alone.
 std::vector<std::string> planted_errors(const std::string& text) {
     std::vector<std::string> wrong;
@@ -150,7 +143,8 @@ TEST_CASE("the corrected formulas are these") {
     CHECK(corrected[5] == "det = 1 + h²/(60·m)·(V″_ξ+V″_{1−ξ}) + h⁴/(1800·m²)·V″_ξ·V″_{1−ξ}");
 }
 
-TEST_CASE("every number and every sign of every printed formula matters: one changed is caught") {
+TEST_CASE("every number and every sign of every printed formula matters: one changed is caught" *
+          doctest::test_suite("slow")) {
     int planted = 0;
     for (const Statement& statement : statements()) {
         for (const Part& part : statement.parts) {
@@ -203,7 +197,7 @@ TEST_CASE("formulas are spelt with Greek letters, indices and powers") {
 }
 
 TEST_CASE("Tables 1 and 2 are reproduced within 1 % down to 1e-12") {
-    for (const PaperTable& table : {in_own_cache(table_1), in_own_cache(table_2)}) {
+    for (const PaperTable& table : {table_1(), table_2()}) {
         CHECK(table.reproduced());
         for (const TableRow& row : table.rows) {
             CAPTURE(row.quantity);
@@ -220,7 +214,7 @@ TEST_CASE("Tables 1 and 2 are reproduced within 1 % down to 1e-12") {
 }
 
 TEST_CASE("a table with a wrong figure is not reproduced") {
-    PaperTable table = in_own_cache(table_2);
+    PaperTable table = table_2();
     table.rows[1].printed[1] *= 1.011;
     CHECK_FALSE(table.reproduced());
 }
@@ -237,7 +231,7 @@ TEST_CASE("the derived midpoint rule preserves the oscillator's energy") {
 
 TEST_CASE("the figures are drawn, and figure 2 reproduces the caption's growth rate 2.50e-11") {
     const test::TemporaryFolder folder;
-    const std::vector<Figure> figures = in_own_cache([&] { return draw_figures(folder.string()); });
+    const std::vector<Figure> figures = draw_figures(folder.string());
     REQUIRE(figures.size() == 4);
     for (const Figure& figure : figures) {
         CHECK(test::read_file(folder / (figure.name + ".svg")).ends_with("</svg>\n\n"));

@@ -78,6 +78,9 @@ void check_energy_of_splitting(double h, double bound) {
 
 }  // namespace
 
+// Numbers in, numbers out: a sanitiser only makes it slow.
+TEST_SUITE_BEGIN("slow");
+
 TEST_CASE("numbers of papers keep 33 digits") {
     CHECK(exact("-12.5e-1") == Quad(-1.25));
     CHECK(exact("7/2400") == Quad(7) / 2400);
@@ -190,3 +193,5 @@ TEST_CASE("the computed ends of the race's problems agree with those of another 
         }
     }
 }
+
+TEST_SUITE_END();

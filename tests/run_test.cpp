@@ -21,14 +21,8 @@ namespace {
 const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
 const std::string oscillator = LOBATTO_SOURCE_DIR "/scenes/harmonic_oscillator.toml";
 
-// A folder for trajectories; the kernels of all tests share one cache.
+// A folder for trajectories.
 struct Place {
-    static const std::string& cache() {
-        static const test::TemporaryFolder folder;
-        static const std::string path = folder.string();
-        return path;
-    }
-    test::EnvironmentVariable variable{"LOBATTO_CACHE_DIR", cache()};
     test::TemporaryFolder folder;
     std::string file(const std::string& name = "run.csv") const { return folder / name; }
 

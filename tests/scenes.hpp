@@ -31,8 +31,6 @@ inline Scene coupled_scene(int points) {
 }
 
 inline Kernel kernel_in_own_cache(const Derivation& derivation, Precision precision) {
-    static const TemporaryFolder folder;
-    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     EmitOptions options;
     options.precision = precision;
     return kernel_of(emit(derivation, options), precision);

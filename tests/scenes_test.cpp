@@ -50,8 +50,7 @@ double distance(const std::vector<double>& state, const std::vector<double>& ref
 class Trajectory {
 public:
     explicit Trajectory(const std::string& scene, const std::vector<std::string>& options = {}) {
-        static const test::TemporaryFolder folder;  // of the trajectories and compiled kernels of this file
-        const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "kernels").string());
+        static const test::TemporaryFolder folder;
         const std::string file = folder / (scene + ".csv");
         std::vector<std::string> arguments = {LOBATTO_PROGRAM, "run", scene_file(scene), "--quiet", "-o", file};
         arguments.insert(arguments.end(), options.begin(), options.end());

@@ -24,14 +24,8 @@ namespace {
 const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
 const std::string coupled = LOBATTO_SOURCE_DIR "/scenes/henon_heiles.toml";
 
-// A folder for tables; the kernels of all tests share one cache.
+// A folder for tables.
 struct Place {
-    static const std::string& cache() {
-        static const test::TemporaryFolder folder;
-        static const std::string path = folder.string();
-        return path;
-    }
-    test::EnvironmentVariable variable{"LOBATTO_CACHE_DIR", cache()};
     test::TemporaryFolder folder;
     std::string file(const std::string& name = "sweep.csv") const { return folder / name; }
 

@@ -19,12 +19,6 @@ using namespace lobatto;
 
 namespace {
 
-Kernel kernel_in_own_cache(const KernelSource& source, Precision precision) {
-    static const test::TemporaryFolder folder;
-    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
-    return kernel_of(source, precision);
-}
-
 const Kernel& pendulum() {
     static const Kernel kernel = [] {
         KernelSource source;
@@ -32,7 +26,7 @@ const Kernel& pendulum() {
         source.digest = "0123456789abcdef";
         source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
                         "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
-        return kernel_in_own_cache(source, Precision::double_);
+        return kernel_of(source, Precision::double_);
     }();
     return kernel;
 }
@@ -49,7 +43,7 @@ const Kernel& eventful_pendulum() {
             "    static constexpr int events = 2;\n    static constexpr int event_direction[2] = {1, 0};\n"
             "    static void event(const Coefficients&, const real* q, const real* velocity, real* value) {\n"
             "        value[0] = q[0];\n        value[1] = velocity[0];\n    }\n};\n}\n";
-        return kernel_in_own_cache(source, Precision::double_);
+        return kernel_of(source, Precision::double_);
     }();
     return kernel;
 }
@@ -323,7 +317,7 @@ TEST_CASE("the symplectic defect shrinks with the precision") {
     const auto defect_in = [&]<class real>(real, Precision precision) {
         EmitOptions options;
         options.precision = precision;
-        LoadedStepper<real> stepper(kernel_in_own_cache(emit(derivation, options), precision));
+        LoadedStepper<real> stepper(kernel_of(emit(derivation, options), precision));
         REQUIRE(stepper.prepare({}, real(0.3)) == LOBATTO_OK);
         return static_cast<double>(symplectic_defect<real>(stepper, {real(0.7), real(-0.4)}, {real(0.2), real(1.1)}));
     };
@@ -341,7 +335,7 @@ TEST_CASE("the symplectic defect shrinks with the precision") {
 
 TEST_CASE("a linear system conserves its discrete energy about its fixed point") {
     const Derivation derivation = derive(coupled("x^2 + x*y + y^2 - 3*x"));
-    LoadedStepper<double> stepper(kernel_in_own_cache(emit(derivation), Precision::double_));
+    LoadedStepper<double> stepper(kernel_of(emit(derivation), Precision::double_));
     REQUIRE(stepper.prepare({}, 0.5) == LOBATTO_OK);
     const std::optional<DiscreteEnergy> energy = discrete_energy(stepper);
     REQUIRE(energy);

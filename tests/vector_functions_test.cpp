@@ -253,30 +253,30 @@ void check_errors(const std::string& output) {
 
 }  // namespace
 
+// What is tested are programs of other compilers, so that the sanitisers would see nothing of it.
+TEST_SUITE_BEGIN("slow");
+
 TEST_CASE("vector functions without FMA keep their accuracy, at every width the same bits") {
-    check_errors(output_of("g++", "x86-64", {"-O2"}));
+    check_errors(output_of("g++", "x86-64", {"-O1"}));
 }
 
-TEST_CASE("vector functions of this machine keep their accuracy, at every width the same bits") {
-    check_errors(output_of("g++", "native", {"-O3", "-DEVERY_WIDTH"}));
-}
-
-TEST_CASE("vector functions have the same bits from g++ and clang++, and optimised less") {
-    const std::string one = output_of("g++", "native", {"-O1"});
-    if (exists("clang++")) CHECK(output_of("clang++", "native", {"-O2"}) == one);
+// As kernels are compiled, and optimised less.
+TEST_CASE(
+    "vector functions of this machine keep their accuracy, with the same bits at every width, from g++ and clang++") {
+    const std::string one = output_of("g++", "native", {"-O2", "-fpeel-loops"});
+    check_errors(one);
+    CHECK(output_of("g++", "native", {"-O1", "-DEVERY_WIDTH"}) == one);
+    if (exists("clang++")) CHECK(output_of("clang++", "native", {"-O1"}) == one);
 }
 
 TEST_CASE("vector functions compile for AVX2 and AVX-512, and there have the same bits") {
     __builtin_cpu_init();
+    const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     const bool avx512 = __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
-    std::string before;
-    for (const std::string target : {"haswell", "skylake-avx512"}) {
-        const bool runs =
-            target == "haswell" ? __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") : avx512;
-        const std::string output = output_of("g++", target, {"-O1"}, runs);
-        if (!runs) continue;
-        check_errors(output);
-        CHECK((before.empty() || before == output));
-        before = output;
-    }
+    const std::string narrow = output_of("g++", "haswell", {"-O1"}, avx2);
+    const std::string wide = output_of("g++", "skylake-avx512", {"-O1"}, avx512);
+    if (avx2) check_errors(narrow);
+    if (avx512) CHECK(wide == narrow);
 }
+
+TEST_SUITE_END();

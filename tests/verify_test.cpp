@@ -9,8 +9,6 @@ using namespace lobatto::test;
 namespace {
 
 Finished verify(const std::vector<std::string>& arguments) {
-    static const TemporaryFolder cache;
-    const EnvironmentVariable folder("LOBATTO_CACHE_DIR", cache.string());
     std::vector<std::string> command{LOBATTO_PROGRAM, "verify"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     return run(command);

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto tradeoff: what accuracy costs on a scene, measured over the family.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "cli/budget_option.hpp"
+#include "cli/commands.hpp"
+#include "cli/interruption.hpp"
+#include "cli/output_path.hpp"
+#include "cli/overrides.hpp"
+#include "cli/tradeoff/page.hpp"
+#include "cli/tradeoff/pictures.hpp"
+#include "cli/tradeoff/report.hpp"
+#include "cli/tradeoff/say.hpp"
+#include "cli/tradeoff/search.hpp"
+#include "runtime/cache.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct TradeoffOptions {
+    std::string scene;
+    std::string output;  // a folder; empty: out/NAME.tradeoff
+    BudgetOption budget;
+    Overrides overrides;
+};
+
+void make_folder(const std::string& folder) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error)
+        throw MachineError(fmt::format("cannot create the folder {}: {}. Choose another place with -o", folder, error.message()));
+}
+
+void tradeoff(const TradeoffOptions& options) {
+    const double seconds = options.budget.seconds();
+    const Scene written = read_scene(options.scene);
+    Scene scene = written;
+    apply(options.overrides, scene);
+    end_of(scene);
+    const std::string folder = output_path(options.output, scene.name + ".tradeoff");
+    make_folder(folder);
+
+    const Interruption interruption;
+    Say say;
+    LaboratoryRequest request;
+    request.seconds = seconds;
+    request.notebook = folder + "/measurements.jsonl";
+    request.first = first_of_tour();
+    request.interrupted = interruption.flag();
+    request.say = [&](const std::string& what) { say(what); };
+    bool interrupted = false;
+    Laboratory laboratory(derive(written), scene, request);
+    try {
+        explore(laboratory);
+    } catch (const Interrupted&) {
+        interrupted = true;
+    }
+    say.clear();
+    if (laboratory.notebook().all().empty())
+        throw ComputationError(fmt::format(
+            "{}: nothing could be measured within {:.3g} s; give more time with --budget", scene.path, seconds));
+    fmt::print("{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, laboratory.notebook().all().size(),
+               laboratory.notebook().found() > 0
+                   ? fmt::format(" ({} of an earlier run)", laboratory.notebook().found())
+                   : "",
+               laboratory.until(), laboratory.elapsed(), reference_text(laboratory), front_table(laboratory));
+    write_file(folder + "/tradeoff.csv", csv_of(laboratory));
+    const std::string json = json_of(laboratory);
+    write_file(folder + "/tradeoff.json", json);
+    if (!interrupted) {
+        const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
+        write_file(folder + "/report.html", report_page(laboratory, folder, pictures, json));
+        fmt::print("\n{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
+                   fmt::join(pictures, ".svg, "));
+    } else {
+        fmt::print(stderr, "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+}
+
+}  // namespace
+
+void add_tradeoff(CLI::App& program) {
+    CLI::App* command =
+        program.add_subcommand("tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
+    const auto options = std::make_shared<TradeoffOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command->add_option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");
+    options->budget.add_to(*command);
+    command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
+    command
+        ->add_option("--set", options->overrides.set,
+                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
+        ->allow_extra_args(false);
+    command->footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
+    command->callback([options] { tradeoff(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/tradeoff/notebook.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/tradeoff/measurement_json.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+Notebook::Notebook(const std::string& path, const std::string& subject) : path_(path) {
+    std::string kept;
+    {
+        std::ifstream file(path);
+        std::string line;
+        if (std::getline(file, line) && line == "# " + subject) {
+            while (std::getline(file, line) && !file.eof()) {  // the last line ends with a line's end, or is torn
+                try {
+                    const Measurement measurement = measurement_of(nlohmann::json::parse(line));
+                    measurements_[measurement.candidate.key()] = measurement;
+                    kept += line + '\n';
+                } catch (const nlohmann::json::exception&) {
+                    break;
+                }
+            }
+        }
+    }
+    found_ = measurements_.size();
+    file_.open(path, std::ios::trunc);
+    file_ << "# " << subject << '\n' << kept << std::flush;
+    if (!file_) throw MachineError(fmt::format("cannot write {}; choose another folder with -o", path));
+}
+
+const Measurement* Notebook::find(const Candidate& candidate) const {
+    const auto place = measurements_.find(candidate.key());
+    return place == measurements_.end() ? nullptr : &place->second;
+}
+
+const Measurement& Notebook::add(const Measurement& measurement) {
+    if (file_.is_open()) {
+        file_ << json_of(measurement).dump() << '\n' << std::flush;
+        if (!file_) throw MachineError(fmt::format("cannot write {}; is the disk full?", path_));
+    }
+    return measurements_[measurement.candidate.key()] = measurement;
+}
+
+}  // namespace lobatto

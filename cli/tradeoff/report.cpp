@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/tradeoff/report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/tradeoff/measurement_json.hpp"
+#include "cli/tradeoff/search.hpp"
+#include "runtime/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr double trusted = Laboratory::trusted;
+
+std::string tolerance_text(double tolerance) {
+    return tolerance > 0 ? fmt::format("{:.0e}", tolerance) : "rounding";
+}
+
+std::string time_a_unit(double seconds, double until) {
+    return fmt::format("{:.3g}", seconds / until * 1e9);
+}
+
+}  // namespace
+
+std::string reference_text(const Laboratory& laboratory) {
+    const Reference& reference = laboratory.reference();
+    std::string text = fmt::format("reference: {}; {} differs from it by {:.1e} at most", reference.first,
+                                   reference.second, reference.disagreement.back());
+    if (laboratory.is_chaotic())
+        text += fmt::format(
+            "\nThe two disagree: beyond t = {:.4g} nobody knows this motion to {:.0e}. It is chaotic, and errors of states mean "
+            "nothing there; look at energy, momenta, and how long a method follows the true motion.",
+            reference.trusted_until(trusted), trusted);
+    return text;
+}
+
+std::vector<Measurement> front_rows_of(const Laboratory& laboratory) {
+    std::vector<Measurement> rows;
+    double next = 0.3;  // errors above this are of no use
+    for (const Measurement& m : pareto_front(laboratory)) {
+        if (laboratory.figure(m) > next) continue;
+        rows.push_back(m);
+        next = laboratory.figure(m) / std::sqrt(10);
+    }
+    return rows;
+}
+
+std::string front_table(const Laboratory& laboratory) {
+    const double until = laboratory.until();
+    std::string text = fmt::format("  {:>9}  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}  {:>9}\n", "error", "ns a unit",
+                                   "method", "step", "precision", "iterate", "gradients", "energy");
+    for (const Measurement& m : front_rows_of(laboratory))
+        text += fmt::format("  {:>9.1e}  {:>9}  {:<10}  {:>10.4g}  {:<11}  {:>8}  {:>9.3g}  {:>9}\n", m.error,
+                            time_a_unit(m.seconds, until), m.candidate.name(),
+                            until / static_cast<double>(m.candidate.steps), precision_name(m.candidate.member.precision),
+                            tolerance_text(m.candidate.tolerance), m.gradients / until,
+                            std::isfinite(m.energy_error) ? fmt::format("{:.1e}", m.energy_error) : "");
+    return text;
+}
+
+std::string csv_of(const Laboratory& laboratory) {
+    std::string text = csv_header();
+    for (const auto& [key, m] : laboratory.notebook().all()) text += csv_row(m, laboratory.until());
+    return text;
+}
+
+std::string json_of(const Laboratory& laboratory) {
+    const Reference& reference = laboratory.reference();
+    nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
+    for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(json_of(m));
+    for (const Measurement& m : pareto_front(laboratory)) front.push_back(json_of(m));
+    const nlohmann::ordered_json json = {
+        {"scene", laboratory.scene().name},
+        {"title", laboratory.scene().title},
+        {"until", laboratory.until()},
+        {"reference",
+         {{"method", reference.first},
+          {"check", reference.second},
+          {"disagreement", reference.disagreement.back()},
+          {"trusted_until", reference.trusted_until(trusted)},
+          {"samples", reference.samples},
+          {"frequency", reference.frequency}}},
+        {"chaotic", laboratory.is_chaotic()},
+        {"front", front},
+        {"measurements", measurements}};
+    return json.dump(1) + '\n';
+}
+
+}  // namespace lobatto

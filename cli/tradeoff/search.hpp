@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What can win is found with few measurements: orders are known, so a few runs tell what the others would give.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "cli/tradeoff/laboratory.hpp"
+
+namespace lobatto {
+
+// No other is both faster and more accurate; from coarse to fine.
+std::vector<Measurement> pareto_front(const Laboratory& laboratory);
+
+// One member's coarsest steps that meet a goal.
+struct Crossing {
+    std::optional<Measurement> measurement;  // nothing: it does not reach the goal
+    double least_error = 0;                  // what it does reach
+};
+// Runs to stagnation, with a handful of steps: from the error of one the next is told by the order.
+Crossing cross(Laboratory& laboratory, const Member& member, double goal);
+
+// The fastest way to the goal with this member: around the crossing, with iterations that stop earlier or steps that
+// are shorter but need fewer sweeps.
+Measurement polish(Laboratory& laboratory, const Measurement& crossing, double goal);
+
+// The fastest of the whole family for an error at most `goal`, as far as the time goes.
+struct Search {
+    std::optional<Measurement> best;  // nothing: no member that was tried reaches the goal
+    double least_error = 0;           // of all that was tried
+    int members = 0;                  // tried
+    bool complete = false;            // no member that was not tried can be expected to win
+    std::vector<Measurement> by_member;
+};
+Search search(Laboratory& laboratory, double goal);
+// The kernels to begin with.
+std::vector<Member> first_guess(double goal, std::size_t count);
+
+// The family from coarse to fine, for the trade of speed for accuracy; returns when time is up or all has been seen.
+void explore(Laboratory& laboratory);
+std::vector<Member> first_of_tour();  // the kernels it begins with
+
+}  // namespace lobatto

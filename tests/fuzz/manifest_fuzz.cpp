@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Fuzz target: whatever bytes a checkpoint or a trajectory has, sealed well, it is read or refused with a MachineError.
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+
+#include "runtime/checkpoint.hpp"
+#include "runtime/error.hpp"
+#include "runtime/output.hpp"
+#include "runtime/sha256.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    static const std::string path = "/dev/shm/lobatto-fuzz-" + std::to_string(::getpid());
+    const std::string bytes(reinterpret_cast<const char*>(data), size);
+    const auto write = [](const std::string& content) {
+        std::remove(path.c_str());
+        std::ofstream(path, std::ios::binary) << content;
+    };
+    try {
+        write(lobatto::sha256(bytes) + '\n' + bytes);
+        lobatto::read_checkpoint(path);
+    } catch (const lobatto::MachineError&) {
+    }
+    try {
+        write(bytes);
+        lobatto::read_trajectory(path);
+    } catch (const lobatto::MachineError&) {
+    }
+    std::remove(path.c_str());
+    return 0;
+}
