@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -62,12 +61,10 @@ std::string intervals_text(const Stability& member) {
 }
 
 std::string phase_text(const Stability& member) {
-    const GiNaC::numeric& error = member.phase_error;
-    return fmt::format("  a step turns by h*omega*(1 {} (h*omega)^{}{} + ...), so the motion runs {}\n",
-                       error.is_positive() ? "+" : "-", member.phase_order,
-                       (error.numer() * error.numer()).is_equal(1) ? "/" + canonical_text(error.denom())
-                                                                   : fmt::format("*{}", canonical_text(abs(error))),
-                       error.is_positive() ? "ahead" : "late");
+    const GiNaC::numeric& error = member.phase_error;  // one over an integer
+    const bool ahead = error.is_positive();
+    return fmt::format("  a step turns by h*omega*(1 {} (h*omega)^{}/{} + ...), so the motion runs {}\n",
+                       ahead ? "+" : "-", member.phase_order, canonical_text(error.denom()), ahead ? "ahead" : "late");
 }
 
 std::string signs_text(const std::vector<int>& signs) {
@@ -77,14 +74,12 @@ std::string signs_text(const std::vector<int>& signs) {
 }
 
 std::string proof_text(const ProofOfStability& proof) {
-    const RationalPolynomial& delta = proof.delta;
-    const bool positive = std::all_of(delta.begin(), delta.end(), [](const GiNaC::numeric& c) { return c > 0; });
     return fmt::format(
         "  b = -z*c and a^2 - b*c = delta^2 make 4 - trace^2 = z*(2*c/delta)^2, which is not negative for z > 0;\n"
-        "  delta has no zero there: {}by Sturm's theorem (signs of its chain at 0: {}, at infinity: {}; {} changes "
-        "each).\n  No step size is unstable.\n",
-        positive ? "its coefficients are positive, and " : "", signs_text(proof.at_zero), signs_text(proof.at_infinity),
-        changes_of_sign(proof.at_zero));
+        "  delta, whose coefficients are positive, has no zero there; by Sturm's theorem too: signs of its chain at 0 "
+        "{}, at\n"
+        "  infinity {}, {} changes each. No step size is unstable.\n",
+        signs_text(proof.at_zero), signs_text(proof.at_infinity), changes_of_sign(proof.at_zero));
 }
 
 std::string mode_text(const Stability& member, const Mode& mode, double h) {
@@ -98,7 +93,7 @@ std::string mode_text(const Stability& member, const Mode& mode, double h) {
     text += "stable";
     if (member.limits.empty()) return text;
     std::size_t k = 0;
-    while (member.limits[k].high.to_double() < mode.z) ++k;
+    while (k + 1 < member.limits.size() && member.limits[k].high.to_double() < mode.z) ++k;
     const auto step_at = [&](std::size_t limit) {
         return std::sqrt(member.limits[limit].approximation(20).to_double()) / (x / h);
     };
