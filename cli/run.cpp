@@ -15,6 +15,7 @@
 #include "cli/output_path.hpp"
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
+#include "cli/step_judge.hpp"
 #include "cli/summary.hpp"
 #include "cli/watch.hpp"
 #include "generator/pipeline.hpp"
@@ -159,10 +160,12 @@ void run(const RunOptions& options) {
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
     Watch watch(scene, derivation.structure, stepper, velocity);
+    StepJudge judge(scene);
     std::int64_t states = 0;
     request.sink = [&](const Records& records) {
         file.write(records);
         watch.look(records);
+        judge.look(records);
         states += records.count;
     };
     TrajectoryResult result;
@@ -179,6 +182,15 @@ void run(const RunOptions& options) {
 
     if (!options.quiet) {
         print_table(derivation, stepper, request, result, watch);
+        if (result.status == LOBATTO_OK && result.steps_done > 1) {
+            const StepJudge::Judgement judgement = judge.judge(derivation, kernel, request, result);
+            if (judgement.error)
+                print_row(
+                    "estimated error",
+                    fmt::format("{:.1g} of the amplitude at the end, from the steps' polynomials", *judgement.error));
+            for (const std::string& warning : StepJudge::warnings(judgement, scene.run.error))
+                fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+        }
         print_events(scene.outputs.events, event_counts, event_file ? event_path(options, scene) : "");
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
         if (!steps.reaches_end)
