@@ -52,7 +52,7 @@ double number_after(const std::string& text, const std::string& pattern) {
                                                                                     : std::nan("");
 }
 
-Quadrature lobatto(int points) {
+Quadrature lobatto_with(int points) {
     return quadrature_of({Family::lobatto, points, 0});
 }
 
@@ -68,9 +68,9 @@ Choice choice_of(Method method, std::int64_t steps, double until) {
 }  // namespace
 
 TEST_CASE("the stability limits found numerically are the known ones") {
-    CHECK(stability_limit(lobatto(2)) == doctest::Approx(2).epsilon(1e-9));
-    CHECK(stability_limit(lobatto(3)) == doctest::Approx(std::sqrt(8.0)).epsilon(1e-9));
-    CHECK(stability_limit(lobatto(4)) == doctest::Approx(std::sqrt(42 - 6 * std::sqrt(29.0))).epsilon(1e-9));
+    CHECK(stability_limit(lobatto_with(2)) == doctest::Approx(2).epsilon(1e-9));
+    CHECK(stability_limit(lobatto_with(3)) == doctest::Approx(std::sqrt(8.0)).epsilon(1e-9));
+    CHECK(stability_limit(lobatto_with(4)) == doctest::Approx(std::sqrt(42 - 6 * std::sqrt(29.0))).epsilon(1e-9));
     CHECK(std::isinf(stability_limit(quadrature_of({Family::gauss, 2, 0}))));
 }
 
@@ -87,7 +87,7 @@ TEST_CASE("numbers of steps meet the samples of a reference often") {
 TEST_CASE(
     "of an oscillation the polynomials' jump has the order of the polynomials, the phase error that of the method") {
     for (const int points : {3, 4, 6}) {
-        const ErrorEstimate estimate(lobatto(points));
+        const ErrorEstimate estimate(lobatto_with(points));
         const double z = 0.2;
         // Measured: 2.99, 4.01, 6.01 and 5.01, 7.00, 11.0.
         CHECK(std::log2(estimate.jump(2 * z) / estimate.jump(z)) == doctest::Approx(points).epsilon(0.03));
@@ -97,8 +97,8 @@ TEST_CASE(
         CHECK(estimate.after(1000, estimate.jump(4 * z)) ==
               doctest::Approx(1000 * estimate.phase(4 * z)).epsilon(1e-6));
     }
-    CHECK(ErrorEstimate(lobatto(4)).after(10, 1e9) == 1);
-    CHECK(ErrorEstimate(lobatto(4)).after(10, 0) == 0);
+    CHECK(ErrorEstimate(lobatto_with(4)).after(10, 1e9) == 1);
+    CHECK(ErrorEstimate(lobatto_with(4)).after(10, 0) == 0);
 }
 
 TEST_CASE("explicit extrapolation follows the pendulum to 1e-15, and its frequency at rest is that of small swings") {

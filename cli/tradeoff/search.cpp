@@ -309,7 +309,8 @@ void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
     double least = infinity;
     int no_better = 0, dominated = 0;
     for (std::int64_t steps = ladder.at_least(fewest_steps(laboratory));
-         static_cast<double>(steps) < most_steps && laboratory.left() > reserve; steps = ladder.next(steps)) {
+         static_cast<double>(steps) < most_steps && (laboratory.left() > reserve || !std::isfinite(least));
+         steps = ladder.next(steps)) {
         const Measurement m = laboratory.measure({scan.member, steps, scan.tolerance});
         if (m.seconds > longest_run) return;
         if (!m.complete) continue;
@@ -359,7 +360,9 @@ void explore(Laboratory& laboratory) {
     const auto name = [](const Member& member) {
         return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));
     };
-    while (laboratory.left() > reserve) {
+    // However long the reference took: something is measured.
+    const auto has_time = [&] { return laboratory.left() > reserve || laboratory.notebook().all().empty(); };
+    while (has_time()) {
         laboratory.check_interruption();
         std::size_t at_work = 0;
         for (const Member& member : waiting)
