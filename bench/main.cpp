@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "bench/growth.hpp"
 #include "bench/instructions.hpp"
 #include "bench/report.hpp"
 #include "runtime/error.hpp"
@@ -18,7 +19,7 @@ struct Options {
     std::vector<std::string> problems;
     std::string output = "out/bench";
     bool ensemble = false;
-    bool instructions = false, store = false;
+    bool growth = false, instructions = false, store = false;
     RaceOptions race;
 };
 
@@ -55,13 +56,19 @@ int main(int argc, char** argv) {
     program.add_flag("--ensemble", options.ensemble, "Only the ensembles");
     program.add_flag("--peers-only", options.race.peers_only, "Without our kernels");
     program.add_flag("--quick", options.race.quick, "Fewer kernels, coarser steps and fewer repetitions");
+    program.add_flag("--growth", options.growth, "No race: chains of 8 to 4096 masses, linear systems");
     CLI::Option* instructions = program.add_flag("--instructions", options.instructions,
                                                  "No race: count the instructions a step, compare with the stored");
     program.add_flag("--store", options.store, "Store the counts instead")->needs(instructions);
     try {
         program.parse(argc, argv);
         if (options.instructions) return check_instructions(options.store);
-        run(options);
+        if (options.growth) {
+            print_machine();
+            print_growth();
+        } else {
+            run(options);
+        }
         return 0;
     } catch (const CLI::ParseError& error) {
         return program.exit(error) == 0 ? 0 : 2;

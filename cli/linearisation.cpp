@@ -20,14 +20,23 @@ bool is_small(const MatrixXd& difference, const MatrixXd& matrix) {
 
 }  // namespace
 
+std::string LinearSystem::obstacle() const {
+    if (!drag.isZero(0) && !is_small(drag, mass * std::sqrt(stiffness.norm() / mass.norm())))
+        return is_small(drag + drag.transpose(), drag) ? "its velocities couple the coordinates"
+                                                       : "its forces depend on the velocities";
+    if (!is_small(stiffness - stiffness.transpose(), stiffness)) return "its forces have no potential";
+    if (mass.llt().info() != Eigen::Success && (-mass).llt().info() != Eigen::Success)
+        return "its masses have both signs";
+    return "";
+}
+
 std::optional<VectorXd> LinearSystem::squared_frequencies() const {
-    if (!drag.isZero(0) && !is_small(drag, mass * std::sqrt(stiffness.norm() / mass.norm()))) return std::nullopt;
-    if (!is_small(stiffness - stiffness.transpose(), stiffness)) return std::nullopt;
-    if (mass.llt().info() != Eigen::Success) return std::nullopt;
+    if (!obstacle().empty()) return std::nullopt;
+    const double sign = mass(0, 0) > 0 ? 1 : -1;
     // Coordinates in units in which each has mass 1.
-    const VectorXd unit = mass.diagonal().cwiseSqrt().cwiseInverse();
-    const MatrixXd M = unit.asDiagonal() * mass * unit.asDiagonal(),
-                   S = unit.asDiagonal() * stiffness * unit.asDiagonal();
+    const VectorXd unit = mass.diagonal().cwiseAbs().cwiseSqrt().cwiseInverse();
+    const MatrixXd M = sign * (unit.asDiagonal() * mass * unit.asDiagonal()),
+                   S = sign * (unit.asDiagonal() * stiffness * unit.asDiagonal());
     if (!M.allFinite() || !S.allFinite()) return std::nullopt;
     const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(S, M, Eigen::EigenvaluesOnly);
     if (solver.info() != Eigen::Success) return std::nullopt;

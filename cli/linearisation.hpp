@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "generator/sample.hpp"
@@ -15,8 +16,10 @@ namespace lobatto {
 struct LinearSystem {
     Eigen::MatrixXd mass, drag, stiffness;
 
-    // Squares of the frequencies, ascending, negative where the motion runs away: when D = 0, S is symmetric and M
-    // positive definite, so that the system falls into independent oscillators.
+    // Why it does not fall into independent oscillators, a clause; "" when it does: D = 0, S is symmetric, and M or -M
+    // is positive definite.
+    std::string obstacle() const;
+    // Squares of the frequencies, ascending, negative where the motion runs away; nothing where there is an obstacle.
     std::optional<Eigen::VectorXd> squared_frequencies() const;
     // The largest real part of the exponents mu of x = exp(mu t).
     double rate() const;

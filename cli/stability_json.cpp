@@ -83,6 +83,7 @@ Json point_of(const StabilityReport& report, const PointReport& point) {
                                      {"stable", mode.z > 0 && mode.rate == 0},
                                      {"rate", mode.rate}});
     }
+    if (!point.obstacle.empty()) json["obstacle"] = point.obstacle;
     json["exact_rate"] = point.exact_rate;
     if (point.kernel_rate) json["measured_rate"] = *point.kernel_rate;
     return json;
@@ -113,11 +114,17 @@ std::string json_of(const StabilityReport& report) {
     json["points"] = Json::array();
     for (const PointReport& point : report.points) json["points"].push_back(point_of(report, point));
     if (const auto& motion = report.trajectory)
-        json["trajectory"] = {{"steps", motion->steps},           {"looked_at", motion->looked_at},
-                              {"largest_z", motion->largest_z},   {"largest_z_time", motion->largest_z_time},
-                              {"parting", motion->parting},       {"rate", motion->rate},
-                              {"exact_rate", motion->exact_rate}, {"time", motion->time},
-                              {"excess", motion->excess},         {"excess_time", motion->excess_time}};
+        json["trajectory"] = {{"steps", motion->steps},
+                              {"steps_done", motion->steps_done},
+                              {"looked_at", motion->looked_at},
+                              {"largest_z", motion->largest_z},
+                              {"largest_z_time", motion->largest_z_time},
+                              {"parting", motion->parting},
+                              {"rate", motion->rate},
+                              {"exact_rate", motion->exact_rate},
+                              {"time", motion->time},
+                              {"excess", motion->excess},
+                              {"excess_time", motion->excess_time}};
     if (const auto& energy = report.energy) {
         json["energy"] = {{"order", energy->order},
                           {"variation", energy->variation},

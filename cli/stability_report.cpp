@@ -53,6 +53,7 @@ std::vector<Mode> modes_of(const Stability& member, const VectorXd& squared, dou
 PointReport point_report(const StabilityReport& report, const LinearSystem& system, const VectorXd& q) {
     PointReport point;
     point.q = q;
+    point.obstacle = system.obstacle();
     point.exact_rate = report.step * system.rate();
     if (const auto squared = system.squared_frequencies()) {
         point.modes = modes_of(report.member, *squared, report.step);
@@ -78,7 +79,7 @@ struct State {
     VectorXd q, p;
 };
 
-std::vector<State> states_along(const StabilityReport& report, TrajectoryRequest request) {
+std::vector<State> states_along(const StabilityReport& report, TrajectoryRequest request, std::int64_t& done) {
     std::vector<State> states;
     const Eigen::Index n = report.kernel->coordinates;
     request.every = std::max<std::int64_t>(1, request.steps / states_looked_at);
@@ -90,15 +91,14 @@ std::vector<State> states_along(const StabilityReport& report, TrajectoryRequest
                 {row[0], Eigen::Map<const VectorXd>(row + 1, n), Eigen::Map<const VectorXd>(row + 1 + n, n)});
         }
     };
-    integrate(report.kernel, request);         // as far as it goes
-    if (states.size() > 1) states.pop_back();  // a step that fails may come after the last
+    done = integrate(report.kernel, request).steps_done;  // as far as it goes
+    if (states.size() > 1) states.pop_back();             // a step that fails may come after the last
     return states;
 }
 
 TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation& linearisation,
-                                   const std::vector<State>& states, std::int64_t steps) {
+                                   const std::vector<State>& states) {
     TrajectoryReport result;
-    result.steps = steps;
     LoadedStepper<double> stepper(report.kernel), finer(report.kernel);
     stepper.prepare(report.parameters, report.step);
     finer.prepare(report.parameters, report.step / fine);
@@ -234,14 +234,17 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
         report.points.push_back(point_report(report, linearisation.at(0, start, rest), start));
         return report;
     }
-    const std::vector<State> states = states_along(report, request);
+    std::int64_t done = 0;
+    const std::vector<State> states = states_along(report, request, done);
     if (system.autonomous && system.n <= static_cast<int>(most_for_eigenvalues)) {
         std::vector<VectorXd> starts{start};
         for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);
         for (const VectorXd& q : linearisation.equilibria(starts))
             report.points.push_back(point_report(report, linearisation.at(0, q, rest), q));
     }
-    report.trajectory = trajectory_report(report, linearisation, states, request.steps);
+    report.trajectory = trajectory_report(report, linearisation, states);
+    report.trajectory->steps = request.steps;
+    report.trajectory->steps_done = done;
     report.energy = energy_report(report, states);
     return report;
 }

@@ -23,14 +23,15 @@ struct Mode {
 // A linear system: the scene's own, or a nonlinear one's about an equilibrium.
 struct PointReport {
     Eigen::VectorXd q;                       // n; of a linear system nothing depends on it
-    std::optional<std::vector<Mode>> modes;  // ascending; nothing: the coordinates are coupled by velocities
+    std::optional<std::vector<Mode>> modes;  // ascending; nothing where there is an obstacle to it
+    std::string obstacle;                    // of LinearSystem
     double exact_rate = 0;                   // ln of the growth of the motion itself in a time h
     std::optional<double> kernel_rate;       // ln of the growth in a step, measured
 };
 
 // Along the scene's own motion.
 struct TrajectoryReport {
-    std::int64_t steps = 0, looked_at = 0;
+    std::int64_t steps = 0, steps_done = 0, looked_at = 0;
     double largest_z = 0, largest_z_time = 0;   // h^2 times the largest squared frequency; 0: none was found
     std::int64_t parting = 0;                   // steps with an eigenvalue above 1, of those looked at
     double rate = 0, exact_rate = 0, time = 0;  // the largest ln |eigenvalue| of a step; of the motion there; when

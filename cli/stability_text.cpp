@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -34,8 +33,9 @@ std::string polynomial(const GiNaC::ex& f, const Propagation& step) {
 // 1.0253, or 1 + 4.5e-07 of narrow gaps.
 std::string growth_text(double rate) {
     if (std::isinf(rate)) return "without bound";
-    if (rate <= 0) return "1";
-    return std::fabs(rate) < 1e-3 ? fmt::format("1 + {:.2g}", rate) : fmt::format("{:.5g}", std::exp(rate));
+    if (rate == 0) return "1";
+    return std::fabs(rate) < 1e-3 ? fmt::format("1 {} {:.2g}", rate > 0 ? '+' : '-', std::fabs(rate))
+                                  : fmt::format("{:.5g}", std::exp(rate));
 }
 
 std::string limit_text(const RealRoot& limit) {
@@ -61,12 +61,10 @@ std::string intervals_text(const Stability& member) {
 }
 
 std::string phase_text(const Stability& member) {
-    const GiNaC::numeric& error = member.phase_error;
-    return fmt::format("  a step turns by h*omega*(1 {} (h*omega)^{}{} + ...), so the motion runs {}\n",
-                       error.is_positive() ? "+" : "-", member.phase_order,
-                       (error.numer() * error.numer()).is_equal(1) ? "/" + canonical_text(error.denom())
-                                                                   : fmt::format("*{}", canonical_text(abs(error))),
-                       error.is_positive() ? "ahead" : "late");
+    const GiNaC::numeric& error = member.phase_error;  // one over an integer
+    const bool ahead = error.is_positive();
+    return fmt::format("  a step turns by h*omega*(1 {} (h*omega)^{}/{} + ...), so the motion runs {}\n",
+                       ahead ? "+" : "-", member.phase_order, canonical_text(error.denom()), ahead ? "ahead" : "late");
 }
 
 std::string signs_text(const std::vector<int>& signs) {
@@ -76,14 +74,12 @@ std::string signs_text(const std::vector<int>& signs) {
 }
 
 std::string proof_text(const ProofOfStability& proof) {
-    const RationalPolynomial& delta = proof.delta;
-    const bool positive = std::all_of(delta.begin(), delta.end(), [](const GiNaC::numeric& c) { return c > 0; });
     return fmt::format(
         "  b = -z*c and a^2 - b*c = delta^2 make 4 - trace^2 = z*(2*c/delta)^2, which is not negative for z > 0;\n"
-        "  delta has no zero there: {}by Sturm's theorem (signs of its chain at 0: {}, at infinity: {}; {} changes "
-        "each).\n  No step size is unstable.\n",
-        positive ? "its coefficients are positive, and " : "", signs_text(proof.at_zero), signs_text(proof.at_infinity),
-        changes_of_sign(proof.at_zero));
+        "  delta, whose coefficients are positive, has no zero there; by Sturm's theorem too: signs of its chain at 0 "
+        "{}, at\n"
+        "  infinity {}, {} changes each. No step size is unstable.\n",
+        signs_text(proof.at_zero), signs_text(proof.at_infinity), changes_of_sign(proof.at_zero));
 }
 
 std::string mode_text(const Stability& member, const Mode& mode, double h) {
@@ -97,7 +93,7 @@ std::string mode_text(const Stability& member, const Mode& mode, double h) {
     text += "stable";
     if (member.limits.empty()) return text;
     std::size_t k = 0;
-    while (member.limits[k].high.to_double() < mode.z) ++k;
+    while (k + 1 < member.limits.size() && member.limits[k].high.to_double() < mode.z) ++k;
     const auto step_at = [&](std::size_t limit) {
         return std::sqrt(member.limits[limit].approximation(20).to_double()) / (x / h);
     };
@@ -135,20 +131,22 @@ std::string point_text(const StabilityReport& report, const PointReport& point) 
     if (point.modes)
         text += modes_text(report.member, *point.modes, report.step);
     else
-        text += fmt::format(
-            "  coupled by velocities: no independent oscillations; the motion itself grows by {} in a "
-            "time h\n",
-            growth_text(point.exact_rate > 1e-12 ? point.exact_rate : 0));
+        text += fmt::format("  no independent oscillations: {}; the motion itself grows by {} in a time h\n",
+                            point.obstacle, growth_text(std::fabs(point.exact_rate) > 1e-12 ? point.exact_rate : 0));
     if (point.kernel_rate)
-        text += fmt::format("  measured on the kernel: growth a step {}\n", *point.kernel_rate > measured_floor(report)
-                                                                                ? growth_text(*point.kernel_rate)
-                                                                                : "1, to rounding");
+        text += fmt::format("  measured on the kernel: growth a step {}\n",
+                            std::fabs(*point.kernel_rate) > measured_floor(report) ? growth_text(*point.kernel_rate)
+                                                                                   : "1, to rounding");
     return text;
 }
 
 std::string trajectory_text(const StabilityReport& report) {
     const TrajectoryReport& motion = *report.trajectory;
-    std::string text = fmt::format("\nAlong the motion: {} steps\n", motion.steps);
+    std::string text = fmt::format(
+        "\nAlong the motion: {}\n",
+        motion.steps_done == motion.steps
+            ? fmt::format("{} steps", motion.steps)
+            : fmt::format("it stops after {} of {} steps; lobatto run says why", motion.steps_done, motion.steps));
     if (motion.largest_z > 0) {
         text += fmt::format("  stiffest at t = {:.6g}: h*omega = {:.6g}", motion.largest_z_time,
                             std::sqrt(motion.largest_z));

@@ -91,7 +91,7 @@ std::optional<double> measured_rate(LoadedStepper<double>& stepper, double step,
         if (!std::isfinite(distance) || distance <= 0) return std::nullopt;
         double& most = largest[2 * done >= steps ? 1 : 0];
         most = std::fmax(most, scale + std::log(distance));
-        if (distance < 1e50) continue;
+        if (distance > 1e-50 && distance < 1e50) continue;
         for (std::size_t k = 0; k < n; ++k) {
             state.q[k] = (state.q[k] - rest.q[k]) / distance;
             state.p[k] = (state.p[k] - rest.p[k]) / distance;

@@ -17,8 +17,8 @@ std::optional<std::vector<std::complex<double>>> step_eigenvalues(const LoadedSt
                                                                   const std::vector<double>& p, int steps = 1);
 
 // ln of the growth in one step of a linear system, measured by running the kernel for `steps` steps: two motions from
-// seeded states, their distance brought back to 1 whenever it has grown large. Of bounded motion some 1/steps or less
-// remains, and a few times that of motion that is free to drift. Nothing when a step fails.
+// seeded states, their distance brought back to 1 whenever it has become large or small. Of bounded motion some 1/steps
+// or less remains, and a few times that of motion that is free to drift. Nothing when a step fails.
 std::optional<double> measured_rate(LoadedStepper<double>& stepper, double step, long steps);
 
 }  // namespace lobatto

@@ -137,15 +137,27 @@ TEST_CASE("a step beyond the first limit somewhere along a motion is named") {
 TEST_CASE("velocities that couple, time, singular places and no equilibrium are each said in words") {
     const test::TemporaryFolder folder;
     const std::string two = "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }";
-    CHECK(contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + y^2)/2", two)}).out,
-                   "coupled by velocities: no independent oscillations; the motion itself grows by 1 in a time h\n"
-                   "  measured on the kernel: growth a step 1, to rounding\n"));
+    CHECK(contains(
+        stability({scene_in(folder, "(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + y^2)/2", two)}).out,
+        "no independent oscillations: its velocities couple the coordinates; the motion itself grows by 1 in a "
+        "time h\n"
+        "  measured on the kernel: growth a step 1, to rounding\n"));
     CHECK(contains(
         stability({scene_in(folder, "q'^2/2 + cos(q)*sin(t)", "q = { position = 1, velocity = 0 }", "time = \"t\"\n")})
             .out,
         "its forces change with time; it has no equilibria\n"));
     CHECK(contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", two)}).out,
                    "no equilibrium was found from its start and along its motion\n"));
+    // Friction: both decay by exp(-h/10).
+    const test::Finished damped = stability({scene_in(folder, "q'^2/2 - q^2/2",
+                                                      "q = { position = 1, velocity = 0 }\n"
+                                                      "[forces]\nq = \"-0.2*q'\"")});
+    CHECK(contains(damped.out,
+                   "its forces depend on the velocities; the motion itself grows by 0.99005 in a time h\n"
+                   "  measured on the kernel: growth a step 0.99005\n"));
+    // Both signs changed: the same oscillator.
+    CHECK(contains(stability({scene_in(folder, "q^2/2 - q'^2/2", "q = { position = 1, velocity = 0 }")}).out,
+                   "omega = 1 "));
     const test::Finished free = stability({scene_in(folder, "q'^2/2 - 3*q", "q = { position = 1, velocity = 0 }")});
     CHECK(contains(free.out, "omega = 0              free: moves on steadily\n"));
     const test::Finished saddle = stability({scene_in(folder, "q'^2/2 + q^2/2", "q = { position = 1, velocity = 0 }")});

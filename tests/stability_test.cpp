@@ -182,6 +182,7 @@ TEST_CASE("the phase error has its closed form") {
         const numeric kappa = factorial(r) * factorial(r) / (factorial(2 * r) * factorial(2 * r + 1));
         const Stability& member = stability_of(method);
         CHECK(member.phase_order == method.order());
+        CHECK(abs(member.phase_error.numer()) == 1);  // as the text of the command says it
         CHECK(member.phase_error == (lobatto ? kappa / (2 * r) : -kappa));
         // And is what the angle does: at x = 1/16, to the next order.
         const cln::cl_R x = cln::cl_float(cln::cl_RA(1) / 16, cln::float_format(120));

@@ -360,7 +360,7 @@ TEST_CASE("a linear system conserves its discrete energy about its fixed point")
 TEST_CASE("a constant force leaves a discrete energy that steps conserve; a nonlinear system has none") {
     // A fall in x, an oscillation in y: no fixed point.
     const Derivation derivation = derive(coupled("9.81*x + y^2"));
-    LoadedStepper<double> stepper(kernel_in_own_cache(emit(derivation), Precision::double_));
+    LoadedStepper<double> stepper(kernel_of(emit(derivation), Precision::double_));
     REQUIRE(stepper.prepare({}, 0.25) == LOBATTO_OK);
     const std::optional<DiscreteEnergy> energy = discrete_energy(stepper);
     REQUIRE(energy);
@@ -392,7 +392,7 @@ TEST_CASE("coordinates coupled by velocities conserve their discrete energy too"
                "title = \"T\"\nlagrangian = \"(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + 2*y^2)/2\"\n[coordinates]\n"
                "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }\n[method]\nfamily = \"gauss\"\n"
                "stages = 2\n[run]\nstep = 0.3\nuntil = 3\n")));
-    LoadedStepper<double> stepper(kernel_in_own_cache(emit(derivation), Precision::double_));
+    LoadedStepper<double> stepper(kernel_of(emit(derivation), Precision::double_));
     REQUIRE(stepper.prepare({}, 0.3) == LOBATTO_OK);
     const std::optional<DiscreteEnergy> energy = discrete_energy(stepper);
     REQUIRE(energy);
