@@ -30,8 +30,8 @@ double BudgetOption::seconds() const {
         throw InputError(fmt::format("--budget: '{}' is not a time; write 30s, 5min or 1h", text));
     if (!(seconds >= least && seconds <= most))
         throw InputError(fmt::format(
-            "--budget: {} is {} for one measurement, which needs a compiled kernel; give 1s to 24h, as in --budget 30s", text,
-            seconds < least ? "too little" : "too much"));
+            "--budget: {} is {} for one measurement, which needs a compiled kernel; give 1s to 24h, as in --budget 30s",
+            text, seconds < least ? "too little" : "too much"));
     return seconds;
 }
 

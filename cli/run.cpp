@@ -16,6 +16,7 @@
 #include "cli/overrides.hpp"
 #include "cli/progress.hpp"
 #include "cli/resume.hpp"
+#include "cli/step_judge.hpp"
 #include "cli/summary.hpp"
 #include "cli/watch.hpp"
 #include "generator/pipeline.hpp"
@@ -192,9 +193,11 @@ void run(const RunOptions& options) {
             write_checkpoint(checkpoint_path(path), checkpoint);
         };
     }
+    StepJudge judge(scene);
     request.sink = [&](const Records& records) {
         file.write(records);
         watch.look(records);
+        judge.look(records);
         counts[0] += static_cast<double>(records.count);
     };
     TrajectoryResult result;
@@ -212,6 +215,15 @@ void run(const RunOptions& options) {
 
     if (!options.quiet) {
         print_table(derivation, stepper, request, result, watch);
+        if (result.status == LOBATTO_OK && result.steps_done > 1) {
+            const StepJudge::Judgement judgement = judge.judge(derivation, kernel, request, result);
+            if (judgement.error)
+                print_row(
+                    "estimated error",
+                    fmt::format("{:.1g} of the amplitude at the end, from the steps' polynomials", *judgement.error));
+            for (const std::string& warning : StepJudge::warnings(judgement, scene.run.error))
+                fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+        }
         print_events(scene.outputs.events, counts, event_file ? event_path(options, scene) : "");
         print_row("trajectory", fmt::format("{}, {} {}", path, counts[0], counts[0] == 1 ? "state" : "states"));
         if (!steps.reaches_end)

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 
 #include "cli/budget_option.hpp"
 #include "cli/commands.hpp"
@@ -15,8 +16,8 @@
 #include "cli/tradeoff/report.hpp"
 #include "cli/tradeoff/say.hpp"
 #include "cli/tradeoff/search.hpp"
-#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
+#include "runtime/partial_file.hpp"
 
 namespace lobatto {
 
@@ -33,7 +34,14 @@ void make_folder(const std::string& folder) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error)
-        throw MachineError(fmt::format("cannot create the folder {}: {}. Choose another place with -o", folder, error.message()));
+        throw MachineError(
+            fmt::format("cannot create the folder {}: {}. Choose another place with -o", folder, error.message()));
+}
+
+void write(const std::string& path, const std::string& text) {
+    PartialFile file(path, "the result");
+    file.write(text);
+    file.finish();
 }
 
 void tradeoff(const TradeoffOptions& options) {
@@ -54,31 +62,39 @@ void tradeoff(const TradeoffOptions& options) {
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
     bool interrupted = false;
-    Laboratory laboratory(derive(written), scene, request);
+    std::optional<Laboratory> begun;
     try {
-        explore(laboratory);
+        begun.emplace(derive(written), scene, request);
+        explore(*begun);
     } catch (const Interrupted&) {
         interrupted = true;
+    } catch (const ComputationError& failure) {
+        throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
     }
     say.clear();
+    if (interrupted && (!begun || begun->notebook().all().empty())) {
+        fmt::print(stderr, "lobatto: interrupted before anything was measured.\n");
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+    Laboratory& laboratory = *begun;
     if (laboratory.notebook().all().empty())
         throw ComputationError(fmt::format(
             "{}: nothing could be measured within {:.3g} s; give more time with --budget", scene.path, seconds));
-    fmt::print("{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, laboratory.notebook().all().size(),
-               laboratory.notebook().found() > 0
-                   ? fmt::format(" ({} of an earlier run)", laboratory.notebook().found())
-                   : "",
-               laboratory.until(), laboratory.elapsed(), reference_text(laboratory), front_table(laboratory));
-    write_file(folder + "/tradeoff.csv", csv_of(laboratory));
+    fmt::print(
+        "{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, laboratory.notebook().all().size(),
+        laboratory.notebook().found() > 0 ? fmt::format(" ({} of an earlier run)", laboratory.notebook().found()) : "",
+        laboratory.until(), laboratory.elapsed(), reference_text(laboratory), front_table(laboratory));
+    write(folder + "/tradeoff.csv", csv_of(laboratory));
     const std::string json = json_of(laboratory);
-    write_file(folder + "/tradeoff.json", json);
+    write(folder + "/tradeoff.json", json);
     if (!interrupted) {
         const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
-        write_file(folder + "/report.html", report_page(laboratory, folder, pictures, json));
+        write(folder + "/report.html", report_page(laboratory, folder, pictures, json));
         fmt::print("\n{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
                    fmt::join(pictures, ".svg, "));
     } else {
-        fmt::print(stderr, "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
+        fmt::print(stderr,
+                   "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
         throw CLI::RuntimeError(interrupted_exit);
     }
 }
@@ -86,8 +102,8 @@ void tradeoff(const TradeoffOptions& options) {
 }  // namespace
 
 void add_tradeoff(CLI::App& program) {
-    CLI::App* command =
-        program.add_subcommand("tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
+    CLI::App* command = program.add_subcommand(
+        "tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
     const auto options = std::make_shared<TradeoffOptions>();
     command->add_option("scene", options->scene, "Scene file")->required();
     command->add_option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");

@@ -42,14 +42,15 @@ double error_of(const TuneOptions& options) {
 
 void print(const Choice& choice, const Scene& scene, double error) {
     const Measurement& m = choice.measurement;
-    fmt::print("{}: error at most {:.2g} to t = {:.6g}, relative to the amplitude of the motion\n\n{}\n", scene.path, error,
-               choice.until, method_text(choice));
+    fmt::print("{}: error at most {:.2g} to t = {:.6g}, relative to the amplitude of the motion\n\n{}\n", scene.path,
+               error, choice.until, method_text(choice));
     print_row("predicted error", fmt::format("{:.2g}: measured against {}, which is known to {:.1g}", m.error,
                                              choice.reference, choice.uncertainty));
     print_row("cost", fmt::format("{} to the end, {:.3g} ns and {:.3g} gradients a unit of time", duration(m.seconds),
                                   m.seconds / choice.until * 1e9, m.gradients / choice.until));
     print_row("stability", stability_text(choice));
-    if (std::isfinite(m.energy_error)) print_row("energy error", fmt::format("{:.2g} of the energy of motion", m.energy_error));
+    if (std::isfinite(m.energy_error))
+        print_row("energy error", fmt::format("{:.2g} of the energy of motion", m.energy_error));
     print_row("searched", fmt::format("{} members of the family{}, {:.1f} s", choice.members,
                                       choice.complete ? "" : "; with more time (--budget) there might be a faster one",
                                       choice.seconds));
@@ -91,7 +92,8 @@ void add_tune(CLI::App& program) {
         program.add_subcommand("tune", "Choose the cheapest method and step that keep a promised accuracy");
     const auto options = std::make_shared<TuneOptions>();
     command->add_option("scene", options->scene, "Scene file")->required();
-    command->add_option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
+    command
+        ->add_option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
         ->required();
     command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
     options->budget.add_to(*command);

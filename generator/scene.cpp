@@ -108,7 +108,7 @@ private:
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
         const Table table(source_, table_of(source_, section, example), section.at, "[run]",
-                          {"step", "steps_per_period", "period", "until"});
+                          {"step", "steps_per_period", "period", "until", "error"});
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
         const Entry* period = table.find("period");
@@ -142,6 +142,16 @@ private:
             fail(until.value.at,
                  fmt::format("the run has {} steps; at most 9e15: make until smaller or the step larger",
                              shown(end / h)));
+        if (const Entry* error = table.find("error")) {
+            GiNaC::numeric value = 0;
+            system_.read_formula(*error, system_.scope_of("the error", false), &value);
+            scene_.run.error = value.to_double();
+            if (!(scene_.run.error >= 1e-15 && scene_.run.error <= 0.1))
+                fail(error->value.at,
+                     fmt::format("the error is {}; it is relative to the amplitude of the motion, at least "
+                                 "1e-15 and at most 0.1",
+                                 shown(value)));
+        }
     }
 
     void read_output() {

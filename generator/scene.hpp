@@ -44,8 +44,9 @@ struct Method {
 };
 
 struct Run {
-    GiNaC::ex step;   // h > 0; in parameters
-    GiNaC::ex until;  // end time, >= 0; in parameters
+    GiNaC::ex step;    // h > 0; in parameters
+    GiNaC::ex until;   // end time, >= 0; in parameters
+    double error = 0;  // that is wanted, relative to the amplitude of the motion; 0: nothing is said
 };
 
 // An event: the value crosses zero. Located on the step's own polynomial.

@@ -374,7 +374,7 @@ System build_system(const Scene& scene) {
     }
     if (!system.separable) return system;
     system.mass = system.momentum_v;
-    system.potential = -sum_of(all_at(system.terms, system.v, 0));
+    system.potential = -at(system.lagrangian, system.v, Occurrences(system.v), 0);
     system.hessian = SparseMatrix(system.n, system.n);
     for (const ex& force : system.force) system.gradient.push_back(-force);
     for (const auto& [place, value] : system.force_q.entries()) system.hessian.put(place.first, place.second, -value);

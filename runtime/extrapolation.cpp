@@ -105,8 +105,8 @@ bool Extrapolation<real>::advance_to(real time) {
     while (time_ < time) {
         const real left = time - time_;
         // Equal parts of what is left.
-        const auto parts = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(
-                                                         static_cast<double>(left / longest_) * (1 - 1e-12))));
+        const auto parts = std::max<std::int64_t>(
+            1, static_cast<std::int64_t>(std::ceil(static_cast<double>(left / longest_) * (1 - 1e-12))));
         const real H = left / real(parts);
         if (macro_step(H)) {
             if (parts == 1) time_ = time;

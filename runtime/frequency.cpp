@@ -56,8 +56,7 @@ double largest_frequency(const LoadedStepper<real>& stepper, real time, const st
         }
         if (!equations(ahead, f_ahead) || !equations(behind, f_behind)) return false;
         Ax.resize(x.size());
-        for (std::size_t i = 0; i < x.size(); ++i)
-            Ax[i] = static_cast<double>(f_ahead[i] - f_behind[i]) / (2 * step);
+        for (std::size_t i = 0; i < x.size(); ++i) Ax[i] = static_cast<double>(f_ahead[i] - f_behind[i]) / (2 * step);
         return true;
     };
 

@@ -307,12 +307,10 @@ struct NeighbourSweeps {
     // One step, h from `time`. False, and nothing has moved, where the sweeps do not contract.
     bool step(const typename K::Coefficients& k, real time) {
         const bool measures = until_measured == 0;
-        if (!has_history)
-            predict<false, true>();
-        else if (measures)
-            predict<true, true>();
+        if (has_history)
+            predict<true>();
         else
-            predict<true, false>();
+            predict<false>();
         if (m > 0 && !solve(k, time, measures)) return false;
         return finish(k, time);
     }
@@ -326,9 +324,9 @@ private:
     }
     real bound() const { return maximum(tolerance, Limits<real>::epsilon); }
 
-    // The positions at the nodes from the accelerations of the step before; and, now and then, the measure of each
-    // coordinate: its displacement in a step, with the rounding of its position as floor.
-    template <bool with_history, bool with_measure>
+    // The positions at the nodes from the accelerations of the step before; and the measure of each coordinate: its
+    // displacement in a step, with the rounding of its position as floor.
+    template <bool with_history>
     void predict() {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
         const V rounding = V(Limits<real>::epsilon / bound()), step_size = V(h);
@@ -341,12 +339,10 @@ private:
             W[s - 1] = V::load(at_end + at);
             const V Q = V::load(position + at), v = fused(weight[0], W[s - 1], V::load(velocity + at));
             v.store(rate + at);
-            if constexpr (with_measure) {
-                const V distance = fabs(Q);
-                const V scale = fabs(step_size * v) + fabs(step_size * (step_size * W[s - 1])) + V(floor) * distance;
-                (V(real(1)) / maximum(scale, fused(rounding, distance, V(Limits<real>::smallest))))
-                    .store(inverse_scale + at);
-            }
+            const V distance = fabs(Q);
+            const V scale = fabs(step_size * v) + fabs(step_size * (step_size * W[s - 1])) + V(floor) * distance;
+            (V(real(1)) / maximum(scale, fused(rounding, distance, V(Limits<real>::smallest))))
+                .store(inverse_scale + at);
 #pragma GCC unroll 16
             for (int i = 0; i < m; ++i) {
                 V x = fused(on_velocity[i], v, Q);
@@ -383,7 +379,8 @@ private:
         return largest(worst);
     }
 
-    // The accelerations at the inner nodes of the step.
+    // The accelerations at the inner nodes of the step. Where rho is measured, increments themselves go down to
+    // rounding: the last ratios are those of the errors that shrink most slowly.
     bool solve(const typename K::Coefficients& k, real time, bool measures) {
         const real small = bound();
         real e_before = real(0), measured = real(0);
@@ -392,10 +389,10 @@ private:
             const real e = sweep();
             increment = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
-            const real rho = measured > real(0) ? measured : measures ? real(1) : shrinking;
+            const real rho = measures ? real(1) : real(4) * maximum(measured, shrinking);  // 4: the motion changes it
             if (rho * e <= small || (e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0))) {
-                if (measured > real(0)) shrinking = measured;
-                until_measured = measured > real(0) ? measured_every : measures ? 0 : until_measured - 1;
+                if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
+                until_measured = !measures ? until_measured - 1 : measured > real(0) ? measured_every : 0;
                 return true;
             }
             if (evaluations > 3 && !(e < real(0.8) * e_before || e <= real(16) * small)) return false;

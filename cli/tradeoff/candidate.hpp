@@ -58,19 +58,20 @@ struct Candidate {
 // Errors of states are relative to the amplitudes of the motion (Reference::scale), those of energies to its energy.
 struct Measurement {
     Candidate candidate;
-    bool complete = false;      // it reached the end
-    double error_end = 0;       // of the state at the end
-    double error = 0;           // the largest at the times that are compared
-    double reaches = 0;         // until when its error was below 0.01
-    double energy_error = 0;    // the largest; not a number where energy is not conserved
-    double drift = 0;           // the slope of a straight line through it, a unit of time
-    double momentum_error = 0;  // the largest change of a conserved momentum; not a number where none is known
-    double defect = 0;          // symplectic, of the first step; not a number where it is not promised or left out
-    double estimate = 0;        // of the error, from the steps' own polynomials (polynomial_defect); 0: none
-    double seconds = 0;         // of processor time, for the whole motion
-    double iterations = 0;      // a step
-    double gradients = 0;       // of V, or of L, for the whole motion
-    double compile_seconds = 0; // 0: it was in the cache
+    bool complete = false;       // it reached the end
+    double error_end = 0;        // of the state at the end
+    double error = 0;            // the largest at the times that are compared
+    double reaches = 0;          // until when its error was below 0.01
+    double energy_error = 0;     // the largest; not a number where energy is not conserved
+    double drift = 0;            // the slope of a straight line through it, a unit of time
+    double momentum_error = 0;   // the largest change of a conserved momentum; not a number where none is known
+    double defect = 0;           // symplectic, of the first step; not a number where it is not promised or left out
+    double jump = 0;             // between the polynomials of neighbouring steps (polynomial_defect); 0: none
+    double estimate = 0;         // of the error, from the jump (ErrorEstimate); 0: none
+    double seconds = 0;          // of processor time, for the whole motion
+    double iterations = 0;       // a step
+    double gradients = 0;        // of V, or of L, for the whole motion
+    double compile_seconds = 0;  // 0: it was in the cache
 };
 
 // Numbers of steps near the terms of a geometric series, among them those that meet the `samples` times of a reference

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "cli/tradeoff/stability_limit.hpp"
+#include "cli/stability_limit.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -13,7 +13,7 @@ namespace lobatto {
 namespace {
 
 constexpr int attempts = 4;
-constexpr double safety = 0.8;         // of the promise: what the search aims at
+constexpr double safety = 0.8;           // of the promise: what the search aims at
 constexpr double reference_part = 0.01;  // of the promise: how well the reference should be known
 constexpr double least_part = 0.1;       // and how well it must be
 
@@ -33,8 +33,8 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     if (!(uncertainty <= least_part * request.error)) {
         const double known = reference.trusted_until(least_part * request.error);
         throw ComputationError(fmt::format(
-            "an error of {:.2g} cannot be promised to t = {:.6g}: there two references in {} differ by {:.1g}. {}", request.error,
-            reference.until, precision_name(reference.precision), uncertainty,
+            "an error of {:.2g} cannot be promised to t = {:.6g}: there two references in {} differ by {:.1g}. {}",
+            request.error, reference.until, precision_name(reference.precision), uncertainty,
             known > 0 ? fmt::format("The motion is chaotic, or needs more time (--budget). They agree to t = {:.4g}: "
                                     "try --until {:.4g}",
                                     known, known)
@@ -55,11 +55,13 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     if (!found.best || !(error <= request.error)) {
         const double least = std::fmax(found.least_error, found.best ? error : 0);
         if (!std::isfinite(least))
-            throw ComputationError(fmt::format("nothing could be measured within {:.3g} s; give more time with --budget",
-                                               request.seconds));
+            throw ComputationError(fmt::format(
+                "nothing could be measured within {:.3g} s; give more time with --budget", request.seconds));
         throw ComputationError(fmt::format(
-            "an error of {:.2g} to t = {:.6g} is not reached: {:.1g} is the least of the {} members of the family that were "
-            "tried in double precision{}. Ask for a larger error or an earlier end; `lobatto tradeoff` measures long double "
+            "an error of {:.2g} to t = {:.6g} is not reached: {:.1g} is the least of the {} members of the family that "
+            "were "
+            "tried in double precision{}. Ask for a larger error or an earlier end; `lobatto tradeoff` measures long "
+            "double "
             "and __float128 too, which `lobatto emit --precision` writes",
             request.error, reference.until, least, found.members,
             found.complete ? "" : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
@@ -73,7 +75,7 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     choice.reference = reference.first;
     choice.uncertainty = uncertainty;
     choice.frequency = reference.frequency;
-    choice.stability_limit = stability_limit(found.best->candidate.member.method());
+    choice.stability_limit = stability_limit(quadrature_of(found.best->candidate.member.method()));
     choice.members = found.members;
     choice.complete = found.complete;
     choice.seconds = laboratory.elapsed();

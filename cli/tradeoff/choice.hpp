@@ -14,13 +14,13 @@ constexpr double least_error = 1e-15, largest_error = 0.1;  // that can be asked
 struct Choice {
     Measurement measurement;  // its error is the prediction
     double until = 0;
-    std::string reference;      // what it was compared with
-    double uncertainty = 0;     // of that
-    double frequency = 0;       // the largest of the motion
-    double stability_limit = 0; // of h times it
-    int members = 0;            // looked at
-    bool complete = false;      // whether none of the others can be expected to be faster
-    double seconds = 0;         // that the search took
+    std::string reference;       // what it was compared with
+    double uncertainty = 0;      // of that
+    double frequency = 0;        // the largest of the motion
+    double stability_limit = 0;  // of h times it
+    int members = 0;             // looked at
+    bool complete = false;       // whether none of the others can be expected to be faster
+    double seconds = 0;          // that the search took
 
     double step() const { return until / static_cast<double>(measurement.candidate.steps); }
 };

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "cli/step_judge.hpp"
 #include "cli/summary.hpp"
 #include "runtime/compiler.hpp"
 #include "runtime/error.hpp"
@@ -19,16 +20,7 @@ namespace {
 
 constexpr int few_coordinates = 10, some_coordinates = 20;
 constexpr double extended_reach = 3e-13;  // what two references in long double can be asked to agree to
-constexpr double reference_share = 0.4; // of the seconds
-
-// Coordinates of the same unit have the same number.
-std::vector<int> groups_of(const Scene& scene) {
-    std::map<std::string, int> numbers;
-    std::vector<int> groups;
-    for (const Coordinate& coordinate : scene.coordinates)
-        groups.push_back(numbers.try_emplace(coordinate.unit, static_cast<int>(numbers.size())).first->second);
-    return groups;
-}
+constexpr double reference_share = 0.4;   // of the seconds
 
 // In quadruple precision where that is asked for and affordable. Order 22; of large systems the equations of a step are
 // large too, and order 10 does.
@@ -54,9 +46,9 @@ std::string subject_of(const Scene& scene, const Workshop& workshop, const Membe
 double end_of(const Scene& scene) {
     const double until = scene.evaluate(scene.run.until, "the end time").to_double();
     if (!(until > 0))
-        throw InputError(fmt::format(
-            "{}: the end time is {:.6g}, so there is nothing to measure; give `until` in [run], or --until", scene.path,
-            until));
+        throw InputError(
+            fmt::format("{}: the end time is {:.6g}, so there is nothing to measure; give `until` in [run], or --until",
+                        scene.path, until));
     return until;
 }
 
@@ -76,7 +68,7 @@ Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequ
     ReferenceRequest wish;
     wish.until = until;
     wish.wanted = request_.wanted;
-    wish.groups = groups_of(scene_);
+    wish.groups = unit_groups(scene_);
     wish.interrupted = request_.interrupted;
     const auto compute = [&] {
         request_.say("compiling the reference in " + precision_name(reference.precision));
@@ -111,8 +103,24 @@ void Laboratory::check_interruption() const {
 Measurement Laboratory::measure(const Candidate& candidate, bool all) {
     check_interruption();
     if (const Measurement* known = notebook_.find(candidate)) return *known;
+    if (!knows_symmetries_ && candidate.member.precision == Precision::double_) {
+        knows_symmetries_ = true;
+        const Kernel kernel = workshop_.kernel(candidate.member);
+        const double step = reference_.until / static_cast<double>(candidate.steps);
+        const StartIn<double> start = start_in<double>(start_, kernel, step);
+        std::vector<std::string> names;
+        for (const Coordinate& coordinate : scene_.coordinates) names.push_back(coordinate.name);
+        measurer_->know_symmetries(find_symmetries(kernel, start.parameters, start.q, step, names));
+    }
     Measurement measurement = measurer_->measure(workshop_.kernel(candidate.member), candidate, all);
     measurement.compile_seconds = workshop_.compile_seconds(candidate.member);
+    if (measurement.jump > 0) {
+        const Member type_free{candidate.member.family, candidate.member.points};
+        auto estimate = estimates_.find(type_free);
+        if (estimate == estimates_.end())
+            estimate = estimates_.emplace(type_free, quadrature_of(type_free.method())).first;
+        measurement.estimate = estimate->second.after(static_cast<double>(candidate.steps), measurement.jump);
+    }
     return notebook_.add(measurement);
 }
 

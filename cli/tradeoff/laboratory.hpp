@@ -4,10 +4,11 @@
 
 #include <chrono>
 #include <functional>
-#include <memory>
+#include <map>
 #include <optional>
 #include <string>
 
+#include "cli/error_estimate.hpp"
 #include "cli/tradeoff/measuring.hpp"
 #include "cli/tradeoff/notebook.hpp"
 #include "cli/tradeoff/workshop.hpp"
@@ -15,9 +16,9 @@
 namespace lobatto {
 
 struct LaboratoryRequest {
-    double seconds = 20;  // of wall time
-    double wanted = 1e-18;  // the disagreement of the two references that is good enough
-    std::string notebook;   // its file; empty: none
+    double seconds = 20;        // of wall time
+    double wanted = 1e-18;      // the disagreement of the two references that is good enough
+    std::string notebook;       // its file; empty: none
     std::vector<Member> first;  // kernels that will be needed whatever is found
     const volatile int* interrupted = nullptr;
     std::function<void(const std::string&)> say = [](const std::string&) {};  // what is being done
@@ -25,8 +26,8 @@ struct LaboratoryRequest {
 
 class Laboratory {
 public:
-    // `derivation` of the scene as written, which one kernel serves; `scene` with what the command line replaces. Computes
-    // the reference. Throws as its parts do; InputError when there is no time to integrate over.
+    // `derivation` of the scene as written, which one kernel serves; `scene` with what the command line replaces.
+    // Computes the reference. Throws as its parts do; InputError when there is no time to integrate over.
     Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequest request);
 
     const Scene& scene() const { return scene_; }
@@ -41,8 +42,8 @@ public:
     // Whether the two references differ by more than the errors that are of interest.
     bool is_chaotic() const { return reference_.disagreement.back() > trusted; }
     static constexpr double trusted = 1e-9;
-    // What is to be small: the error; of a chaotic motion the energy error, or without energy 1/t, t the time until which
-    // the true motion was followed.
+    // What is to be small: the error; of a chaotic motion the energy error, or without energy 1/t, t the time until
+    // which the true motion was followed.
     double figure(const Measurement& measurement) const;
 
     double until() const { return reference_.until; }
@@ -66,6 +67,8 @@ private:
     Reference reference_;
     std::optional<Measurer> measurer_;
     Notebook notebook_;
+    std::map<Member, ErrorEstimate> estimates_;
+    bool knows_symmetries_ = false;
 };
 
 // The end time of a scene, > 0; InputError.

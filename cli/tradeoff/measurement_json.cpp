@@ -14,14 +14,15 @@ namespace lobatto {
 namespace {
 
 using Column = std::pair<const char*, double Measurement::*>;
-constexpr std::array<Column, 12> columns = {{{"error_end", &Measurement::error_end},
+constexpr std::array<Column, 13> columns = {{{"error_end", &Measurement::error_end},
                                              {"error", &Measurement::error},
                                              {"reaches", &Measurement::reaches},
                                              {"energy_error", &Measurement::energy_error},
                                              {"drift", &Measurement::drift},
                                              {"momentum_error", &Measurement::momentum_error},
                                              {"symplectic_defect", &Measurement::defect},
-                                             {"polynomial_defect", &Measurement::estimate},
+                                             {"polynomial_jump", &Measurement::jump},
+                                             {"estimated_error", &Measurement::estimate},
                                              {"seconds", &Measurement::seconds},
                                              {"iterations", &Measurement::iterations},
                                              {"gradients", &Measurement::gradients},
@@ -60,14 +61,13 @@ Measurement measurement_of(const nlohmann::json& json) {
     measurement.complete = json.at("complete");
     for (const auto& [name, member] : columns)
 
-            measurement.*member = json.at(name).is_null() ? std::nan("") : json.at(name).get<double>();
+        measurement.*member = json.at(name).is_null() ? std::nan("") : json.at(name).get<double>();
     return measurement;
 }
 
 std::string csv_header() {
     std::string text = "family,points,precision,steps,step,tolerance,complete";
-    for (const auto& [name, member] : columns)
-        text += fmt::format(",{}", name);
+    for (const auto& [name, member] : columns) text += fmt::format(",{}", name);
     return text + '\n';
 }
 
@@ -80,7 +80,7 @@ std::string csv_row(const Measurement& measurement, double until) {
                     measurement.complete ? 1 : 0);
     for (const auto& [name, member] : columns)
 
-            text += "," + (std::isfinite(measurement.*member) ? exact_text(measurement.*member) : std::string());
+        text += "," + (std::isfinite(measurement.*member) ? exact_text(measurement.*member) : std::string());
     return text + '\n';
 }
 

@@ -16,14 +16,14 @@ namespace lobatto {
 
 namespace {
 
-constexpr double lost = 0.01;                   // of the amplitude: the motion is another one
-constexpr std::int64_t energies = 128;          // samples at which the energy is looked at
-constexpr int estimates = 48;                   // places where the polynomials are compared
-constexpr std::int64_t looks = 1500;             // steps whose error is looked at
-constexpr int defect_limit = 32;                // coordinates; tangent maps of more take long
-constexpr double timing_seconds = 4e-3;         // of repetitions in all
+constexpr double lost = 0.01;            // of the amplitude: the motion is another one
+constexpr std::int64_t energies = 128;   // samples at which the energy is looked at
+constexpr int estimates = 48;            // places where the polynomials are compared
+constexpr std::int64_t looks = 1500;     // steps whose error is looked at
+constexpr int defect_limit = 32;         // coordinates; tangent maps of more take long
+constexpr double timing_seconds = 4e-3;  // of repetitions in all
 constexpr int most_repetitions = 5;
-constexpr double block_seconds = 0.05;          // between two looks at the interruption
+constexpr double block_seconds = 0.05;  // between two looks at the interruption
 
 double processor_seconds() {
     timespec now{};
@@ -130,7 +130,8 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
         double worst = 0;
         for (std::size_t k = 0; k < 2 * n; ++k) {
             using Wide = std::conditional_t<std::is_same_v<real, float>, double, real>;
-            const Wide difference = (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
+            const Wide difference =
+                (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
             const double error = std::fabs(static_cast<double>(difference)) / reference_.scale[k];
             if (!(error <= worst)) worst = error;
         }
@@ -181,7 +182,8 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
         stepper.prepare(exact.parameters, static_cast<Exact>(run.h));
         std::vector<double> times, errors;
         Exact first = 0;
-        const std::int64_t every = std::max<std::int64_t>(1, run.meetings / (course != nullptr ? run.meetings : energies));
+        const std::int64_t every =
+            std::max<std::int64_t>(1, run.meetings / (course != nullptr ? run.meetings : energies));
         for (std::int64_t meeting = 0; meeting <= run.meetings; meeting += every) {
             state_at(meeting);
             Exact energy = 0;
@@ -233,10 +235,11 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
             const std::int64_t meeting = run.meetings * place / estimates;
             if (place > 0 && meeting == run.meetings * (place - 1) / estimates) continue;
             state_at(meeting);
-            const auto time = static_cast<real>(reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings));
+            const auto time =
+                static_cast<real>(reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings));
             const double defect = polynomial_defect(run.stepper, time, std::vector<real>(q.begin(), q.end()),
                                                     std::vector<real>(p.begin(), p.end()), reference_.scale);
-            if (defect > result.estimate) result.estimate = defect;
+            if (defect > result.jump) result.jump = defect;
         }
     }
     return result;
@@ -286,16 +289,14 @@ double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candid
 double Measurer::error_on_steps(const Kernel& kernel, const Candidate& candidate) const {
     return with_type_of(candidate.member.precision, [&](auto type) {
         using real = decltype(type);
-        return reference_.precision == Precision::quadruple
-                   ? error_on_steps_in<real, __float128>(kernel, candidate)
-                   : error_on_steps_in<real, long double>(kernel, candidate);
+        return reference_.precision == Precision::quadruple ? error_on_steps_in<real, __float128>(kernel, candidate)
+                                                            : error_on_steps_in<real, long double>(kernel, candidate);
     });
 }
 
 Measurement Measurer::measure(const Kernel& kernel, const Candidate& candidate, bool all) const {
-    return with_type_of(candidate.member.precision, [&](auto type) {
-        return measure_in<decltype(type)>(kernel, candidate, all, nullptr);
-    });
+    return with_type_of(candidate.member.precision,
+                        [&](auto type) { return measure_in<decltype(type)>(kernel, candidate, all, nullptr); });
 }
 
 Timing Measurer::time_once(const Kernel& kernel, const Candidate& candidate) const {

@@ -22,8 +22,8 @@ struct Timing {
 
 class Measurer {
 public:
-    // `exact`: a kernel of the system in the reference's precision, for its energy. `conserves`: energy. All are kept by
-    // reference, the kernel excepted.
+    // `exact`: a kernel of the system in the reference's precision, for its energy. `conserves`: energy. All are kept
+    // by reference, the kernel excepted.
     Measurer(const Reference& reference, const ExactStart& start, Kernel exact, bool conserves,
              const volatile int* interrupted);
 
@@ -34,7 +34,8 @@ public:
     double error_on_steps(const Kernel& kernel, const Candidate& candidate) const;
     // The time alone, as many runs as there are.
     Timing time_once(const Kernel& kernel, const Candidate& candidate) const;
-    // The error and the relative energy error at each of the samples that the candidate meets: rows of t, error, energy.
+    // The error and the relative energy error at each of the samples that the candidate meets: rows of t, error,
+    // energy.
     struct Course {
         std::vector<double> time, error, energy;
     };

@@ -63,18 +63,16 @@ std::string method_text(const Choice& choice) {
 
 std::string stability_text(const Choice& choice) {
     const double radians = choice.step() * choice.frequency;
-    if (!std::isfinite(choice.stability_limit))
-        return fmt::format("h omega = {:.3g}, stable for every step", radians);
+    if (!std::isfinite(choice.stability_limit)) return fmt::format("h omega = {:.3g}, stable for every step", radians);
     return fmt::format("h omega = {:.3g} of at most {:.4g}, omega the largest frequency met{}", radians,
-                       choice.stability_limit,
-                       radians > choice.stability_limit ? "; it is met only for moments" : "");
+                       choice.stability_limit, radians > choice.stability_limit ? "; it is met only for moments" : "");
 }
 
 std::string with_choice(const std::string& text, const Choice& choice, double error, bool until) {
     std::vector<std::string> method = method_lines(choice);
-    method.front() += fmt::format(" # lobatto tune --error {:.2g}: {:.1g} to t = {:.6g}, {:.3g} ns a unit of time", error,
-                                  choice.measurement.error, choice.until,
-                                  choice.measurement.seconds / choice.until * 1e9);
+    method.front() +=
+        fmt::format(" # lobatto tune --error {:.2g}: {:.1g} to t = {:.6g}, {:.3g} ns a unit of time", error,
+                    choice.measurement.error, choice.until, choice.measurement.seconds / choice.until * 1e9);
     std::string result;
     bool has_method = false;
     const std::vector<Line> lines = lines_of(text);
@@ -94,11 +92,13 @@ std::string with_choice(const std::string& text, const Choice& choice, double er
                 has_method = true;
             }
             result += line.text + '\n' + "step = " + exact_text(choice.step()) + '\n';
+            result += "error = " + exact_text(error) + '\n';
             if (until) result += "until = " + exact_text(choice.until) + '\n';
             continue;
         }
-        const bool replaced = line.table == "run" && (line.key == "step" || line.key == "steps_per_period" ||
-                                                      line.key == "period" || (until && line.key == "until"));
+        const bool replaced =
+            line.table == "run" && (line.key == "step" || line.key == "steps_per_period" || line.key == "period" ||
+                                    line.key == "error" || (until && line.key == "until"));
         if (!replaced) result += line.text + '\n';
     }
     return result;
@@ -109,10 +109,12 @@ void write_method(const Choice& choice, const Scene& scene, double error, bool u
     const Candidate& candidate = choice.measurement.candidate;
     const Scene back = read_scene(Source(scene.path, text));
     if (back.method.family != candidate.member.family || back.method.points != candidate.member.points ||
-        back.method.tolerance != candidate.tolerance || back.evaluate(back.run.step, "the step").to_double() != choice.step())
-        throw InputError(fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "
-                                     "unusually; copy the lines above",
-                                     scene.path));
+        back.method.tolerance != candidate.tolerance ||
+        back.evaluate(back.run.step, "the step").to_double() != choice.step())
+        throw InputError(
+            fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "
+                        "unusually; copy the lines above",
+                        scene.path));
     PartialFile file(scene.path, "the scene");
     file.write(text);
     file.finish();

@@ -65,21 +65,24 @@ std::string processor_name() {
 }
 
 const std::map<std::string, std::string> captions = {
-    {"work_precision", "Work against precision: each point is a whole run. Further right is more accurate, lower is faster."},
+    {"work_precision",
+     "Work against precision: each point is a whole run. Further right is more accurate, lower is faster."},
     {"error", "The error of the best ways to some accuracies, against time."},
     {"energy", "Their energy errors: bounded where steps are iterated to rounding."}};
 
 const char* const style = R"(
 body { font: 16px/1.5 "DejaVu Sans", sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
-table { border-collapse: collapse; font-size: 0.85rem; } th, td { padding: 0.15rem 0.7rem; text-align: right; border-bottom: 1px solid #ddd; }
-td.text, th.text { text-align: left; } figure { margin: 1.5rem 0; } img { max-width: 100%; } figcaption { color: #555; font-size: 0.9rem; }
+table { border-collapse: collapse; font-size: 0.85rem; } th, td { padding: 0.15rem 0.7rem; text-align: right; white-space: nowrap; border-bottom: 1px solid #ddd; }
+th { white-space: normal; } td.text, th.text { text-align: left; } table.words td { white-space: normal; } figure { margin: 1.5rem 0; } img { max-width: 100%; } figcaption { color: #555; font-size: 0.9rem; }
 pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.8rem; } .note { background: #fff3cd; padding: 0.6rem 0.8rem; }
 )";
 
 std::string front_rows(const Laboratory& laboratory) {
     std::string rows;
-    const auto optional = [](double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : std::string("–"); };
+    const auto optional = [](double value) {
+        return std::isfinite(value) ? fmt::format("{:.1e}", value) : std::string("–");
+    };
     for (const Measurement& m : front_rows_of(laboratory)) {
         const Candidate& c = m.candidate;
         rows += fmt::format(
@@ -95,16 +98,17 @@ std::string front_rows(const Laboratory& laboratory) {
 
 }  // namespace
 
-std::string report_page(const Laboratory& laboratory, const std::string& folder, const std::vector<std::string>& pictures,
-                        const std::string& json) {
+std::string report_page(const Laboratory& laboratory, const std::string& folder,
+                        const std::vector<std::string>& pictures, const std::string& json) {
     const Scene& scene = laboratory.scene();
     std::string figures, findings;
     for (const std::string& name : pictures)
         figures += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption>{}</figcaption></figure>\n", name,
                                data_address(file_text(folder + "/" + name + ".svg")), captions.at(name));
     for (const Finding& finding : laboratory.derivation().structure.findings)
-        findings += fmt::format("<tr><td class=\"text\">{}</td><td class=\"text\">{}</td><td class=\"text\">{}</td></tr>\n",
-                                escaped(finding.name), finding.holds ? "yes" : "no", escaped(finding.reason));
+        findings +=
+            fmt::format("<tr><td class=\"text\">{}</td><td class=\"text\">{}</td><td class=\"text\">{}</td></tr>\n",
+                        escaped(finding.name), finding.holds ? "yes" : "no", escaped(finding.reason));
     // "</" inside data would end the script.
     std::string data;
     for (std::size_t i = 0; i < json.size(); ++i)
@@ -130,7 +134,7 @@ std::string report_page(const Laboratory& laboratory, const std::string& folder,
 {figures}<h2>The scene</h2>
 <pre>{scene}</pre>
 <h2>Its structure</h2>
-<table><tbody>
+<table class="words"><tbody>
 {findings}</tbody></table>
 <h2>The machine</h2>
 <p>{machine}; one thread, processor time, the least of some repetitions. Kernels compiled by {compiler}.</p>
@@ -144,8 +148,8 @@ std::string report_page(const Laboratory& laboratory, const std::string& folder,
         fmt::arg("title", escaped(scene.title.empty() ? scene.name : scene.title)), fmt::arg("style", style),
         fmt::arg("until", laboratory.until()), fmt::arg("note", laboratory.is_chaotic() ? " class=\"note\"" : ""),
         fmt::arg("reference", escaped(reference_text(laboratory))), fmt::arg("front", front_rows(laboratory)),
-        fmt::arg("figures", figures), fmt::arg("scene", escaped(scene.source.content())), fmt::arg("findings", findings),
-        fmt::arg("machine", escaped(processor_name())),
+        fmt::arg("figures", figures), fmt::arg("scene", escaped(scene.source.content())),
+        fmt::arg("findings", findings), fmt::arg("machine", escaped(processor_name())),
         fmt::arg("compiler", escaped(find_compiler(false).words.back())),
         fmt::arg("count", laboratory.notebook().all().size()), fmt::arg("data", data));
 }

@@ -10,7 +10,7 @@
 namespace lobatto {
 
 // `pictures`: names of SVG files in the folder, in order; `json`: the data.
-std::string report_page(const Laboratory& laboratory, const std::string& folder, const std::vector<std::string>& pictures,
-                        const std::string& json);
+std::string report_page(const Laboratory& laboratory, const std::string& folder,
+                        const std::vector<std::string>& pictures, const std::string& json);
 
 }  // namespace lobatto

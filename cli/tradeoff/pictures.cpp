@@ -37,21 +37,22 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
             members[m.candidate.member].push_back(&m);
     std::vector<const Member*> shown;
     for (const auto& [member, list] : members) shown.push_back(&member);
-    std::stable_sort(shown.begin(), shown.end(), [&](const Member* a, const Member* b) {
-        return members.at(*a).size() > members.at(*b).size();
-    });
+    std::stable_sort(shown.begin(), shown.end(),
+                     [&](const Member* a, const Member* b) { return members.at(*a).size() > members.at(*b).size(); });
     if (shown.size() > most_curves) shown.resize(most_curves);
     std::sort(shown.begin(), shown.end(), [](const Member* a, const Member* b) { return *a < *b; });
     const double until = laboratory.until();
     std::string data, curves;
     const auto add = [&](std::vector<const Measurement*> list, const std::string& style, const std::string& title) {
-        std::sort(list.begin(), list.end(), [](const auto* a, const auto* b) { return a->candidate.steps < b->candidate.steps; });
+        std::sort(list.begin(), list.end(),
+                  [](const auto* a, const auto* b) { return a->candidate.steps < b->candidate.steps; });
         const std::string name = fmt::format("$m{}", std::count(data.begin(), data.end(), '$'));
         data += name + " << END\n";
         for (const Measurement* m : list)
             data += fmt::format("{:.4e},{:.4e}\n", laboratory.figure(*m), m->seconds / until * 1e9);
         data += "END\n";
-        curves += fmt::format("{}{} using 1:2 {} title \"{}\"", curves.empty() ? "plot " : ", \\\n     ", name, style, title);
+        curves +=
+            fmt::format("{}{} using 1:2 {} title \"{}\"", curves.empty() ? "plot " : ", \\\n     ", name, style, title);
     };
     std::vector<Measurement> front = pareto_front(laboratory);
     std::vector<const Measurement*> best;
@@ -103,7 +104,8 @@ void draw_course(const std::string& folder, const std::string& name, const std::
         if (values[i].empty()) continue;
         data += fmt::format("$c{} << END\n", i);
         for (std::size_t j = 0; j < values[i].size(); ++j)
-            if (std::fabs(values[i][j]) > 0) data += fmt::format("{:.6g},{:.4e}\n", times[i][j], std::fabs(values[i][j]));
+            if (std::fabs(values[i][j]) > 0)
+                data += fmt::format("{:.6g},{:.4e}\n", times[i][j], std::fabs(values[i][j]));
         data += "END\n";
         curves += fmt::format("{}$c{} using 1:2 with lines lc rgb \"{}\" lw 1.5 title \"{}\"",
                               curves.empty() ? "plot " : ", \\\n     ", i, colours[i % 6], titles[i]);
@@ -126,7 +128,8 @@ std::vector<std::string> draw_pictures(Laboratory& laboratory, const std::string
     for (const Measurement& m : representatives(laboratory)) {
         const Measurer::Course course =
             laboratory.measurer().course(laboratory.workshop().kernel(m.candidate.member), m.candidate);
-        titles.push_back(fmt::format("{}, h = {:.3g}", m.candidate.name(), laboratory.until() / static_cast<double>(m.candidate.steps)));
+        titles.push_back(fmt::format("{}, h = {:.3g}", m.candidate.name(),
+                                     laboratory.until() / static_cast<double>(m.candidate.steps)));
         times.push_back(course.time);
         errors.push_back(course.error);
         energies.push_back(course.energy);

@@ -24,10 +24,10 @@ double seconds_since(Clock::time_point start) {
 
 // Numbers with many divisors, so that many numbers of steps meet many of the samples.
 constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
-constexpr double rough = 1e-6;           // tolerance of the first look
-constexpr double precise_factor = 6;     // what the precise way takes longer, at most, about
-constexpr double half = 0.5;             // of the seconds, for a first way; the rest is for finer steps
-constexpr double radians_of_step = 0.75; // h omega of the family's first run
+constexpr double rough = 1e-6;            // tolerance of the first look
+constexpr double precise_factor = 6;      // what the precise way takes longer, at most, about
+constexpr double half = 0.5;              // of the seconds, for a first way; the rest is for finer steps
+constexpr double radians_of_step = 0.75;  // h omega of the family's first run
 constexpr int most_refinements = 4;
 constexpr int frequency_looks = 24;
 
@@ -96,7 +96,9 @@ private:
         const int samples = sample_counts[std::size(sample_counts) - 2];
         const auto began = Clock::now();
         auto states = extrapolate(samples, static_cast<real>(rough), true);
-        if (!states) throw ComputationError("the motion cannot be followed to the end: it runs into a singularity, or away to infinity");
+        if (!states)
+            throw ComputationError(
+                "the motion cannot be followed to the end: it runs into a singularity, or away to infinity");
         const double seconds = seconds_since(began);
         set_scale(*states, samples);
         set_frequency(*states, samples);
@@ -113,10 +115,11 @@ private:
     }
 
     [[noreturn]] void fail_slow(double reached) const {
-        throw TooSlow(fmt::format("a reference to t = {:.6g} takes longer than the {:.3g} s that the budget leaves for it; "
-                                  "it would do to about t = {:.2g}. Give more time with --budget, or an earlier --until",
-                                  request_.until, request_.seconds_limit, reached),
-                      reached);
+        throw TooSlow(
+            fmt::format("a reference to t = {:.6g} takes longer than the {:.3g} s that the budget leaves for it; "
+                        "it would do to about t = {:.2g}. Give more time with --budget, or an earlier --until",
+                        request_.until, request_.seconds_limit, reached),
+            reached);
     }
 
     // Of one step of the kernel.
@@ -177,8 +180,7 @@ private:
             if (stepper_.velocity(time, q, p, v) != LOBATTO_OK) continue;
             real product = 0;
             for (std::size_t k = 0; k < n_; ++k) product += p[k] * v[k];
-            reference_.energy_scale =
-                std::max(reference_.energy_scale, std::fabs(static_cast<double>(product)) / 2);
+            reference_.energy_scale = std::max(reference_.energy_scale, std::fabs(static_cast<double>(product)) / 2);
             if (n_ > 64 && look >= 2) break;
         }
     }
@@ -195,8 +197,7 @@ private:
     std::optional<std::vector<double>> disagreement_with(const States& states, std::int64_t ratio) {
         const int samples = reference_.samples;
         const real h = static_cast<real>(request_.until) / static_cast<real>(samples * ratio);
-        if (stepper_.prepare(start_.parameters, h) != LOBATTO_OK ||
-            stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
+        if (stepper_.prepare(start_.parameters, h) != LOBATTO_OK || stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
             return std::nullopt;
         std::vector<double> largest{0};
         std::vector<real> q, p;
@@ -209,8 +210,7 @@ private:
             stepper_.state(time, q, p);
             double worst = largest.back();
             for (std::size_t k = 0; k < 2 * n_; ++k) {
-                const real difference =
-                    (k < n_ ? q[k] : p[k - n_]) - states[static_cast<std::size_t>(i) * 2 * n_ + k];
+                const real difference = (k < n_ ? q[k] : p[k - n_]) - states[static_cast<std::size_t>(i) * 2 * n_ + k];
                 const double error = std::fabs(static_cast<double>(difference / scale_[k]));
                 if (!(error <= worst)) worst = error;
             }
@@ -227,8 +227,8 @@ private:
             const auto began = Clock::now();
             const auto measured = disagreement_with(states, ratio);
             last = seconds_since(began);
-            const double before =
-                reference_.disagreement.empty() ? std::numeric_limits<double>::infinity() : reference_.disagreement.back();
+            const double before = reference_.disagreement.empty() ? std::numeric_limits<double>::infinity()
+                                                                  : reference_.disagreement.back();
             if (measured && measured->back() < before) {
                 reference_.disagreement = *measured;
                 reference_.first = fmt::format("{} with {} steps in {}", kernel_->method, ratio * reference_.samples,

@@ -10,16 +10,14 @@
 #include <set>
 #include <thread>
 
-#include "cli/tradeoff/stability_limit.hpp"
-
 namespace lobatto {
 
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double longest_radians = 4;      // h omega of the coarsest steps tried; Lobatto's limits are near pi
-constexpr double fine_ratio = 1.06;        // of the steps in the end
-constexpr double hopeless = 1.6;           // times the best: a crossing that polishing will not save
+constexpr double longest_radians = 4;  // h omega of the coarsest steps tried; Lobatto's limits are near pi
+constexpr double fine_ratio = 1.06;    // of the steps in the end
+constexpr double hopeless = 1.6;       // times the best: a crossing that polishing will not save
 constexpr double most_steps = 1e9;
 constexpr double close = 1.08;  // two numbers of steps between which nothing is looked for
 
@@ -76,9 +74,7 @@ Crossing cross(Laboratory& laboratory, const Member& member, double goal) {
         }
         double next = 0;
         if (good && bad && good->candidate.steps > bad->candidate.steps) {
-            if (static_cast<double>(good->candidate.steps) <=
-                static_cast<double>(bad->candidate.steps) * close)
-                break;
+            if (static_cast<double>(good->candidate.steps) <= static_cast<double>(bad->candidate.steps) * close) break;
             const double a = static_cast<double>(bad->candidate.steps), b = static_cast<double>(good->candidate.steps);
             next = std::sqrt(a * b);
             if (bad->complete) {  // by the slope between the two
@@ -102,8 +98,7 @@ Crossing cross(Laboratory& laboratory, const Member& member, double goal) {
             steps = ladder.at_most(static_cast<double>(good->candidate.steps) * factor);
             if (steps >= good->candidate.steps) break;
         } else {
-            const double factor =
-                m.complete ? std::clamp(1.03 * std::pow(m.error / goal, 1 / order), 1.05, 4.0) : 1.5;
+            const double factor = m.complete ? std::clamp(1.03 * std::pow(m.error / goal, 1 / order), 1.05, 4.0) : 1.5;
             const double more = static_cast<double>(steps) * factor;
             if (more > most_steps) break;
             // A run that would take more than is left.
@@ -214,7 +209,8 @@ Search search(Laboratory& laboratory, double goal) {
     while (true) {
         laboratory.check_interruption();
         // What is ready is measured; else the compilers are waited for.
-        const auto ready = std::find_if(queue.begin(), queue.end(), [&](const Member& m) { return workshop.is_ready(m); });
+        const auto ready =
+            std::find_if(queue.begin(), queue.end(), [&](const Member& m) { return workshop.is_ready(m); });
         if (ready != queue.end()) {
             const Member member = *ready;
             queue.erase(ready);
@@ -313,7 +309,8 @@ void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
     double least = infinity;
     int no_better = 0, dominated = 0;
     for (std::int64_t steps = ladder.at_least(fewest_steps(laboratory));
-         static_cast<double>(steps) < most_steps && laboratory.left() > reserve; steps = ladder.next(steps)) {
+         static_cast<double>(steps) < most_steps && (laboratory.left() > reserve || !std::isfinite(least));
+         steps = ladder.next(steps)) {
         const Measurement m = laboratory.measure({scan.member, steps, scan.tolerance});
         if (m.seconds > longest_run) return;
         if (!m.complete) continue;
@@ -323,7 +320,8 @@ void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
         const double rounding =
             1e4 * rounding_of(scan.member.precision) * std::sqrt(static_cast<double>(steps)) + scan.tolerance;
         if (no_better >= 3 && least < rounding) return;
-        // Another is as accurate in a fraction of the time; four times in a row, because the coarsest steps may be slow.
+        // Another is as accurate in a fraction of the time; four times in a row, because the coarsest steps may be
+        // slow.
         const double lead = scan.ratio < 1.5 ? 2 : 4;
         dominated = figure < 0.1 && m.seconds > lead * fastest_within(laboratory, figure) ? dominated + 1 : 0;
         if (dominated >= 4) return;
@@ -362,7 +360,9 @@ void explore(Laboratory& laboratory) {
     const auto name = [](const Member& member) {
         return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));
     };
-    while (laboratory.left() > reserve) {
+    // However long the reference took: something is measured.
+    const auto has_time = [&] { return laboratory.left() > reserve || laboratory.notebook().all().empty(); };
+    while (has_time()) {
         laboratory.check_interruption();
         std::size_t at_work = 0;
         for (const Member& member : waiting)

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The trade of speed for accuracy: its parts by themselves, `lobatto tradeoff` and `lobatto tune` from the outside.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <regex>
+
+#include "cli/budget_option.hpp"
+#include "cli/error_estimate.hpp"
+#include "cli/kernel_of.hpp"
+#include "cli/stability_limit.hpp"
+#include "cli/tradeoff/measurement_json.hpp"
+#include "cli/tradeoff/method_text.hpp"
+#include "cli/tradeoff/notebook.hpp"
+#include "runtime/extrapolation.hpp"
+#include "runtime/frequency.hpp"
+#include "runtime/reference.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
+const std::string duffing = LOBATTO_SOURCE_DIR "/scenes/duffing.toml";
+
+// A folder for results; the kernels of all tests here share one cache.
+struct Place {
+    static const std::string& cache() {
+        static const test::TemporaryFolder folder;
+        static const std::string path = folder.string();
+        return path;
+    }
+    test::EnvironmentVariable variable{"LOBATTO_CACHE_DIR", cache()};
+    test::TemporaryFolder folder;
+
+    test::Finished run(std::vector<std::string> arguments) const {
+        arguments.insert(arguments.begin(), LOBATTO_PROGRAM);
+        return test::run(arguments);
+    }
+};
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+double number_after(const std::string& text, const std::string& pattern) {
+    std::smatch match;
+    return std::regex_search(text, match, std::regex(pattern + "\\s*([-+.0-9e]+)")) ? std::stod(match[1])
+                                                                                    : std::nan("");
+}
+
+Quadrature lobatto_with(int points) {
+    return quadrature_of({Family::lobatto, points, 0});
+}
+
+Choice choice_of(Method method, std::int64_t steps, double until) {
+    Choice choice;
+    choice.measurement.candidate = {{method.family, method.points}, steps, method.tolerance};
+    choice.measurement.error = 5e-9;
+    choice.measurement.seconds = 1e-3;
+    choice.until = until;
+    return choice;
+}
+
+}  // namespace
+
+TEST_CASE("the stability limits found numerically are the known ones") {
+    CHECK(stability_limit(lobatto_with(2)) == doctest::Approx(2).epsilon(1e-9));
+    CHECK(stability_limit(lobatto_with(3)) == doctest::Approx(std::sqrt(8.0)).epsilon(1e-9));
+    CHECK(stability_limit(lobatto_with(4)) == doctest::Approx(std::sqrt(42 - 6 * std::sqrt(29.0))).epsilon(1e-9));
+    CHECK(std::isinf(stability_limit(quadrature_of({Family::gauss, 2, 0}))));
+}
+
+TEST_CASE("numbers of steps meet the samples of a reference often") {
+    const StepLadder ladder(2520, 1.1);
+    for (std::int64_t steps = 1; steps < 100000; steps = ladder.next(steps)) {
+        CAPTURE(steps);
+        CHECK(std::gcd(steps, std::int64_t(2520)) >= std::min<std::int64_t>(steps, 36));
+        CHECK(static_cast<double>(ladder.next(steps)) <= 1.35 * static_cast<double>(steps) + 1);
+        CHECK(ladder.at_most(static_cast<double>(steps)) == steps);
+    }
+}
+
+TEST_CASE(
+    "of an oscillation the polynomials' jump has the order of the polynomials, the phase error that of the method") {
+    for (const int points : {3, 4, 6}) {
+        const ErrorEstimate estimate(lobatto_with(points));
+        const double z = 0.2;
+        // Measured: 2.99, 4.01, 6.01 and 5.01, 7.00, 11.0.
+        CHECK(std::log2(estimate.jump(2 * z) / estimate.jump(z)) == doctest::Approx(points).epsilon(0.03));
+        CHECK(std::log2(estimate.phase(4 * z) / estimate.phase(2 * z)) ==
+              doctest::Approx(2 * points - 1).epsilon(0.03));
+        // From the jump back to the error that goes with it.
+        CHECK(estimate.after(1000, estimate.jump(4 * z)) ==
+              doctest::Approx(1000 * estimate.phase(4 * z)).epsilon(1e-6));
+    }
+    CHECK(ErrorEstimate(lobatto_with(4)).after(10, 1e9) == 1);
+    CHECK(ErrorEstimate(lobatto_with(4)).after(10, 0) == 0);
+}
+
+TEST_CASE("explicit extrapolation follows the pendulum to 1e-15, and its frequency at rest is that of small swings") {
+    const Place place;
+    Scene scene = read_scene(pendulum);
+    EmitOptions options;
+    options.precision = Precision::extended;
+    const Kernel kernel = kernel_of(emit(derive(scene), options), options.precision);
+    LoadedStepper<long double> stepper(kernel);
+    const long double omega = 2 * 3.14159265358979323846264338327950288L;
+    REQUIRE(stepper.prepare({1, omega}, 0.1L) == LOBATTO_OK);
+    CHECK(largest_frequency<long double>(stepper, 0, {0}, {0}) ==
+          doctest::Approx(static_cast<double>(omega)).epsilon(1e-6));
+    Extrapolation<long double> way(stepper, {1, 6}, 1e-18L);
+    way.start(0, {omega / 4}, {0});
+    double worst = 0;
+    for (int i = 1; i <= 50; ++i) {
+        REQUIRE(way.advance_to(0.1L * i));
+        const PhasePoint exact = pendulum_solution(omega * omega, omega / 4, 0, 0.1L * i);
+        worst = std::max(worst, static_cast<double>(std::fabs(way.state()[0] - exact.q)));
+    }
+    CHECK(worst < 1e-15);  // measured 2e-17
+    CHECK(way.evaluations() > 0);
+}
+
+TEST_CASE("a choice written into a scene leaves everything else, and reads back") {
+    const std::string text = test::read_file(pendulum);
+    const Choice choice = choice_of({Family::gauss, 5, 1e-9}, 1000, 120);
+    const std::string changed = with_choice(text, choice, 1e-8, false);
+    const Scene scene = read_scene(Source("changed.toml", changed));
+    CHECK(scene.method.family == Family::gauss);
+    CHECK(scene.method.points == 5);
+    CHECK(scene.method.tolerance == 1e-9);
+    CHECK(scene.evaluate(scene.run.step, "step").to_double() == 0.12);
+    CHECK(scene.evaluate(scene.run.until, "until").to_double() == 120);
+    CHECK(scene.run.error == 1e-8);
+    CHECK(contains(changed, "# lobatto tune --error 1e-08: 5e-09 to t = 120"));
+    CHECK(contains(changed, "until = 120 # s: about 100 swings"));  // its own comment
+    CHECK(contains(changed, "[output]\nevery = 1     # keep every step\n"));
+    CHECK(with_choice(changed, choice, 1e-8, false) == changed);  // once is enough
+    // Without [method], with a step from a period, and what looks like a table inside a text.
+    const std::string other =
+        "title = \"t\"\nlagrangian = \"\"\"\n  x'^2/2\n# [method]\n  - x^2/2\"\"\"\n[coordinates]\nx = { position = 1, "
+        "velocity = 0 "
+        "}\n[run]\nsteps_per_period = 10\nperiod = 6\nuntil = 12\n";
+    const Scene second =
+        read_scene(Source("other.toml", with_choice(other, choice_of({Family::lobatto, 7, 0}, 40, 20), 1e-3, true)));
+    CHECK(second.method.points == 7);
+    CHECK(second.evaluate(second.run.step, "step").to_double() == 0.5);
+    CHECK(second.evaluate(second.run.until, "until").to_double() == 20);
+    CHECK(contains(second.source.content(), "# [method]\n  - x^2/2\"\"\""));
+}
+
+TEST_CASE("a notebook keeps measurements, and leaves out a torn line and another subject's") {
+    const test::TemporaryFolder folder;
+    const std::string path = folder / "m.jsonl";
+    Measurement measurement;
+    measurement.candidate = {{Family::gauss, 3, Precision::extended}, 77, 1e-9};
+    measurement.complete = true;
+    measurement.error = 1.25e-7;
+    measurement.energy_error = std::nan("");
+    {
+        Notebook notebook(path, "a subject");
+        notebook.add(measurement);
+    }
+    test::write_text(path, test::read_file(path) + "{\"family\": \"lob");
+    {
+        Notebook notebook(path, "a subject");
+        REQUIRE(notebook.found() == 1);
+        const Measurement* found = notebook.find(measurement.candidate);
+        REQUIRE(found != nullptr);
+        CHECK(found->error == 1.25e-7);
+        CHECK(std::isnan(found->energy_error));
+        CHECK(csv_row(*found, 7.7) == csv_row(measurement, 7.7));
+    }
+    CHECK(Notebook(path, "another").found() == 0);
+}
+
+TEST_CASE("a budget is a time with a unit") {
+    const auto seconds = [](const std::string& text) {
+        BudgetOption option;
+        option.text = text;
+        return option.seconds();
+    };
+    CHECK(seconds("30s") == 30);
+    CHECK(seconds("2.5min") == 150);
+    CHECK(seconds("45") == 45);
+    CHECK(test::message_of<InputError>([&] { seconds("soon"); }) ==
+          "--budget: 'soon' is not a time; write 30s, 5min or 1h");
+    CHECK(contains(test::message_of<InputError>([&] { seconds("10ms"); }), "is not a time"));
+    CHECK(contains(test::message_of<InputError>([&] { seconds("0.1s"); }), "too little for one measurement"));
+}
+
+TEST_CASE("what cannot be promised or measured is refused with the reason") {
+    const Place place;
+    const auto refused = [&](std::vector<std::string> arguments, int code, const std::string& reason) {
+        const test::Finished finished = place.run(arguments);
+        CAPTURE(finished.err);
+        CHECK(finished.exit_code == code);
+        CHECK(contains(finished.err, reason));
+    };
+    refused({"tune", pendulum, "--error", "1e-20"}, 2, "double precision holds nothing below 1e-15");
+    refused({"tune", pendulum, "--error", "small"}, 2, "'small' is not a number");
+    refused({"tune", pendulum, "--error", "1e-6", "--until", "0"}, 2, "there is nothing to measure");
+    refused({"tradeoff", pendulum, "--until", "0", "-o", place.folder / "out"}, 2, "there is nothing to measure");
+    refused({"tradeoff", pendulum, "--budget", "0.1s"}, 2, "too little for one measurement");
+    const std::string endless = place.folder / "endless.toml";
+    test::write_text(endless, std::regex_replace(test::read_file(pendulum), std::regex("\nuntil[^\n]*"), ""));
+    refused({"tune", endless, "--error", "1e-6"}, 2, "until");
+}
+
+TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic solution") {
+    const Place place;
+    const std::string scene = place.folder / "pendulum.toml";
+    test::write_text(scene, test::read_file(pendulum));
+    const test::Finished tuned =
+        place.run({"tune", scene, "--error", "1e-6", "--until", "20", "--budget", "8s", "--write"});
+    CAPTURE(tuned.out);
+    CAPTURE(tuned.err);
+    REQUIRE(tuned.exit_code == 0);
+    CHECK(contains(tuned.out, "error at most 1e-06 to t = 20"));
+    CHECK(number_after(tuned.out, "predicted error") <= 1e-6);
+    CHECK(contains(tuned.out, "stability"));
+    const test::Finished ran = place.run({"run", scene, "-o", place.folder / "run.csv"});
+    CAPTURE(ran.out);
+    REQUIRE(ran.exit_code == 0);
+    CHECK(ran.err == "");                                          // nothing to warn of
+    const double error = number_after(ran.out, "position error");  // of the angle; its amplitude is pi/2
+    CHECK(error <= 1e-6 * 1.5708);
+    CHECK(error > 1e-10);  // not far more than was asked for
+}
+
+TEST_CASE(
+    "tradeoff writes a table, CSV, JSON, pictures and a page that needs no other file, and goes on where it was") {
+    const Place place;
+    const std::string out = place.folder / "out";
+    const std::vector<std::string> command = {"tradeoff", pendulum, "--until", "10", "--budget", "7s", "-o", out};
+    const test::Finished first = place.run(command);
+    CAPTURE(first.out);
+    CAPTURE(first.err);
+    REQUIRE(first.exit_code == 0);
+    CHECK(contains(first.out, "ns a unit"));
+    CHECK(contains(first.out, "explicit extrapolation in __float128 differs from it by"));
+    const auto json = nlohmann::json::parse(test::read_file(out + "/tradeoff.json"));
+    REQUIRE(json.at("front").size() > 2);
+    CHECK(json.at("chaotic") == false);
+    CHECK(json.at("reference").at("disagreement") < 1e-17);
+    double error = 1e9, seconds = 0;
+    for (const auto& row : json.at("front")) {  // each costs more and errs less
+        CHECK(row.at("error") < error);
+        CHECK(row.at("seconds") >= seconds);
+        error = row.at("error");
+        seconds = row.at("seconds");
+    }
+    const std::string csv = test::read_file(out + "/tradeoff.csv");
+    CHECK(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')) == json.at("measurements").size() + 1);
+    const std::string page = test::read_file(out + "/report.html");
+    CHECK(contains(page, "<script type=\"application/json\" id=\"data\">"));
+    CHECK(contains(page, "data:image/svg+xml"));
+    CHECK(contains(page, "lagrangian = "));
+    CHECK_FALSE(std::regex_search(page, std::regex("(src|href)=\"(?!data:)")));
+    const std::size_t begin = page.find("id=\"data\">") + 10, end = page.find("</script>", begin);
+    CHECK(nlohmann::json::parse(page.substr(begin, end - begin)) == json);
+    CHECK(contains(test::read_file(out + "/work_precision.svg"), "</svg>"));
+    const test::Finished second = place.run(command);
+    CHECK(contains(second.out, "of an earlier run)"));
+}
+
+TEST_CASE("run warns beyond the linear stability limit") {
+    const Place place;
+    const test::Finished ran =
+        place.run({"run", pendulum, "--points", "2", "--step", "0.4", "--until", "4", "-o", place.folder / "run.csv"});
+    CHECK(contains(ran.err, "beyond the linear stability limit: h omega = 2.51 is more than 2"));
+    CHECK(
+        place.run({"run", pendulum, "--points", "2", "--step", "0.01", "--until", "4", "-o", place.folder / "run.csv"})
+            .err == "");
+}
+
+TEST_SUITE("slow") {
+    TEST_CASE("a chaotic motion is not promised further than it is known") {
+        const Place place;
+        const test::Finished refused = place.run({"tune", duffing, "--error", "1e-9", "--budget", "15s"});
+        CAPTURE(refused.err);
+        CHECK(refused.exit_code == 3);
+        CHECK(contains(refused.err, "cannot be promised to t = 1256.64"));
+        CHECK(contains(refused.err, "try --until"));
+    }
+}
