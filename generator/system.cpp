@@ -253,6 +253,32 @@ SparseMatrix derivative_of(const std::vector<ex>& vector, const Symbols& variabl
     return result;
 }
 
+namespace {
+
+bool mentions(const System& system, const GiNaC::symbol& t) {
+    const auto has = [&](const ex& e) { return e.has(t); };
+    return has(system.lagrangian) || std::any_of(system.outer_force.begin(), system.outer_force.end(), has);
+}
+
+// L(q, q', t) + f(t) moves as L does, and a time that drops out need not be known: any moment will do.
+Scene without_time(const Scene& scene) {
+    const Symbols time{scene.time};
+    const Occurrences occurrences(time);
+    const auto still = [&](const ex& value) {
+        try {
+            return at(value, time, occurrences, 0);
+        } catch (const std::exception&) {  // a pole at the origin: one away from it
+            return at(value, time, occurrences, GiNaC::numeric(1, 2));
+        }
+    };
+    Scene result = scene;
+    result.lagrangian = still(scene.lagrangian);
+    for (Coordinate& coordinate : result.coordinates) coordinate.force = still(coordinate.force);
+    return result;
+}
+
+}  // namespace
+
 System build_system(const Scene& scene) {
     System system;
     system.n = static_cast<int>(scene.coordinates.size());
@@ -335,6 +361,7 @@ System build_system(const Scene& scene) {
     }
     for (const Event& event : scene.outputs.events)
         if (event.value.has(system.t)) system.autonomous = false;  // events are given the time with everything else
+    if (system.autonomous && mentions(system, system.t)) return build_system(without_time(scene));
     check_mass(scene, system);
 
     // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).

@@ -122,3 +122,23 @@ TEST_CASE("a Lagrangian in SI units is not degenerate because its mass is small"
     CHECK(system.momentum_v.entries().size() == 4);
     CHECK_FALSE(system.separable);
 }
+
+// Found by the fuzz target derivation: the energy of the first asked for a time that no function was given.
+TEST_CASE("a time that changes nothing is left out, also where formulas mention it") {
+    const auto system_of = [](const std::string& potential, const std::string& forces) {
+        return build_system(
+            read_scene(Source("time.toml", "time = \"t\"\nlagrangian = \"q'^2/2 - " + potential +
+                                               "\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n" + forces +
+                                               "[run]\nstep = 0.1\nuntil = 1\n")));
+    };
+    for (const char* potential : {"q^4 + 2*t", "q^4 - 1/t", "q^4*(sin(t)^2 + cos(t)^2)", "q^4 + log(t)*(q - q)"}) {
+        CAPTURE(potential);
+        const System system = system_of(potential, "");
+        CHECK(system.autonomous);
+        CHECK_FALSE(system.lagrangian.has(system.t));
+        CHECK_FALSE(system.potential.has(system.t));
+    }
+    CHECK(system_of("q^4", "[forces]\nq = \"-q'*(sin(t)^2 + cos(t)^2)\"\n").autonomous);
+    CHECK_FALSE(system_of("q^4 + t*q", "").autonomous);
+    CHECK_FALSE(system_of("q^4", "[forces]\nq = \"cos(t)\"\n").autonomous);
+}
