@@ -219,7 +219,7 @@ struct Stepper<K, Form::linear_map> : Motion<K> {
         if (this->time_stands_still()) return Status::time_stands_still;
         real q1[n], p1[n];
         if constexpr (in_lanes)
-            propagate(q1, p1);
+            propagate(columns, q1, p1);
         else
             K::propagate(coefficients, +q, +p, +q1, +p1);
         real sum = real(0);
@@ -264,15 +264,15 @@ struct Stepper<K, Form::linear_map> : Motion<K> {
     Status jacobian(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
 
     // (D20), rows side by side.
-    void propagate(real* q1, real* p1) const {
+    template <class Columns>
+    void propagate(const Columns& column, real* q1, real* p1) const {
         using V = Pack<real, width>;
         V sum[rows / width];
         real moved[rows];
-        for (int r = 0; r < rows / width; ++r) sum[r] = V::load(columns + 2 * n * rows + r * width);
+        for (int r = 0; r < rows / width; ++r) sum[r] = V::load(column + 2 * n * rows + r * width);
         const auto add = [&](int c, real x) LOBATTO_FORMULA {
 #pragma GCC unroll 8
-            for (int r = 0; r < rows / width; ++r)
-                sum[r] = fused(V::load(columns + c * rows + r * width), V(x), sum[r]);
+            for (int r = 0; r < rows / width; ++r) sum[r] = fused(V::load(column + c * rows + r * width), V(x), sum[r]);
         };
         for (int c = 0; c < n; ++c) add(c, q[c]);
         for (int c = 0; c < n; ++c) add(n + c, p[c]);
