@@ -85,6 +85,7 @@ TEST_CASE("a run says how good it is and where its trajectory is") {
         "  energy error            \\S+ at most, relative \\S+\n"
         "  symplectic defect       \\S+\n"
         "  position error          \\S+ rad at most, against the exact elliptic solution\n"
+        "  estimated error         \\S+ of the amplitude at the end, from the steps' polynomials\n"
         "  trajectory              \\S+/run.csv, 2401 states\n");
     CHECK_MESSAGE(std::regex_match(first.out, table), first.out);
     const test::Finished second = place.run({pendulum, "-o", place.file("again.csv")});
@@ -261,7 +262,8 @@ TEST_CASE("an interrupted run keeps what was computed, says so and returns 130")
         const Signalled run = signal_long_run(place, signal);
         CHECK(run.exit_code == 130);
         CHECK(run.err.starts_with("lobatto: interrupted at t = "));
-        CHECK(run.err.ends_with("; what was computed is in " + place.file() + ".\n"));
+        CHECK(run.err.ends_with("; what was computed is in " + place.file() +
+                                ". The same command with --resume goes on from there.\n"));
         const TrajectoryTable table = read_trajectory(place.file());
         CHECK(table.rows.size() > 100);
         CHECK(!std::filesystem::exists(place.file() + ".partial"));
@@ -300,12 +302,12 @@ TEST_CASE("a reader that goes away does not cost the trajectory") {
         test::run({"sh", "-c", "'" LOBATTO_PROGRAM "' run '" + pendulum + "' -o '" + place.file() + "' | true"});
     CHECK(done.err == "");
     CHECK(read_trajectory(place.file()).rows.size() == 2401);
-    // Rows to a pipe that closes: ended quietly.
+    // Rows to a pipe that closes.
     const test::Finished head = test::run(
         {"sh", "-c",
          "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
     CHECK(head.out == "t,q,p_q,H\n");
-    CHECK(head.err == "");
+    CHECK(head.err == "lobatto: cannot write the trajectory to /dev/stdout: Broken pipe. Its reader has gone\n");
 }
 
 TEST_CASE("a run keeps only what the scene asks for") {
