@@ -87,10 +87,11 @@ void tradeoff(const TradeoffOptions& options) {
     write(folder + "/tradeoff.csv", csv_of(laboratory));
     const std::string json = json_of(laboratory);
     write(folder + "/tradeoff.json", json);
+    fmt::print("\n{}", estimate_text(laboratory));
     if (!interrupted) {
         const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
         write(folder + "/report.html", report_page(laboratory, folder, pictures, json));
-        fmt::print("\n{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
+        fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
                    fmt::join(pictures, ".svg, "));
     } else {
         fmt::print(stderr,

@@ -265,6 +265,7 @@ bool are_neighbours(const Elements& elements) {
     std::size_t rows = 0, in_runs = 0;
     for (const Element& element : elements.repeated) {
         if (element.target >= 0) return false;
+        if (element.x.empty()) continue;
         rows += element.rows.size();
         for (const RowRun& run : runs_of(element)) {
             if (run.count < static_cast<int>(fewest_rows)) continue;

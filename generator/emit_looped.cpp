@@ -176,6 +176,7 @@ std::vector<RowFunction> LoopedText::row_functions() const {
     std::vector<RowFunction> result;
     for (std::size_t number = 0; neighbours_ && number < d_.structure.elements.repeated.size(); ++number) {
         const Element& element = d_.structure.elements.repeated[number];
+        if (element.x.empty()) continue;
         const std::string name = element_name(number);
         std::vector<Statement> list;
         for (const Output& output : program(name + "_slope").outputs)
@@ -208,6 +209,7 @@ std::string LoopedText::along_rows() const {
     bool is_first = true;
     for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
         const Element& element = d_.structure.elements.repeated[number];
+        if (element.x.empty()) continue;  // a constant that repeats: of the energy, not of the forces
         const std::string name = element_name(number);
         const bool sets = is_first && covers(element);
         if (is_first && !sets) text += "        how::template clear<coordinates>(W);\n";

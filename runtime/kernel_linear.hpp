@@ -5,8 +5,11 @@
 #ifndef LOBATTO_KERNEL_LINEAR_HPP
 #define LOBATTO_KERNEL_LINEAR_HPP
 
+#include <type_traits>
+
 #include "kernel_contract.hpp"
 #include "kernel_numbers.hpp"
+#include "kernel_pack.hpp"
 #include "kernel_solve.hpp"
 
 namespace lobatto {
@@ -186,11 +189,20 @@ struct Stepper<K, Form::linear_map> : Motion<K> {
     using Motion<K>::n, Motion<K>::coefficients, Motion<K>::q;
     static constexpr int N = 0;
     static constexpr int nodes = K::points;
+    // Of a few coordinates and more, the rows of Phi - I lie in lanes, column after column.
+    static constexpr int width = native_lanes<real>, rows = (2 * n + width - 1) / width * width;
+    static constexpr bool in_lanes = n >= 4 && width > 1;
+    struct Nothing {};
     real p[n]{};  // momentum
+    std::conditional_t<in_lanes, real[(2 * n + 1) * rows], Nothing> columns{};
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         this->step_size = h;
-        return K::prepare(parameters, h, coefficients);
+        const Status status = K::prepare(parameters, h, coefficients);
+        if constexpr (in_lanes)
+            for (int r = 0; r < 2 * n; ++r)
+                for (int c = 0; c <= 2 * n; ++c) columns[c * rows + r] = coefficients.Phi_minus_I[r * (2 * n + 1) + c];
+        return status;
     }
 
     Status start(real time, const real* position, const real* momentum) {
@@ -206,7 +218,10 @@ struct Stepper<K, Form::linear_map> : Motion<K> {
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
         real q1[n], p1[n];
-        K::propagate(coefficients, +q, +p, +q1, +p1);
+        if constexpr (in_lanes)
+            propagate(columns, q1, p1);
+        else
+            K::propagate(coefficients, +q, +p, +q1, +p1);
         real sum = real(0);
         for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (p1[k] - p1[k]);
         if (!(sum == real(0))) return Status::not_finite;
@@ -247,6 +262,26 @@ struct Stepper<K, Form::linear_map> : Motion<K> {
     }
     Status residual(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
     Status jacobian(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
+
+    // (D20), rows side by side.
+    template <class Columns>
+    void propagate(const Columns& column, real* q1, real* p1) const {
+        using V = Pack<real, width>;
+        V sum[rows / width];
+        real moved[rows];
+        for (int r = 0; r < rows / width; ++r) sum[r] = V::load(column + 2 * n * rows + r * width);
+        const auto add = [&](int c, real x) LOBATTO_FORMULA {
+#pragma GCC unroll 8
+            for (int r = 0; r < rows / width; ++r) sum[r] = fused(V::load(column + c * rows + r * width), V(x), sum[r]);
+        };
+        for (int c = 0; c < n; ++c) add(c, q[c]);
+        for (int c = 0; c < n; ++c) add(n + c, p[c]);
+        for (int r = 0; r < rows / width; ++r) sum[r].store(moved + r * width);
+        for (int k = 0; k < n; ++k) {
+            q1[k] = q[k] + moved[k];
+            p1[k] = p[k] + moved[n + k];
+        }
+    }
 
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {

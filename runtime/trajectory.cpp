@@ -29,7 +29,7 @@ double processor_seconds() {
 constexpr std::int64_t rows_at_once = 4096;  // the records in memory, however long the run
 constexpr double block_seconds = 0.02;       // of a block of steps: an interruption is noticed within about twice this
 constexpr double progress_seconds = 0.1;
-constexpr double checkpoint_seconds = 0.1;   // between two checkpoints, unless
+constexpr double checkpoint_seconds = 0.1;    // between two checkpoints, unless
 constexpr double checkpoint_part = 1.0 / 50;  // of the time would go into them
 
 // Watches the kept states go by: their energies, and the sink.

@@ -41,7 +41,8 @@ TEST_CASE("a sweep has the same bytes from a new cache and with any number of th
     const TemporaryFolder folder;
     std::string first;
     for (const char* threads : {"1", "2", "3", "7"}) {
-        const EnvironmentVariable variable("LOBATTO_CACHE_DIR", folder / (threads == std::string("1") ? "one" : "more"));
+        const EnvironmentVariable variable("LOBATTO_CACHE_DIR",
+                                           folder / (threads == std::string("1") ? "one" : "more"));
         const Finished done = run({LOBATTO_PROGRAM, "sweep", scene_file("henon_heiles"), "--vary", "x=0:0.3:23",
                                    "--until", "20", "--threads", threads, "-o", folder / "sweep.csv"});
         REQUIRE_MESSAGE(done.exit_code == 0, done.err);

@@ -5,7 +5,6 @@
 #include <doctest/doctest.h>
 #include <sys/stat.h>
 
-#include <chrono>
 #include <string>
 
 #include "tests/support.hpp"
@@ -634,21 +633,6 @@ TEST_CASE("a Lagrangian may hold comments, which its text leaves out") {
     const std::string lagrangian =
         "lagrangian = '''\nm*q'^2/2   # kinetic\n  # only a comment\n - k*q^2/2 # [potential'''";
     CHECK(read(with_line(1, lagrangian)).lagrangian_text == "m*q'^2/2 - k*q^2/2");
-}
-
-TEST_CASE("256 masses are read in a few hundredths of a second, 4096 within a second") {
-    const auto seconds = [](const std::string& n) {
-        const std::string text =
-            "lagrangian = \"sum(i = 1 .. n, x[i]'^2)/2 - sum(i = 1 .. n - 1, (x[i+1] - x[i])^2/2 + (x[i+1] - "
-            "x[i])^4/4)\"\n[coordinates]\nx = { count = \"n\", position = \"sin(pi*i/(n+1))\", velocity = 0 }\n"
-            "[parameters]\nn = { value = " +
-            n + ", constant = true }\n[run]\nstep = 1\nuntil = 1\n";
-        const auto begin = std::chrono::steady_clock::now();
-        CHECK(read(text).coordinates.size() == std::stoul(n));
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    };
-    CHECK(seconds("256") < 0.25);
-    CHECK(seconds("4096") < 4);
 }
 
 TEST_CASE("4096 coordinates and 10000 parameters are read, one more is refused") {

@@ -12,6 +12,9 @@ namespace lobatto {
 // What is to be said before any number: what the errors are errors of.
 std::string reference_text(const Laboratory& laboratory);
 
+// How `lobatto run`'s estimate of the error follows the true one here; empty when too little was measured.
+std::string estimate_text(const Laboratory& laboratory);
+
 // Pareto's front, thinned to about two rows a decade.
 std::vector<Measurement> front_rows_of(const Laboratory& laboratory);
 std::string front_table(const Laboratory& laboratory);

@@ -125,7 +125,9 @@ Measurement polish(Laboratory& laboratory, const Measurement& crossing, double g
     const StepLadder ladder = ladder_of(laboratory, fine_ratio);
     std::vector<double> tolerances = {0};
     const double exponent = std::floor(std::log10(goal));
+    const bool iterates = laboratory.workshop().kernel(member)->linear == 0;
     for (const double below : {0.0, 1.0, 2.0, 3.0, 4.0}) {
+        if (!iterates) break;
         const double tolerance = std::pow(10.0, std::clamp(exponent - below, -14.0, -3.0));
         if (tolerances.back() != tolerance) tolerances.push_back(tolerance);
     }
