@@ -154,14 +154,17 @@ void run(const RunOptions& options) {
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
     Watch watch(scene, derivation.structure, stepper, velocity);
+    StepJudge judge(scene);
     std::vector<double> counts(1 + event_kinds, 0);  // of the states and of each kind of event
     std::optional<Checkpoint> from;
     if (options.resume) {
         from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.seen().size());
         if (from) {
-            std::vector<double> seen(from->watched.begin() + std::ssize(counts), from->watched.end());
-            watch.go_on_after(seen);
-            std::copy_n(from->watched.begin(), counts.size(), counts.begin());
+            const auto by_watch = from->watched.begin() + std::ssize(counts),
+                       by_judge = by_watch + std::ssize(watch.seen());
+            std::copy(from->watched.begin(), by_watch, counts.begin());
+            watch.go_on_after({by_watch, by_judge});
+            judge.go_on_after({by_judge, from->watched.end()});
             request.from = &from->halfway;
         }
         if (!options.quiet)
@@ -189,11 +192,11 @@ void run(const RunOptions& options) {
                 event_file->sync();
                 checkpoint.sizes.push_back(event_file->size());
             }
-            for (const double number : watch.seen()) checkpoint.watched.push_back(number);
+            for (const std::vector<double>& seen : {watch.seen(), judge.seen()})
+                checkpoint.watched.insert(checkpoint.watched.end(), seen.begin(), seen.end());
             write_checkpoint(checkpoint_path(path), checkpoint);
         };
     }
-    StepJudge judge(scene);
     request.sink = [&](const Records& records) {
         file.write(records);
         watch.look(records);

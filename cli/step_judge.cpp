@@ -50,6 +50,30 @@ void StepJudge::look(const Records& records) {
     }
 }
 
+std::vector<double> StepJudge::seen() const {
+    std::vector<double> all{static_cast<double>(seen_), static_cast<double>(stride_)};
+    all.insert(all.end(), least_.begin(), least_.end());
+    all.insert(all.end(), most_.begin(), most_.end());
+    for (const std::vector<double>& row : some_) all.insert(all.end(), row.begin(), row.end());
+    return all;
+}
+
+void StepJudge::go_on_after(const std::vector<double>& seen) {
+    const std::ptrdiff_t width = 2 * std::ssize(groups_);
+    auto at = seen.begin();
+    const auto take = [&](std::ptrdiff_t count) {
+        std::vector<double> part(at, at + count);
+        at += count;
+        return part;
+    };
+    if (std::ssize(seen) < 2 + 2 * width) return;  // nothing was kept yet
+    seen_ = std::llround(*at++);
+    stride_ = std::llround(*at++);
+    least_ = take(width);
+    most_ = take(width);
+    while (seen.end() - at > width) some_.push_back(take(1 + width));
+}
+
 StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel& kernel,
                                       const TrajectoryRequest& request, const TrajectoryResult& result) const {
     Judgement judgement;

@@ -18,6 +18,10 @@ public:
     explicit StepJudge(const Scene& scene);
     void look(const Records& records);
 
+    // What it has seen so far, for a later run that goes on.
+    std::vector<double> seen() const;
+    void go_on_after(const std::vector<double>& seen);
+
     struct Judgement {
         std::optional<double> error;  // estimated, relative to the amplitude; nothing without dense output
         double radians = 0;           // h times the largest frequency met; 0: not looked for
