@@ -218,7 +218,7 @@ void run(const RunOptions& options) {
 
     if (!options.quiet) {
         print_table(derivation, stepper, request, result, watch);
-        if (!from && result.status == LOBATTO_OK && result.steps_done > 1) {  // resumed, it has not seen all
+        if (result.status == LOBATTO_OK && result.steps_done > 1) {
             const StepJudge::Judgement judgement = judge.judge(derivation, kernel, request, result);
             if (judgement.error)
                 print_row(

@@ -55,9 +55,9 @@ std::vector<std::string> command(const Subject& subject, const std::filesystem::
     return words;
 }
 
-// What the program says of the run, without what it measured of the time; a resumed run does not estimate its error.
+// What the program says of the run, without what it measured of the time.
 std::string said(const std::string& out) {
-    const std::regex own("  (time per step|resumed|estimated error|trajectory) .*\n|, in .*");
+    const std::regex own("  (time per step|resumed|trajectory) .*\n|, in .*");
     return std::regex_replace(out.substr(out.find('\n')), own, "");
 }
 
