@@ -47,8 +47,12 @@ void Watch::look_at_end(const TrajectoryResult& result) {
 }
 
 std::vector<double> Watch::seen() const {
-    return {position_error_, static_cast<double>(seen_), static_cast<double>(compared_), static_cast<double>(stride_),
-            discrete_start_, discrete_error_};
+    return {position_error_,
+            static_cast<double>(seen_),
+            static_cast<double>(compared_),
+            static_cast<double>(stride_),
+            discrete_start_,
+            discrete_error_};
 }
 
 void Watch::go_on_after(const std::vector<double>& seen) {

@@ -19,7 +19,7 @@ struct Compiled {
     std::string object;   // path of the shared object in the cache
     std::string command;  // the command that made it
     bool from_cache = false;
-    double seconds = 0;  // spent compiling; 0 on a hit
+    double seconds = 0;        // spent compiling; 0 on a hit
     bool was_altered = false;  // an object in the cache was not as it had been built, or others could write to it
 };
 

@@ -98,7 +98,8 @@ inline Motion chain() {
 // lengths, masses and couplings differ. Rows of formulas in runs, runs that end, far and near neighbours.
 inline Motion lattice() {
     Motion lattice{
-        "time = \"t\"\nlagrangian = \"sum(i = 1 .. n, (1 + i/n)*x[i]'^2/2 + g*(1 + mod(i, 4))*(cos(x[i]) - 1)) - sum(i = 1 "
+        "time = \"t\"\nlagrangian = \"sum(i = 1 .. n, (1 + i/n)*x[i]'^2/2 + g*(1 + mod(i, 4))*(cos(x[i]) - 1)) - sum(i "
+        "= 1 "
         ".. n, "
         "(k + i/50)*sin((x[i] - x[mod(i, n) + 1])/2)^2) - sum(i = 1 .. n - 2, (x[i] - x[i+2])^4/8) - sum(i = 1 .. n - "
         "9, "
