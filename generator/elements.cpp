@@ -268,8 +268,8 @@ bool are_neighbours(const Elements& elements) {
         if (element.x.empty()) continue;
         rows += element.rows.size();
         for (const RowRun& run : runs_of(element)) {
-            if (run.count < static_cast<int>(fewest_rows)) continue;
-            in_runs += static_cast<std::size_t>(run.count);
+            if (run.count == 1) continue;
+            if (run.count >= static_cast<int>(fewest_rows)) in_runs += static_cast<std::size_t>(run.count);
             const std::vector<int>&here = element.rows[static_cast<std::size_t>(run.begin)],
                   &first = element.rows.front();
             for (std::size_t j = 1; j < here.size(); ++j)

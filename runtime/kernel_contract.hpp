@@ -141,7 +141,8 @@ struct Pause {
     std::int32_t left{};   // steps
     std::int32_t next{1};  // how many, the next time that sweeps fail
 
-    bool is_over() { return left == 0 || --left == 0; }  // asked once a step
+    // Once a step: whether the pause is over with it.
+    bool count_down() { return left == 0 || --left == 0; }
     void succeed() { next = 1; }
     void fail() {
         left = next;

@@ -381,7 +381,7 @@ private:
     template <class AnySwept>
     bool sweep(AnySwept& any) {
         const bool paused = any.pause.left > 0;
-        if (!any.pause.is_over()) return false;
+        if (!any.pause.count_down()) return false;
         if (paused) any.sweeps.recall([this](int c, int i) { return node_velocity(c, i); });
         real q1[n], p1[n];
         for (int k = 0; k < n; ++k) {

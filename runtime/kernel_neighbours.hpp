@@ -21,25 +21,31 @@
 namespace lobatto {
 
 // Rows of a repeated formula: its variables x, and what it gives for each, to be added to W. V: a number, of one row;
-// or, `in_lanes`, a Pack of rows that follow one another.
+// or, `in_lanes`, a Pack of `count` rows that follow one another from `row` on.
 template <class V, int variables, bool in_lanes>
 struct Rows {
     V x[variables], result[variables]{};
-    int row;
+    int row, count;
 
     // A coefficient, of which the table has one value a row.
     template <class number>
     LOBATTO_INLINE auto of(const number* table) const {
-        if constexpr (in_lanes)
-            return V::load(table + row);
-        else
+        if constexpr (!in_lanes) {
             return table[row];
+        } else {
+            if (count == lanes_of<V>) return V::load(table + row);
+            number first[lanes_of<V>]{};
+            for (int i = 0; i < count; ++i) first[i] = table[row + i];
+            return V::load(first);
+        }
     }
 };
 
-// Going through rows of formulas. `indices` has the `variables` of each row; a run is rows whose variables are those of
-// the row before plus one. All long runs have the same distances between the variables of a row.
+// Shorter runs of rows are not worth a Pack.
 constexpr int long_run = 8;
+
+// Going through rows of formulas. `indices` has the `variables` of each row; a run is rows whose variables are those of
+// the row before plus one. All runs of more than one row have the same distances between the variables of a row.
 template <int variables, const auto& indices>
 struct RowLoop {
     // How far variable j is behind the first.
@@ -85,6 +91,7 @@ struct RowLoop {
         const auto add = [&](auto is_whole) LOBATTO_FORMULA {
             Rows<V, variables, in_lanes> rows;
             rows.row = begin + r;
+            rows.count = is_whole ? width : count - r;
             each(every, [&](auto j) LOBATTO_FORMULA { rows.x[j] = load(q + offset(j) + r); });
             formula(rows);
             V sum = adds ? load(W + r) : V(real_of<number>(0));
@@ -121,6 +128,7 @@ struct RowLoop {
         for (int row = begin; row < begin + count; ++row) {
             Rows<number, variables, false> one;
             one.row = row;
+            one.count = 1;
             for (int j = 0; j < variables; ++j) one.x[j] = q[indices[row * variables + j]];
             formula(one);
             for (int j = 0; j < variables; ++j) W[indices[row * variables + j]] += one.result[j];

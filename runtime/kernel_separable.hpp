@@ -405,7 +405,7 @@ private:
     template <class AnySwept>
     bool sweep(AnySwept& any) {
         const bool paused = any.pause.left > 0;
-        if (!any.pause.is_over()) return false;
+        if (!any.pause.count_down()) return false;
         if (paused) {
             const auto acceleration = [this](int i, int k) { return node_acceleration(i, k); };
             if constexpr (along_coordinates)

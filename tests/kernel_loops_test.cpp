@@ -37,6 +37,9 @@ struct LoopedPendulum : HandwrittenPendulum {
     static constexpr int position[1] = {0}, group_count = 1, group_first[2] = {0, 1}, group_bandwidth[1] = {0};
 };
 
+constexpr int spring_ends[] = {0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9, 10, 10, 11};  // of 11 springs
+constexpr int spring_runs[] = {0, 11};
+
 }  // namespace
 
 TEST_CASE("loops take the steps of written-out stage functions") {
@@ -150,4 +153,20 @@ TEST_CASE("the tangent map of the chain agrees with differences") {
     std::vector<double> many(32), T_long(64 * 64);
     CHECK(in_first_mode<Long>(0.3, 1)->tangent(0, many.data(), many.data(), many.data(), many.data(), T_long.data()) ==
           Status::unsupported);
+}
+
+TEST_CASE("rows side by side are those one by one, and read no coefficient that is not there") {
+    const std::vector<double> stiffness = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};  // on the heap: sanitisers see its end
+    const auto springs = [&](auto& rows) {
+        const auto force = rows.of(stiffness.data()) * (rows.x[1] - rows.x[0]);
+        rows.result[0] = force;
+        rows.result[1] = -force;
+    };
+    constexpr int room = 12 + 2 * native_lanes<double>;
+    double q[room]{}, side_by_side[room]{}, one_by_one[room]{};
+    for (int i = 0; i < 12; ++i) q[i] = i * i;
+    SideBySide::add_rows<2, spring_ends, spring_runs>(q, side_by_side, springs);
+    OneByOne::add_rows<2, spring_ends, spring_runs>(q, one_by_one, springs);
+    for (int i = 0; i < room; ++i) CHECK(side_by_side[i] == one_by_one[i]);
+    CHECK(one_by_one[11] == -11.0 * (121 - 100));
 }
