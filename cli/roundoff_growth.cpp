@@ -113,7 +113,7 @@ struct Course {
 Course follow(const Kernels& kernels, const ExactStart& start, double step, int number,
               const std::vector<std::int64_t>& looks, const volatile int* interrupted) {
     StartIn<double> in_double = start_in(start, kernels.plain, step);
-    const double factor = 1 + number / 1000.0;
+    const double factor = 1 + number * 0x1p-20;
     for (double& q : in_double.q) q *= factor;
     for (double& p : in_double.p) p *= factor;
     const auto quad_of = [](const std::vector<double>& values) {

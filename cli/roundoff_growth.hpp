@@ -30,7 +30,7 @@ struct RoundoffResult {
     bool interrupted = false;
 };
 
-// Trajectory i begins at (1 + i/1000) times the scene's positions and momenta. What rounding does is seen beside clean
+// Trajectory i begins at (1 + i/2^20) times the scene's positions and momenta. What rounding does is seen beside clean
 // steps in long double from the very same numbers, energies are evaluated in quadruple precision, of both numbers that
 // clean arithmetic has for a position. Nothing is said of the method's own error, which both share. ComputationError
 // where a step fails; InputError without a constant mass matrix. Ends early once `interrupted` is raised.
