@@ -123,10 +123,12 @@ std::string figure_document(const std::vector<Figure>& figures) {
         if (figure.growth.empty()) continue;
         text +=
             "\nGrowth of the running maximum, least-squares slope per period:\n\n"
-            "| h | paper's caption | ours, double | ours, extended | maximum |\n|--:|--:|--:|--:|--:|\n";
+            "| h | paper's caption | ours, double | ours, extended | maximum | rounding, plain | rounding, clean |\n"
+            "|--:|--:|--:|--:|--:|--:|--:|\n";
         for (const Growth& growth : figure.growth)
-            text += fmt::format("| {} | {:.2e} | {:.2e} | {:.2e} | {:.2e} |\n", growth.step, growth.printed,
-                                growth.slope, growth.slope_extended, growth.largest);
+            text += fmt::format("| {} | {:.2e} | {:.2e} | {:.2e} | {:.2e} | {:.1e} | {:.1e} |\n", growth.step,
+                                growth.printed, growth.slope, growth.slope_extended, growth.largest,
+                                growth.rounding_plain, growth.rounding_clean);
         text += "\n" + figure.remark + "\n";
     }
     return text;
@@ -167,11 +169,13 @@ std::string growth_lines(const std::vector<Figure>& figures) {
     std::string text;
     for (const Figure& figure : figures) {
         if (figure.growth.empty()) continue;
-        text += fmt::format("\n{}: growth per period\n{:>8}{:>11}{:>14}{:>16}{:>11}\n", figure.title, "h", "caption",
-                            "ours, double", "ours, extended", "maximum");
+        text +=
+            fmt::format("\n{}: growth per period\n{:>8}{:>11}{:>14}{:>16}{:>11}{:>17}{:>17}\n", figure.title, "h",
+                        "caption", "ours, double", "ours, extended", "maximum", "rounding, plain", "rounding, clean");
         for (const Growth& growth : figure.growth)
-            text += fmt::format("{:>8}{:>11.2e}{:>14.2e}{:>16.2e}{:>11.2e}\n", growth.step, growth.printed,
-                                growth.slope, growth.slope_extended, growth.largest);
+            text += fmt::format("{:>8}{:>11.2e}{:>14.2e}{:>16.2e}{:>11.2e}{:>17.1e}{:>17.1e}\n", growth.step,
+                                growth.printed, growth.slope, growth.slope_extended, growth.largest,
+                                growth.rounding_plain, growth.rounding_clean);
     }
     return text;
 }

@@ -14,6 +14,9 @@ struct Growth {
     double slope = 0;           // in double arithmetic
     double slope_extended = 0;  // in extended arithmetic (64-bit significand)
     double largest = 0;         // the maximum itself at the end
+    // What rounding does until then: the largest |H_d/H_d(0) - 1| of the oscillator, |H - H without rounding|/(m
+    // omega^2) of the pendulum.
+    double rounding_plain = 0, rounding_clean = 0;
 };
 
 struct Figure {

@@ -92,6 +92,18 @@ void run_in(const Kernel& kernel, double step, long steps, const std::function<v
     succeed(stepper.prepare({1, 2 * pi}, static_cast<real>(step)));
     succeed(stepper.start(0, {pi / 2}, {0}));
     look({0, pi / 2, 0});
+    if (kernel->two_fold_state != nullptr) {
+        std::vector<real> q, q_rest, p, p_rest;  // m = 1: the velocity is the momentum
+        for (long done = 1; done <= steps; ++done) {
+            lobatto_advance call{};
+            call.steps = 1;
+            succeed(stepper.advance(call));
+            stepper.two_fold_state(q, q_rest, p, p_rest);
+            const auto sum = [](real value, real rest) { return static_cast<long double>(value) + rest; };
+            look({static_cast<long double>(step) * done, sum(q[0], q_rest[0]), sum(p[0], p_rest[0])});
+        }
+        return;
+    }
     std::vector<real> records(3 * 1024);
     for (long done = 0; done < steps;) {
         lobatto_advance call{};
@@ -126,10 +138,12 @@ double exact_period(PaperSystem system) {
                : static_cast<double>(pendulum_period(omega_squared, std::numbers::pi_v<long double> / 2));
 }
 
-Kernel paper_kernel(PaperSystem system, int points, Precision precision) {
+Kernel paper_kernel(PaperSystem system, int points, Precision precision, StepArithmetic arithmetic) {
     const Source source(system == PaperSystem::oscillator ? "paper_oscillator.toml" : "paper_pendulum.toml",
                         scene_text(system, points));
-    return kernel_of(emit(derive(read_scene(source)), {.precision = precision, .standalone_support = ""}), precision);
+    Scene scene = read_scene(source);
+    scene.method.arithmetic = arithmetic;
+    return kernel_of(emit(derive(scene), {.precision = precision, .standalone_support = ""}), precision);
 }
 
 std::function<long double(const PaperState&)> discrete_energy_of(const Kernel& kernel, double step) {

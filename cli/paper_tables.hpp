@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "generator/emit.hpp"
+#include "generator/scene.hpp"
 #include "runtime/library.hpp"
 
 namespace lobatto {
@@ -23,12 +24,14 @@ long double exact_energy(PaperSystem system, const PaperState& state);
 double exact_period(PaperSystem system);
 
 // The kernel of a system for Lobatto's quadrature with these points (3: Simpson).
-Kernel paper_kernel(PaperSystem system, int points, Precision precision = Precision::double_);
+Kernel paper_kernel(PaperSystem system, int points, Precision precision = Precision::double_,
+                    StepArithmetic arithmetic = StepArithmetic::plain);
 
 // The discrete energy of the oscillator's kernel at this step (eq:discreteEnergy).
 std::function<long double(const PaperState&)> discrete_energy_of(const Kernel& kernel, double step);
 
-// Every state of a run in the kernel's own arithmetic (double or extended), the first included, in order.
+// Every state of a run in the kernel's own arithmetic (double or extended; a clean kernel's states are the sums of both
+// their numbers), the first included, in order.
 void run_kernel(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& look);
 std::vector<PaperState> kernel_states(PaperSystem system, int points, double step, int steps);
 std::vector<PaperState> midpoint_states(PaperSystem system, double step, int steps);

@@ -9,7 +9,8 @@
 //         Q_i = q + gamma_i (u + f_1) + sum_j eta_ij f_j,   q1 = q + h (u + f_1) + sum_j beta_j f_j,   u1 = u + sum f
 //     is symplectic, since eta_ij - eta_ji = gamma_i - gamma_j.
 //   Sweeps go on until they give the same bits again, or no smaller increments.
-//   Position and velocity are sums of two numbers each, and the increments of a step are added without error.
+//   Position and velocity are sums of two numbers each, and the increments of a step are added without error: products
+//     with b_j too, whose rounding is not random where b_j is a simple fraction.
 // The scheme is that of Antonana, Makazaga and Murua (Numer. Algorithms 76, 2017) for Gauss' methods, in the form that
 // methods for second-order equations take here; error-free sums and products are Knuth's and Dekker's.
 #ifndef LOBATTO_KERNEL_CLEAN_HPP
@@ -105,9 +106,8 @@ struct CleanSweeps {
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
     using Layout = NodeLayout<real, real, m>;
     using V = typename Layout::V;
-    static constexpr bool with_end = Layout::with_end;
-    static constexpr int width = Layout::width, count = Layout::count;
-    static constexpr int parts = Layout::parts > 0 ? Layout::parts : 1, evaluation_limit = 60;
+    static constexpr int width = Layout::width, evaluation_limit = 60;
+    static constexpr int parts = m > 0 ? Layout::parts_of(m) : 1;
 
     struct Arrays {
         V first[parts * n], X[parts * n], W[parts * n];
@@ -115,7 +115,7 @@ struct CleanSweeps {
         real q1[n], q1_rest[n], u1[n], u1_rest[n];
     };
 
-    V eta[inner_room][parts];  // a column for each inner node; the row of the step's end has beta
+    V eta[inner_room][parts];  // a column for each inner node
     V gamma[parts];            // h c
     V weight[parts];           // -h b; zero in lanes to spare
     V before[s][parts];        // -h^2 A E: from the accelerations of the step before (D15)
@@ -134,9 +134,8 @@ struct CleanSweeps {
         while (power > real(2) * fabs(h) && power > real(0)) power /= real(2);
         const real unit = power * (Limits<real>::epsilon / real(2));
         if (!(unit > real(0)) || !is_finite(power)) return Status::not_finite;
-        real g[m + 1], e[inner_room * inner_room];
+        real g[inner_room], e[inner_room * inner_room];
         for (int i = 0; i < m; ++i) g[i] = on_grid(h * K::c[i + 1], unit);
-        g[m] = h;
         for (int i = 0; i < m; ++i)
             for (int j = i; j < m; ++j) e[i * m + j] = on_grid(h * (K::A[i * m + j] / K::b[j + 1]), unit);
         for (int i = 0; i < m; ++i)
@@ -145,16 +144,16 @@ struct CleanSweeps {
         beta[0] = h;
         for (int j = 0; j < m; ++j) beta[j + 1] = h - g[j];
         beta[s - 1] = real(0);
-        for (int i = 0; i < parts * width; ++i) {
-            const int row = i < count ? i : count - 1;
+        for (int i = 0; i < parts * width && m > 0; ++i) {
+            const int row = i < m ? i : m - 1;
             const auto put = [i](V* values, real x) { set_lane(values[i / width], i % width, x); };
-            put(gamma, row < 0 ? h : g[row]);
+            put(gamma, g[row]);
             put(node_time, h * K::c[row + 1]);
-            put(weight, i < count ? impulse[i + 1] : real(0));
+            put(weight, i < m ? impulse[i + 1] : real(0));
             real sum = real(0), extrapolated[s] = {};
             for (int j = 0; j < m; ++j) {
-                const real entry = row < m ? e[row * m + j] : beta[j + 1], stage = impulse[j + 1] * entry;
-                put(eta[j], entry);
+                const real stage = impulse[j + 1] * e[row * m + j];
+                put(eta[j], e[row * m + j]);
                 sum += stage;
                 for (int l = 0; l < s; ++l) extrapolated[l] += stage * K::E[j * s + l];
             }
@@ -167,10 +166,12 @@ struct CleanSweeps {
     // What the positions of a step are made of before any iteration. W: the accelerations of the step before.
     void set_out(const real* q, const real* u, const real* u_rest, const real* W, Arrays& a) const {
         for (int c = 0; c < n; ++c) {
-            const real rate = u[c] + (impulse[0] * W[(s - 1) * n + c] + u_rest[c]);
+            real rest;
+            const real rate = add_with_error(u[c], impulse[0] * W[(s - 1) * n + c], rest);
+            rest += u_rest[c];
             const real size = Limits<real>::epsilon * (fabs(q[c]) + fabs(h * rate));
             a.in_roundings[c] = size > Limits<real>::smallest ? real(1) / size : real(0);
-            for (int p = 0; p < parts; ++p) a.first[p * n + c] = gamma[p] * V(rate);
+            for (int p = 0; p < parts; ++p) a.first[p * n + c] = fused(gamma[p], V(rate), gamma[p] * V(rest));
         }
     }
 
@@ -233,31 +234,35 @@ struct CleanSweeps {
         for (; c < n; ++c) use(Pack<real, 1>(), c);
     }
 
-    // The end of the step from the accelerations a.W at its inner nodes and, with_end, at its end: q, u, their rests
-    // and W, of all nodes, move on. False, and nothing has moved, where a number is not finite.
+    // The end of the step from the accelerations a.W at its inner nodes: q, u, their rests and W, of all nodes, move
+    // on. False, and nothing has moved, where a number is not finite.
     template <class Given>
-    bool finish(const Given& k, real time, real* q, real* q_rest, real* u, real* u_rest, real* W, bool has_end,
-                Arrays& a) const {
+    bool finish(const Given& k, real time, real* q, real* q_rest, real* u, real* u_rest, real* W, Arrays& a) const {
         real* const next = a.next;
         for (int c = 0; c < n; ++c) {
             for (int p = 0; p < parts; ++p) lay_flat<1>(&a.W[p * n + c], 1, a.flat + p * width);
             next[c] = W[(s - 1) * n + c];
-            for (int j = 0; j < count; ++j) next[(j + 1) * n + c] = a.flat[j];
+            for (int j = 0; j < m; ++j) next[(j + 1) * n + c] = a.flat[j];
         }
         over_coordinates([&](auto lanes, int c) LOBATTO_FORMULA {
             using L = decltype(lanes);
             TwoFold<L> moved{L(real(0)), L(h) * L::load(u_rest + c)};
             moved.add_product(L(h), L::load(u + c));
-            for (int j = 0; j <= m; ++j) moved.add_product(L(beta[j]), L(impulse[j]) * L::load(next + j * n + c));
+            for (int j = 0; j <= m; ++j) {
+                L error;
+                const L f = multiply_with_error(L(impulse[j]), L::load(next + j * n + c), error);
+                moved.add_product(L(beta[j]), f);
+                moved.rest = fused(L(beta[j]), error, moved.rest);
+            }
             moved = TwoFold<L>{L::load(q + c), L::load(q_rest + c)}.sum_with(moved);
             moved.value.store(a.q1 + c);
             moved.rest.store(a.q1_rest + c);
         });
-        if (!has_end) Formulas<K>::acceleration(k, real(time + h), static_cast<const real*>(a.q1), next + (s - 1) * n);
+        Formulas<K>::acceleration(k, real(time + h), static_cast<const real*>(a.q1), next + (s - 1) * n);
         over_coordinates([&](auto lanes, int c) LOBATTO_FORMULA {
             using L = decltype(lanes);
             TwoFold<L> change{L(real(0)), L(real(0))};
-            for (int j = 0; j < s; ++j) change.add(L(impulse[j]) * L::load(next + j * n + c));
+            for (int j = 0; j < s; ++j) change.add_product(L(impulse[j]), L::load(next + j * n + c));
             change = TwoFold<L>{L::load(u + c), L::load(u_rest + c)}.sum_with(change);
             change.value.store(a.u1 + c);
             change.rest.store(a.u1_rest + c);
@@ -316,18 +321,15 @@ private:
             u_old[c] = u[c];
         }
         sweeps.set_out(q, u, u_rest, W, a);
-        const auto finish = [&](bool has_end) {
-            return sweeps.finish(coefficients, time, q, q_rest, u, u_rest, W, has_end, a);
-        };
-        if (pause.count_down() && sweeps.solve(coefficients, time, q, q_rest, W, has_history, a) &&
-            finish(Sweeps::with_end)) {
+        const auto finish = [&] { return sweeps.finish(coefficients, time, q, q_rest, u, u_rest, W, a); };
+        if (pause.count_down() && sweeps.solve(coefficients, time, q, q_rest, W, has_history, a) && finish()) {
             pause.succeed();
             iterations = static_cast<std::int32_t>(sweeps.evaluations);
         } else {
             if (pause.left == 0) pause.fail();
             const Status status = this->workspace.with([&](typename Plain::Arrays& plain) { return newton(plain, a); });
             if (status != Status::ok) return status;
-            if (!finish(false)) return Status::not_finite;
+            if (!finish()) return Status::not_finite;
         }
         for (int c = 0; c < n; ++c) {
             q_before[c] = q_old[c];
