@@ -6,10 +6,8 @@
 #include <limits>
 #include <random>
 
-#include "cli/roundoff_growth.hpp"
 #include "runtime/kernel.hpp"
 #include "tests/handwritten_chain.hpp"
-#include "tests/handwritten_pendulum.hpp"
 
 using namespace lobatto;
 
@@ -20,8 +18,8 @@ using Quad = __float128;
 template <class number, class Tables>
 using Rule = CleanSweeps<HandwrittenChain<number, Tables, 1, Chain::newton>>;
 
-// The largest |eta_ij - eta_ji - (gamma_i - gamma_j)| and |beta_i + gamma_i - h| of a rule's coefficients at a step; and
-// of these rounded one by one.
+// The largest |eta_ij - eta_ji - (gamma_i - gamma_j)| and |beta_i + gamma_i - h| of a rule's coefficients at a step;
+// and of these rounded one by one.
 template <class number, class Tables>
 std::pair<Quad, Quad> symplecticity(number h) {
     using R = Rule<number, Tables>;
@@ -34,13 +32,13 @@ std::pair<Quad, Quad> symplecticity(number h) {
     for (int i = 0; i < R::m; ++i) {
         clean = larger(clean, Quad(rule.beta[i + 1]) + entry(rule.gamma, i) - Quad(h));
         for (int j = 0; j < R::m; ++j) {
-            clean = larger(clean, entry(rule.eta[j], i) - entry(rule.eta[i], j) -
-                                      (entry(rule.gamma, i) - entry(rule.gamma, j)));
+            clean = larger(
+                clean, entry(rule.eta[j], i) - entry(rule.eta[i], j) - (entry(rule.gamma, i) - entry(rule.gamma, j)));
             const auto of = [&](int a, int b) -> Quad {
                 return number(h * (Table::A[a * R::m + b] / Table::b[b + 1]));
             };
-            plain = larger(plain, of(i, j) - of(j, i) -
-                                      (Quad(number(h * Table::c[i + 1])) - Quad(number(h * Table::c[j + 1]))));
+            plain = larger(
+                plain, of(i, j) - of(j, i) - (Quad(number(h * Table::c[i + 1])) - Quad(number(h * Table::c[j + 1]))));
         }
     }
     return {clean, plain};

@@ -45,7 +45,11 @@ const Subject subjects[] = {
      "lagrangian = \"x'^2/2 + y'^2/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 0.7, velocity = 0 }\n"
      "y = { position = 0, velocity = 1.3627 }\n[run]\nstep = 0.05\nuntil = 5000\n[output]\ndense = 1\n"
      "events = [\"y = 0\"]\n",
-     {"--tolerance", "1e-9"}}};
+     {"--tolerance", "1e-9"}},
+    {"clean",
+     "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\npoints = 6\n"
+     "[run]\nstep = 0.1\nuntil = 100000\n[output]\nevery = 37\n",
+     {"--arithmetic", "clean"}}};
 
 std::vector<std::string> command(const Subject& subject, const std::filesystem::path& scene, const std::string& out,
                                  bool resume) {
