@@ -208,23 +208,10 @@ times (no vector registers) and gives three more digits; __float128 is for refer
 
 ## The error that a run estimates
 
-`lobatto run` says what the error probably is, at the cost of some 60 steps: it carries the polynomial of a step on into the next, sees by how much that misses the next step's own polynomial, and
-looks up which harmonic oscillation would be missed as much, and what phase error the method has on it. No constant is fitted. How well that follows the true error, over all members and
-steps measured:
-
-![estimate](choosing/estimate.svg)
-
-True error divided by the estimate: tenth part, median, nine tenths.
-
-| scene | runs | 10 % | 50 % | 90 % |
-|---|---|---|---|---|
-{estimates}
-Of low orders the estimate is good to a factor of some ten. Of high orders it is too small, the more so the less the motion is like an oscillation of one frequency: superconvergence does not
-show in the polynomials. Take it for a warning, not for a promise; `lobatto tradeoff` measures the factor for your scene, and `lobatto tune` does not use it. It also supposes that errors grow in proportion to time, as they do on regular motions; on chaotic ones they grow exponentially, and the estimate is too small.
+`lobatto run` says what the error probably is, and `lobatto tradeoff` calibrates another estimate: [how, and how well](estimate.md).
 )",
         fmt::arg("head", head), fmt::arg("winners", tables.winners), fmt::arg("pictures", tables.pictures),
-        fmt::arg("high", tables.high), fmt::arg("gauss", tables.gauss), fmt::arg("types", tables.types),
-        fmt::arg("estimates", tables.estimates));
+        fmt::arg("high", tables.high), fmt::arg("gauss", tables.gauss), fmt::arg("types", tables.types));
 }
 
 }  // namespace
