@@ -205,27 +205,35 @@ more than 10⁵ would be a ratio above 100: {misses} of {runs}.
         fmt::arg("unknown", unknown.empty() ? "" : "Not here, for want of runs with such errors: " + unknown + "."));
 }
 
-void draw_estimates(const std::map<std::string, std::vector<Measurement>>& scenes, const std::string& docs) {
-    std::string run, laws;
+// How often which ratio: in per cent of the runs, in bins of a quarter of a decade.
+void draw_ratios(const std::map<std::string, std::vector<Measurement>>& scenes, const std::string& docs) {
+    std::vector<double> by_run, by_laws;
     for (const auto& [scene, list] : scenes) {
-        const std::vector<Measurement> runs = telling(list, least);
+        std::vector<Measurement> runs = telling(list, least);
         const Calibration calibration = calibrate(runs);
-        for (const Measurement& m : runs) {
-            run += fmt::format("{:.3e},{:.3e}\n", m.estimate, m.error);
-            for (const Calibration::Law& law : calibration.laws)
-                if (law.member == m.candidate.member) laws += fmt::format("{:.3e},{:.3e}\n", law.error(m), m.error);
-        }
+        by_laws.insert(by_laws.end(), calibration.by_laws.begin(), calibration.by_laws.end());
+        for (const Measurement& m : runs)
+            if (m.growth > 0) by_run.push_back(m.error / m.estimate);
     }
+    const auto shares = [](const std::vector<double>& ratios) {
+        std::string text;
+        for (int bin = -18; bin <= 18; ++bin) {
+            const auto count = std::count_if(ratios.begin(), ratios.end(),
+                                             [&](double x) { return std::lround(4 * std::log10(x)) == bin; });
+            text += fmt::format("{:.4g},{:.4g}\n", bin / 4.0,
+                                100 * static_cast<double>(count) / static_cast<double>(ratios.size()));
+        }
+        return text;
+    };
     draw(docs + "/choosing", "estimate",
-         fmt::format("$run << END\n{}END\n$laws << END\n{}END\nset logscale xy\nset format \"10^{{%T}}\"\n"
-                     "set xrange [1e-13:10]\nset yrange [1e-12:0.3]\nset key outside right center vertical Left "
-                     "reverse samplen 2\n"
-                     "set xlabel \"estimated\"\nset ylabel \"true error\"\n"
-                     "plot $run using 1:2 with points pt 7 ps 0.25 title \"by `lobatto run`\", \\\n"
-                     "     $laws using 1:2 with points pt 7 ps 0.25 title \"calibrated\", \\\n"
-                     "     x with lines ls 1 title \"equal\"\n",
-                     run, laws),
-         960, 520, "The pictures need gnuplot: apt-get install gnuplot-nox.");
+         fmt::format(
+             "$run << END\n{}END\n$laws << END\n{}END\nset format x \"10^{{%g}}\"\n"
+             "set xrange [-4.5:4.5]\nset key inside top right vertical maxrows 2 Left reverse samplen 2\n"
+             "set xlabel \"true error / estimated error\"\nset ylabel \"runs, per cent in a quarter of a decade\"\n"
+             "plot $laws using 1:2 with histeps ls 2 title \"calibrated\", \\\n"
+             "     $run using 1:2 with histeps ls 1 title \"lobatto run\"\n",
+             shares(by_run), shares(by_laws)),
+         760, 400, "The pictures need gnuplot: apt-get install gnuplot-nox.");
 }
 
 }  // namespace
@@ -235,7 +243,7 @@ int main(int argc, char** argv) {
     try {
         if (words.size() == 3 && words[0] == "--page") {
             const auto scenes = read(words[1]);
-            draw_estimates(scenes, words[2]);
+            draw_ratios(scenes, words[2]);
             PartialFile file(words[2] + "/estimate.md", "the page");
             file.write(page_of(scenes));
             file.finish();

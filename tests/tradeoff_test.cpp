@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <regex>
@@ -17,6 +18,9 @@
 #include "cli/error_estimate.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/stability_limit.hpp"
+#include "cli/step_judge.hpp"
+#include "cli/tradeoff/calibration.hpp"
+#include "cli/tradeoff/laboratory.hpp"
 #include "cli/tradeoff/measurement_json.hpp"
 #include "cli/tradeoff/method_text.hpp"
 #include "cli/tradeoff/notebook.hpp"
@@ -370,7 +374,104 @@ TEST_CASE("run warns beyond the linear stability limit") {
             .err == "");
 }
 
+// The largest and the least of true error over estimate, of some members with some steps.
+struct Ratios {
+    double least = 1e300, most = 0;
+    int runs = 0;
+};
+
+Ratios ratios_on(const std::string& name, const std::vector<Member>& members) {
+    const Scene scene = read_scene(LOBATTO_SOURCE_DIR "/scenes/" + name + ".toml");
+    LaboratoryRequest wish;
+    wish.seconds = 120;
+    wish.wanted = 1e-10;
+    wish.first = members;
+    Laboratory laboratory(derive(scene), scene, wish);
+    const double until = laboratory.until(), omega = laboratory.reference().frequency;
+    const StepLadder ladder(laboratory.reference().samples, 1.1);
+    Ratios ratios;
+    for (const Member& member : members)
+        for (const double radians : {2.0, 1.0, 0.5, 0.25, 0.1}) {
+            const Measurement m = laboratory.measure({member, ladder.at_least(until * omega / radians), 0});
+            if (!m.complete || m.growth == 0) continue;
+            if (!(m.error > std::fmax(1e-11, 100 * laboratory.reference().disagreement.back()) && m.error < 0.1))
+                continue;
+            CAPTURE(name);
+            CAPTURE(m.candidate.name());
+            CAPTURE(m.candidate.steps);
+            CAPTURE(m.error);
+            CAPTURE(m.estimate);
+            StepJudge::Judgement judgement;
+            judgement.error = m.estimate;
+            judgement.limit = 1;
+            CHECK(StepJudge::warnings(judgement, m.error).empty());            // keeps what is asked for: no alarm
+            CHECK(StepJudge::warnings(judgement, m.error / 1e6).size() == 1);  // a miss by 1e6 is not silent
+            ratios.least = std::min(ratios.least, m.error / m.estimate);
+            ratios.most = std::max(ratios.most, m.error / m.estimate);
+            ++ratios.runs;
+        }
+    return ratios;
+}
+
+TEST_CASE("the error that a run estimates is near the true one, on regular and chaotic motions and with forces") {
+    const Place place;
+    const Member verlet{Family::lobatto, 2}, eight{Family::lobatto, 8}, gauss{Family::gauss, 3};
+    // Measured: 0.4 ... 1.9, 0.02 ... 0.9, 0.4 ... 20.
+    for (const auto& [name, members] : std::map<std::string, std::vector<Member>>{
+             {"henon_heiles", {verlet, eight}}, {"double_pendulum", {eight}}, {"driven_damped_pendulum", {gauss}}}) {
+        const Ratios ratios = ratios_on(name, members);
+        CAPTURE(name);
+        CHECK(ratios.runs >= 2);
+        CHECK(ratios.least > 1e-3);
+        CHECK(ratios.most < 1e2);
+    }
+}
+
+TEST_CASE("a calibration finds the factor of each member, and leaves out what rounding hides") {
+    std::vector<Measurement> measurements;
+    const auto add = [&](const Member& member, double factor, std::int64_t steps, double jump) {
+        Measurement m;
+        m.complete = true;
+        m.candidate = {member, steps, 0};
+        m.jump = jump;
+        m.error = factor * static_cast<double>(steps) * std::pow(jump, error_power(member.method()));
+        m.estimate = m.error / 2;
+        measurements.push_back(m);
+    };
+    for (const double jump : {1e-3, 1e-4, 1e-5}) {
+        add({Family::lobatto, 4}, 0.5, 100, jump);
+        add({Family::gauss, 2}, 7, 100, jump);
+    }
+    add({Family::gauss, 3}, 1, 100, 1e-3);   // one run is no calibration
+    add({Family::gauss, 4}, 1, 100, 1e-10);  // rounding, which hides all below 30 times as much
+    CHECK(error_power({Family::lobatto, 4, 0}) == 7.0 / 4);
+    CHECK(error_power({Family::gauss, 2, 0}) == 5.0 / 3);
+    const Calibration calibration = calibrate(telling(measurements, 1e-12));
+    REQUIRE(calibration.laws.size() == 2);
+    CHECK(calibration.laws[0].factor == doctest::Approx(0.5));
+    CHECK(calibration.laws[1].factor == doctest::Approx(7));
+    CHECK(calibration.by_run.front() == doctest::Approx(2));
+    for (const double ratio : calibration.by_laws) CHECK(ratio == doctest::Approx(1));
+    CHECK(telling(measurements, 1e-13).size() == 7);
+    measurements.back().error *= 1e8;
+    CHECK(telling(measurements, 1e-13).size() < 7);
+}
+
 TEST_SUITE("slow") {
+    TEST_CASE(
+        "over the library no run that keeps what is asked for is warned of, and none that misses it by 1e6 is not") {
+        const Place place;
+        const Member eight{Family::lobatto, 8}, three{Family::lobatto, 3};
+        // Of these members and steps; docs/estimate.md has all.
+        bool turn = false;
+        for (const char* const name :
+             {"arenstorf", "coupled_oscillators", "figure_eight", "fput_beta", "harmonic_oscillator", "kepler",
+              "lagrange_top", "magnetic_bottle", "mathews_lakshmanan", "morse", "pendulum", "relativistic_oscillator",
+              "spherical_pendulum", "stiff_fput", "swinging_atwood", "swinging_spring", "toda_lattice",
+              "triple_pendulum", "two_pendulums"})
+            ratios_on(name, {(turn = !turn) ? three : eight});
+    }
+
     TEST_CASE("a chaotic motion is not promised further than it is known") {
         const Place place;
         test::Finished refused;
