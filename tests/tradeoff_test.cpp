@@ -417,10 +417,10 @@ TEST_CASE("the error that a run estimates is near the true one, on regular and c
     const Place place;
     const Member verlet{Family::lobatto, 2}, eight{Family::lobatto, 8}, gauss{Family::gauss, 3};
     // Measured: 0.4 ... 1.9, 0.02 ... 0.9, 0.4 ... 20.
-    for (const auto& [name, members] : std::map<std::string, std::vector<Member>>{
+    for (const auto& example : std::map<std::string, std::vector<Member>>{
              {"henon_heiles", {verlet, eight}}, {"double_pendulum", {eight}}, {"driven_damped_pendulum", {gauss}}}) {
-        const Ratios ratios = ratios_on(name, members);
-        CAPTURE(name);
+        const Ratios ratios = ratios_on(example.first, example.second);
+        CAPTURE(example.first);
         CHECK(ratios.runs >= 2);
         CHECK(ratios.least > 1e-3);
         CHECK(ratios.most < 1e2);
