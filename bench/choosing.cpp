@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Writes docs/choosing.md and its pictures from measurements on this machine: which member of the family for what.
 //
-//   bench_choosing [SECONDS a scene]
+//   bench_choosing FOLDER [SCENE...]
+//
+// What is measured is kept in FOLDER and not measured again, so that an interrupted call goes on where it was. With
+// names of scenes only those are measured, and no page is written.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +13,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
-#include <map>
+#include <set>
 
 #include "cli/drawing.hpp"
 #include "cli/tradeoff/pictures.hpp"
@@ -23,6 +26,7 @@ using namespace lobatto;
 namespace {
 
 const std::string docs = LOBATTO_SOURCE_DIR "/docs", folder = docs + "/choosing";
+constexpr double reference_seconds = 60;  // of which the reference takes a part
 constexpr double targets[] = {1e-3, 1e-6, 1e-9, 1e-12};
 
 struct Example {
@@ -69,22 +73,74 @@ std::string ratio_text(const Measurement* a, const Measurement* b) {
 }
 
 struct Tables {
-    std::string winners, gauss, high, types, estimates, pictures;
+    std::string winners, gauss, high, types, stiff, pictures;
 };
 
-struct Point {
-    double error, estimate;
-};
+// What each member takes for each error, so that no table has a gap for want of a measurement: the coarsest steps that
+// reach it; then the fastest few with looser iterations. Runs of more than half a second are not begun.
+void measure_all(Laboratory& laboratory) {
+    Workshop& workshop = laboratory.workshop();
+    const auto say = [&](const Member& member) {
+        laboratory.request().say(
+            fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision)));
+    };
+    std::vector<std::pair<Member, std::vector<double>>> wishes;
+    const std::vector<double> all(std::begin(targets), std::end(targets));
+    for (const Member& member : family_in(Precision::double_)) wishes.emplace_back(member, all);
+    for (const int points : {4, 6, 8, 9})
+        wishes.push_back({{Family::lobatto, points, Precision::single}, {1e-3, 1e-9}});
+    for (const int points : {9, 12}) wishes.push_back({{Family::lobatto, points, Precision::extended}, {1e-12, 1e-17}});
+    wishes.push_back({{Family::lobatto, 12, Precision::quadruple}, {1e-12, 1e-20}});
+    for (const auto& [member, goals] : wishes) workshop.order(member);
+    std::vector<std::vector<Measurement>> reached(std::size(targets));
+    for (const auto& [member, goals] : wishes) {
+        say(member);
+        for (const double goal : goals) {
+            const Crossing crossing = cross(laboratory, member, goal);
+            const auto place = std::find(std::begin(targets), std::end(targets), goal);
+            if (crossing.measurement && member.precision == Precision::double_)
+                reached[static_cast<std::size_t>(place - std::begin(targets))].push_back(*crossing.measurement);
+        }
+    }
+    for (std::size_t i = 0; i < reached.size(); ++i) {
+        std::sort(reached[i].begin(), reached[i].end(),
+                  [](const Measurement& a, const Measurement& b) { return a.seconds < b.seconds; });
+        for (std::size_t k = 0; k < std::min<std::size_t>(4, reached[i].size()); ++k) {
+            say(reached[i][k].candidate.member);
+            polish(laboratory, reached[i][k], targets[i]);
+        }
+    }
+}
 
-void measure(const Example& example, double seconds, Tables& tables,
-             std::map<std::string, std::vector<Point>>& points) {
+// Steps that pass over the fast oscillations of stiff springs: what energy is left.
+constexpr double long_steps[] = {0.5, 1, 2, 2.8, 4, 8, 16};
+
+std::string stiff_rows(Laboratory& laboratory) {
+    const double radians = laboratory.until() * laboratory.reference().frequency;
+    const StepLadder ladder(laboratory.reference().samples, 1.1);
+    std::string rows;
+    for (const Member& member : {Member{Family::lobatto, 2}, Member{Family::lobatto, 4}, Member{Family::lobatto, 8},
+                                 Member{Family::gauss, 1}, Member{Family::gauss, 3}, Member{Family::gauss, 7}}) {
+        rows += fmt::format("| {} |", Candidate{member, 0, 0}.name());
+        for (const double step : long_steps) {
+            const Measurement m = laboratory.measure({member, ladder.at_least(radians / step), 0});
+            rows += m.complete && m.energy_error < 10 ? fmt::format(" {:.0e} |", m.energy_error) : " fails |";
+        }
+        rows += '\n';
+    }
+    return rows;
+}
+
+void measure(const Example& example, const std::string& kept, bool draws, Tables& tables) {
     const Scene scene = read_scene(fmt::format("{}/scenes/{}.toml", LOBATTO_SOURCE_DIR, example.scene));
     LaboratoryRequest request;
-    request.seconds = seconds;
-    request.first = first_of_tour();
+    request.seconds = reference_seconds;
+    request.notebook = fmt::format("{}/{}.jsonl", kept, example.scene);
+    request.first = family_in(Precision::double_);
     request.say = [&](const std::string& what) { fmt::print(stderr, "{}: {}\n", scene.name, what); };
     Laboratory laboratory(derive(scene), scene, request);
-    explore(laboratory);
+    measure_all(laboratory);
+    if (std::string(example.scene) == "stiff_fput") tables.stiff = stiff_rows(laboratory);
     const double until = laboratory.until(), omega = laboratory.reference().frequency;
 
     const auto any = [](const Member&) { return true; };
@@ -119,18 +175,7 @@ void measure(const Example& example, double seconds, Tables& tables,
         ratio_text(fastest(laboratory, 1e-12, in(Precision::quadruple)),
                    fastest(laboratory, 1e-12, in(Precision::double_))));
 
-    std::vector<double> ratios;
-    for (const auto& [key, m] : laboratory.notebook().all())
-        if (m.complete && m.candidate.tolerance == 0 && m.candidate.member.precision == Precision::double_ &&
-            m.estimate > 0 && m.estimate < 1 && m.error > 1e-12 && m.error < 0.1) {
-            ratios.push_back(m.error / m.estimate);
-            points[example.scene].push_back({m.error, m.estimate});
-        }
-    std::sort(ratios.begin(), ratios.end());
-    if (!ratios.empty())
-        tables.estimates +=
-            fmt::format("| `{}` | {} | {:.2g} | {:.2g} | {:.2g} |\n", example.scene, ratios.size(),
-                        ratios[ratios.size() / 10], ratios[ratios.size() / 2], ratios[ratios.size() * 9 / 10]);
+    if (!draws) return;
     const std::string own = folder + "/" + example.scene;
     std::filesystem::create_directories(own);
     draw_pictures(laboratory, own);
@@ -139,35 +184,17 @@ void measure(const Example& example, double seconds, Tables& tables,
     tables.pictures += fmt::format("![{0}](choosing/{0}.svg)\n", example.scene);
 }
 
-void draw_estimates(const std::map<std::string, std::vector<Point>>& points) {
-    std::string data, curves;
-    int number = 0;
-    for (const auto& [scene, list] : points) {
-        data += fmt::format("$e{} << END\n", number);
-        for (const Point& point : list) data += fmt::format("{:.3e},{:.3e}\n", point.estimate, point.error);
-        data += "END\n";
-        curves +=
-            fmt::format(", \\\n     $e{} using 1:2 with points pt {} ps 0.5 title \"{}\"", number, 4 + number, scene);
-        ++number;
-    }
-    draw(folder, "estimate",
-         fmt::format("{}set logscale xy\nset format \"10^{{%T}}\"\nset xrange [1e-14:1]\nset yrange [1e-13:1]\n"
-                     "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
-                     "set xlabel \"estimated from the steps' polynomials\"\nset ylabel \"true error\"\n"
-                     "plot x with lines ls 1 title \"equal\"{}\n",
-                     data, curves),
-         960, 520, "The pictures need gnuplot: apt-get install gnuplot-nox.");
-}
-
 std::string page(const Tables& tables) {
+    std::string dashes;
+    for (std::size_t i = 0; i < std::size(long_steps); ++i) dashes += "---|";
     const std::string head = "| scene | 1e-3 | 1e-6 | 1e-9 | 1e-12 |\n|---|---|---|---|---|\n";
     return fmt::format(
         R"(# Choosing a method
 
 Nobody has to: `lobatto tune SCENE --error 1e-8` chooses, and `lobatto tradeoff SCENE` shows the whole trade on your machine. This page says what they find. Its
-tables and pictures are written by a command, which takes a few minutes and measures on the machine it runs on:
+tables and pictures are written by a command, which takes some ten minutes, measures on the machine it runs on, and goes on where it was when it is called again:
 
-    ninja -C build/release bench_choosing && build/release/bench_choosing
+    ninja -C build/release bench_choosing && build/release/bench_choosing choosing
 
 Errors are the largest on the way to the scene's end, relative to the amplitude of the motion; times are nanoseconds of processor time a unit of the scene's time, on
 one core that was not alone. ω is the largest frequency of the motion.
@@ -185,16 +212,23 @@ The fastest in double precision for an error, its step in units of 1/ω, and wha
 {pictures}
 ## What high orders are good for
 
-How many times longer the best of order up to 6 takes than the best of order 18 to 22:
+How many times longer the best of order up to 6 takes than the best of order 18 to 22 (–: one of the two does not reach this error, or not within half a second):
 
 {head}{high}
 ## When Gauss beats Lobatto
 
-The best Gauss against the best Lobatto, ratio of times (below 1: Gauss is faster; –: one of the two was not measured at this error):
+The best Gauss against the best Lobatto, ratio of times (below 1: Gauss is faster; –: one of the two does not reach this error, or not within half a second):
 
 {head}{gauss}
 Lobatto reuses the gradient at the end of a step and has a node less to solve for; of the same order, it is ahead where the mass is constant. With a mass matrix that depends on the
-position all nodes are solved for, and the two are close. Gauss is stable for every step, Lobatto up to a limit (`lobatto stability`): a step that passes over fast oscillations needs Gauss.
+position all nodes are solved for, and the two are close.
+
+Gauss is stable for every step, Lobatto up to a limit (`lobatto stability`). Steps that pass over the fast oscillations of `stiff_fput`, whose stiff springs hold most of ω, and the largest energy error to the scene's
+end, relative to the energy of motion (fails: the step's equations have no solution, or the energy grows tenfold):
+
+| hω | {long_steps} |
+|---|{dashes}
+{stiff}
 
 ## Number types
 
@@ -206,37 +240,34 @@ What float saves at an error of 1e-3, the least error each type reaches, and how
 float is for ensembles, where twice as many trajectories fit into a register, and errors of 1e-4 will do; one trajectory gains little or nothing. long double costs some 20 to 50
 times (no vector registers) and gives three more digits; __float128 is for references.
 
+`lobatto tune` chooses in double precision, since that is what `lobatto run` computes in: below some 1e-14 it says what is the least, and that `lobatto tradeoff` and `lobatto emit --precision` have more digits.
+
 ## The error that a run estimates
 
-`lobatto run` says what the error probably is, at the cost of some 60 steps: it carries the polynomial of a step on into the next, sees by how much that misses the next step's own polynomial, and
-looks up which harmonic oscillation would be missed as much, and what phase error the method has on it. No constant is fitted. How well that follows the true error, over all members and
-steps measured:
-
-![estimate](choosing/estimate.svg)
-
-True error divided by the estimate: tenth part, median, nine tenths.
-
-| scene | runs | 10 % | 50 % | 90 % |
-|---|---|---|---|---|
-{estimates}
-Of low orders the estimate is good to a factor of some ten. Of high orders it is too small, the more so the less the motion is like an oscillation of one frequency: superconvergence does not
-show in the polynomials. Take it for a warning, not for a promise; `lobatto tradeoff` measures the factor for your scene, and `lobatto tune` does not use it. It also supposes that errors grow in proportion to time, as they do on regular motions; on chaotic ones they grow exponentially, and the estimate is too small.
+`lobatto run` says what the error probably is, and `lobatto tradeoff` calibrates another estimate: [how, and how well](estimate.md).
 )",
         fmt::arg("head", head), fmt::arg("winners", tables.winners), fmt::arg("pictures", tables.pictures),
-        fmt::arg("high", tables.high), fmt::arg("gauss", tables.gauss), fmt::arg("types", tables.types),
-        fmt::arg("estimates", tables.estimates));
+        fmt::arg("long_steps", fmt::join(long_steps, " | ")), fmt::arg("dashes", dashes),
+        fmt::arg("stiff", tables.stiff), fmt::arg("high", tables.high), fmt::arg("gauss", tables.gauss),
+        fmt::arg("types", tables.types));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    const double seconds = argc > 1 ? std::strtod(argv[1], nullptr) : 40;
+    if (argc < 2) {
+        fmt::print(stderr, "bench_choosing FOLDER [SCENE...]\n");
+        return 2;
+    }
+    const std::string kept = argv[1];
+    const std::set<std::string> some(argv + 2, argv + argc);
     try {
+        std::filesystem::create_directories(kept);
         std::filesystem::create_directories(folder);
         Tables tables;
-        std::map<std::string, std::vector<Point>> points;
-        for (const Example& example : examples) measure(example, seconds, tables, points);
-        draw_estimates(points);
+        for (const Example& example : examples)
+            if (some.empty() || some.count(example.scene) != 0) measure(example, kept, some.empty(), tables);
+        if (!some.empty()) return 0;
         PartialFile file(docs + "/choosing.md", "the page");
         file.write(page(tables));
         file.finish();

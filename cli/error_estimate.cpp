@@ -1,13 +1,25 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/error_estimate.hpp"
 
+#include <cln/cln.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <type_traits>
 
 #include "generator/propagation.hpp"
+#include "runtime/polynomial_estimate.hpp"
 
 namespace lobatto {
 
+namespace {
+
+constexpr double turning = 0.25;     // of the swing: what angles turn faster
+constexpr double shortest = 0.5;     // z, below which the leading power of the phase error does
+constexpr double shadow_work = 3e5;  // steps times coordinates that a second run may take
+
+// Coefficients of a polynomial, lowest first.
 std::vector<long double> coefficients_of(const GiNaC::ex& polynomial, const GiNaC::symbol& z) {
     std::vector<long double> result;
     for (int power = 0; power <= polynomial.degree(z); ++power) {
@@ -23,6 +35,101 @@ long double value_of(const std::vector<long double>& polynomial, long double z) 
     long double sum = 0;
     for (std::size_t i = polynomial.size(); i-- > 0;) sum = sum * z + polynomial[i];
     return sum;
+}
+
+template <class real>
+double size(real x) {
+    return std::fabs(static_cast<double>(x));
+}
+
+template <class real>
+lobatto_status start_at(LoadedStepper<real>& stepper, const std::vector<real>& state) {
+    const auto begin = state.begin() + 1, middle = begin + (state.end() - begin) / 2;
+    return stepper.start(state[0], {begin, middle}, {middle, state.end()});
+}
+
+// From where `stepper` is; nothing when a step fails.
+template <class real>
+std::vector<real> state_after(LoadedStepper<real>& stepper, std::int64_t steps) {
+    lobatto_advance call{};
+    call.steps = steps;
+    if (stepper.advance(call) != LOBATTO_OK) return {};
+    real time;
+    std::vector<real> q, p;
+    stepper.state(time, q, p);
+    q.insert(q.end(), p.begin(), p.end());
+    return q;
+}
+
+// The largest distance at the states of a motion that begins beside theirs, in units of that at the start.
+template <class real>
+double growth_of(LoadedStepper<real>& stepper, const States<real>& states, real step,
+                 const std::vector<double>& scale) {
+    const double away = std::is_same_v<real, float> ? 3e-4 : 1e-7;  // of the amplitude: far above rounding
+    std::vector<real> start = states.front();
+    double first = 0, largest = 0;
+    for (std::size_t k = 0; k < scale.size(); ++k) {
+        // Each by its own amplitude: what is far for a heavy body throws a light one out of its way.
+        real low = start[1 + k], high = low;
+        for (const std::vector<real>& state : states)
+            low = std::min(low, state[1 + k]), high = std::max(high, state[1 + k]);
+        const double way = away * static_cast<double>(high - low) * std::cos(1 + 0.7 * static_cast<double>(k));
+        start[1 + k] += static_cast<real>(way);
+        first = std::fmax(first, std::fabs(way) / scale[k]);
+    }
+    if (!(first > 0) || start_at(stepper, start) != LOBATTO_OK) return 0;
+    std::int64_t done = 0;
+    for (const std::vector<real>& state : states) {
+        const std::int64_t steps = std::llround(static_cast<double>((state[0] - start[0]) / step)) - done;
+        if (steps <= 0) continue;
+        const std::vector<real> there = state_after(stepper, steps);
+        if (there.empty()) break;
+        done += steps;
+        for (std::size_t k = 0; k < scale.size(); ++k)
+            largest = std::fmax(largest, size(there[k] - state[1 + k]) / scale[k]);
+    }
+    return largest / first;
+}
+
+template <class real>
+double local_error_of(LoadedStepper<real>& stepper, const States<real>& states, const std::vector<real>& parameters,
+                      real step, const std::vector<double>& scale) {
+    States<real> ends;
+    for (const std::vector<real>& state : states)
+        ends.push_back(start_at(stepper, state) == LOBATTO_OK ? state_after(stepper, 1) : std::vector<real>());
+    double sum = 0;
+    int count = 0;
+    if (stepper.prepare(parameters, step / 2) != LOBATTO_OK) return 0;
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        if (ends[i].empty() || start_at(stepper, states[i]) != LOBATTO_OK) continue;
+        const std::vector<real> halves = state_after(stepper, 2);
+        if (halves.empty()) continue;
+        double difference = 0;
+        for (std::size_t k = 0; k < scale.size(); ++k)
+            difference = std::fmax(difference, size(halves[k] - ends[i][k]) / scale[k]);
+        sum += difference;
+        ++count;
+    }
+    stepper.prepare(parameters, step);
+    return count > 0 ? sum / count : 0;
+}
+
+// cos(x + phase) = a/delta at the short x, where phase is far below the rounding of either side.
+double small_phase(const Propagation& step) {
+    const auto exact = [](const GiNaC::ex& value) {
+        return cln::cl_float(cln::the<cln::cl_R>(GiNaC::ex_to<GiNaC::numeric>(value).to_cl_N()), cln::float_format(60));
+    };
+    const GiNaC::numeric x(static_cast<long>(shortest * 1000), 1000L);
+    const GiNaC::ex cosine = (step.a / step.delta).subs(step.z == x * x);
+    const cln::cl_F angle = exact(x);
+    return std::fabs(cln::double_approx((cln::cos(angle) - exact(cosine)) / cln::sin(angle)));
+}
+
+}  // namespace
+
+double error_power(const Method& method) {
+    const int degree = method.family == Family::lobatto ? method.points - 1 : method.points;
+    return (method.order() + 1.0) / (degree + 1.0);
 }
 
 ErrorEstimate::ErrorEstimate(const Quadrature& quadrature) {
@@ -44,6 +151,8 @@ ErrorEstimate::ErrorEstimate(const Quadrature& quadrature) {
         here_.push_back(here);
     }
     const Propagation step = propagation(quadrature);
+    order_ = quadrature.order();
+    phase_of_short_ = small_phase(step);
     a_ = coefficients_of(step.a, step.z);
     delta_ = coefficients_of(step.delta, step.z);
 }
@@ -61,21 +170,79 @@ double ErrorEstimate::jump(double z) const {
 }
 
 double ErrorEstimate::phase(double z) const {
+    if (z < shortest) return phase_of_short_ * std::pow(z / shortest, order_ + 1);
     const long double square = static_cast<long double>(z) * z;
     const long double cosine = value_of(a_, square) / value_of(delta_, square);
     if (!(std::fabs(cosine) < 1)) return 1;
     return static_cast<double>(std::fabs(std::acos(cosine) - static_cast<long double>(z)));
 }
 
-double ErrorEstimate::after(double steps, double jump_of_step) const {
-    if (!(jump_of_step > 0)) return 0;
-    if (jump(longest_) <= jump_of_step) return 1;
+double ErrorEstimate::of_oscillation(double steps, double jump_of_step) const {
+    if (!(jump_of_step > 0) || jump(longest_) <= jump_of_step) return 0;
     double below = 0, above = longest_;
     for (int halving = 0; halving < 50; ++halving) {
         const double middle = (below + above) / 2;
         (jump(middle) < jump_of_step ? below : above) = middle;
     }
-    return std::min(1.0, steps * phase(above));
+    return steps * phase(above);
 }
+
+double ErrorEstimate::after(double steps, double duration, const Evidence& evidence, double random) const {
+    const double way = evidence.rate * duration,
+                 laws = std::max(
+                     {turning * evidence.swing * way, steps * evidence.local, of_oscillation(steps, evidence.jump)}),
+                 error = laws + random * std::sqrt(steps);
+    return way > 0 ? error * std::fmax(1, evidence.growth / way) : error;
+}
+
+template <class real>
+Evidence evidence_of(LoadedStepper<real>& stepper, const States<real>& states, const std::vector<real>& parameters,
+                     real step, const std::vector<double>& scale, double power, bool energy_tells) {
+    const std::size_t n = scale.size() / 2;
+    Evidence evidence;
+    if (states.size() < 2) return evidence;
+    double sum = 0, motion = 0;
+    int jumps = 0, motions = 0;
+    real lowest = 0, highest = 0;
+    for (const std::vector<real>& state : states) {
+        const auto middle = state.begin() + 1 + static_cast<std::ptrdiff_t>(n);
+        const std::vector<real> q(state.begin() + 1, middle), p(middle, state.end());
+        std::vector<real> v, Lv, Lq;
+        if (stepper.velocity(state[0], q, p, v) != LOBATTO_OK) continue;
+        stepper.slopes(state[0], q, v, Lv, Lq);
+        double product = 0;
+        for (std::size_t k = 0; k < n; ++k) {
+            product += static_cast<double>(p[k] * v[k]);
+            evidence.rate = std::fmax(evidence.rate, std::fmax(size(v[k]) / scale[k], size(Lq[k]) / scale[n + k]));
+        }
+        real energy = 0;
+        if (energy_tells && stepper.energy(state[0], q, p, energy) == LOBATTO_OK) {
+            if (motions == 0) lowest = highest = energy;
+            lowest = std::min(lowest, energy);
+            highest = std::max(highest, energy);
+            motion += std::fabs(product);
+            ++motions;
+        }
+        const double here = polynomial_defect(stepper, state[0], q, p, scale);
+        if (!(here >= 0)) continue;
+        sum += std::pow(here, power);
+        ++jumps;
+    }
+    if (jumps > 0) evidence.jump = std::pow(sum / jumps, 1 / power);
+    if (motion > 0) evidence.swing = static_cast<double>(highest - lowest) / (motion / motions);
+    if (!energy_tells) evidence.local = local_error_of(stepper, states, parameters, step, scale);
+    const double work = static_cast<double>((states.back()[0] - states.front()[0]) / step) * static_cast<double>(n);
+    if (work <= shadow_work) evidence.growth = growth_of(stepper, states, step, scale);
+    return evidence;
+}
+
+template Evidence evidence_of(LoadedStepper<float>&, const States<float>&, const std::vector<float>&, float,
+                              const std::vector<double>&, double, bool);
+template Evidence evidence_of(LoadedStepper<double>&, const States<double>&, const std::vector<double>&, double,
+                              const std::vector<double>&, double, bool);
+template Evidence evidence_of(LoadedStepper<long double>&, const States<long double>&, const std::vector<long double>&,
+                              long double, const std::vector<double>&, double, bool);
+template Evidence evidence_of(LoadedStepper<__float128>&, const States<__float128>&, const std::vector<__float128>&,
+                              __float128, const std::vector<double>&, double, bool);
 
 }  // namespace lobatto

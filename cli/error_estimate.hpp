@@ -1,39 +1,75 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What the polynomials of two neighbouring steps tell of the error of a whole run: the error of the harmonic
-// oscillation whose polynomials miss one another as much.
+// What a run tells of its own error: how its energy swings, how far neighbouring motions part, and by how much the
+// polynomials of neighbouring steps miss one another.
 #pragma once
 
 #include <complex>
 #include <vector>
 
 #include "generator/quadrature.hpp"
+#include "runtime/library.hpp"
 
 namespace lobatto {
 
-// For one member of the family. With z = h omega an oscillation of amplitude 1 has
-//     jump(z)  = max |P_before(1 + theta) - P(theta)|, theta = 1/4, 1/2, 3/4 (polynomial_defect),
-//                P through the exact values at the control points,
-//     phase(z) = |arccos(a/delta) - z|, the error of its phase in one step (D20).
-// From the jump of a step z is found, and from z the error: steps * phase(z). Jumps are of the order of the
-// polynomials, errors of that of the method, about twice as high; the oscillation tells how one goes with the other.
+// What some states of a run show. Everything is relative to `scale`, 2n: amplitudes of q and p.
+struct Evidence {
+    double jump = 0;    // (mean of J^b)^(1/b), J = polynomial_defect at a state, b = error_power; 0: no
+                        // dense output
+    double swing = 0;   // of the energy, largest less smallest, in units of the mean of |p v|; 0: does not tell
+    double rate = 0;    // 1/time: the largest |v_k| / scale_k, |p_k'| / scale_{n+k}
+    double local = 0;   // the mean difference, at its end, of a step and two of half its length; 0: not looked at
+    double growth = 0;  // how many times further apart than at the start a neighbouring motion gets; 0: not looked at
+};
+
+// Of a motion of any kind the error of a run is a (steps) J^b with b = (order + 1)/(degree + 1): one step's error has
+// the power order + 1 of the step, J has that of the polynomials' degree + 1. a belongs to the motion and the member:
+// `lobatto tradeoff` measures it (Calibration).
+double error_power(const Method& method);
+
+// For one member of the family.
 class ErrorEstimate {
 public:
     explicit ErrorEstimate(const Quadrature& quadrature);
 
-    // Relative to the amplitude, at most 1, after this many steps; rounding is left out.
-    double after(double steps, double jump) const;
+    // Of a run of `steps` steps that takes `duration`, relative to the amplitude: the larger of what its energy or its
+    // halves say, and its polynomials; docs/estimate.md shows how near that comes.
+    //   Energy: the steps follow a modified energy H + h^p H_p, so H swings as much as h^p H_p does, and angles turn
+    // faster by about the same part: swing/4 * rate * duration. (The quarter is measured.)
+    //   Halves: the errors of single steps, added, where no energy is conserved, or its quadratic part always (Gauss).
+    //   Polynomials: the error of the harmonic oscillation whose polynomials miss one another as much; that of a motion
+    // with harmonics is larger.
+    // A part `random` of the amplitude, in each step: rounding, or what a tolerance leaves out. Where neighbours part
+    // faster than rate * duration, as on chaotic motions, errors do so too.
+    double after(double steps, double duration, const Evidence& evidence, double random = 0) const;
+
+    // The harmonic oscillation of amplitude 1 with z = h omega:
+    //     jump(z)  = max |P_before(1 + theta) - P(theta)|, theta = 1/4, 1/2, 3/4,
+    //                P through the exact values at the control points,
+    //     phase(z) = |arccos(a/delta) - z|, the error of its phase in one step (D20).
     double jump(double z) const;
     double phase(double z) const;
+    // The error after this many steps of the oscillation with this jump; 0 when none has it.
+    double of_oscillation(double steps, double jump) const;
 
 private:
     std::vector<double> control_;
     std::vector<std::vector<double>> ahead_, here_;  // l_j(1 + theta), l_j(theta) for each theta
     std::vector<long double> a_, delta_;             // polynomials in z^2
-    double longest_ = 3;                             // the largest z of interest
+    double phase_of_short_ = 0;                      // phase(shortest)
+    int order_ = 0;
+    double longest_ = 3;  // the largest z of interest
 };
 
-// Coefficients of a polynomial, lowest first, and its value.
-std::vector<long double> coefficients_of(const GiNaC::ex& polynomial, const GiNaC::symbol& z);
-long double value_of(const std::vector<long double>& polynomial, long double z);
+// Rows of t, q, p.
+template <class real>
+using States = std::vector<std::vector<real>>;
+
+// `states` are some of a run, in the order of time, the first its start; `stepper` is prepared with its step, and its
+// trajectory is lost. `energy_tells`: it is conserved, by the motion and by no quadratic form of the method. Costs two
+// steps a state; three for `local`, which is looked at where the energy does not tell; and for `growth` the run once
+// more where that is short (some 0.1 s).
+template <class real>
+Evidence evidence_of(LoadedStepper<real>& stepper, const States<real>& states, const std::vector<real>& parameters,
+                     real step, const std::vector<double>& scale, double power, bool energy_tells);
 
 }  // namespace lobatto

@@ -220,10 +220,7 @@ void run(const RunOptions& options) {
         print_table(derivation, stepper, request, result, watch);
         if (result.status == LOBATTO_OK && result.steps_done > 1) {
             const StepJudge::Judgement judgement = judge.judge(derivation, kernel, request, result);
-            if (judgement.error)
-                print_row(
-                    "estimated error",
-                    fmt::format("{:.1g} of the amplitude at the end, from the steps' polynomials", *judgement.error));
+            print_row("estimated error", judgement.text());
             for (const std::string& warning : StepJudge::warnings(judgement, scene.run.error))
                 fmt::print(stderr, "lobatto: warning: {}.\n", warning);
         }

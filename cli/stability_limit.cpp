@@ -1,31 +1,36 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/stability_limit.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "cli/error_estimate.hpp"
-#include "generator/propagation.hpp"
+#include "generator/stability.hpp"
 
 namespace lobatto {
 
-double stability_limit(const Quadrature& quadrature) {
-    if (quadrature.method.family == Family::gauss) return std::numeric_limits<double>::infinity();
+namespace {
+
+constexpr double negligible = 1e-6;  // growth of a step
+constexpr double most = 1e9;         // (h omega)^2, beyond all limits
+
+// Whether b c of (D20) vanishes somewhere in 0 < z <= up_to^2: a count by Sturm's theorem, without looking where.
+bool has_limit(const Quadrature& quadrature, double up_to) {
     const Propagation step = propagation(quadrature);
-    const auto a = coefficients_of(step.a, step.z), delta = coefficients_of(step.delta, step.z);
-    const auto amplifies = [&](long double x) {  // cosh of the growth exponent
-        const long double trace = value_of(a, x * x) / value_of(delta, x * x);
-        return !(std::fabs(trace) <= 1 + 0.5e-12L);
-    };
-    const long double ladder = 1e-4L;
-    long double x = ladder;
-    while (!amplifies(x)) x += ladder;
-    long double stable = x - ladder, unstable = x;
-    for (int halving = 0; halving < 40; ++halving) {
-        const long double middle = (stable + unstable) / 2;
-        (amplifies(middle) ? unstable : stable) = middle;
-    }
-    return static_cast<double>(stable);
+    const SturmChain chain(rational_polynomial((-step.b / step.z).expand() * step.c, step.z));
+    return chain.zeros(0, static_cast<long>(std::min(std::ceil(up_to * up_to), most))) > 0;
+}
+
+}  // namespace
+
+double stability_limit(const Quadrature& quadrature, double up_to) {
+    constexpr double none = std::numeric_limits<double>::infinity();
+    if (quadrature.method.family == Family::gauss || !has_limit(quadrature, up_to)) return none;
+    const Stability exact = stability(quadrature);
+    for (std::size_t k = 0; k < exact.limits.size(); ++k)
+        if (const StabilityInterval& beyond = exact.intervals[k + 1]; !beyond.stable && beyond.rate >= negligible)
+            return std::sqrt(exact.limits[k].approximation(20).to_double());
+    return none;
 }
 
 }  // namespace lobatto

@@ -5,20 +5,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "cli/error_estimate.hpp"
 #include "cli/stability_limit.hpp"
+#include "cli/summary.hpp"
 #include "runtime/frequency.hpp"
-#include "runtime/polynomial_estimate.hpp"
 
 namespace lobatto {
 
 namespace {
 
-constexpr std::size_t most_states = 32;
+constexpr std::size_t most_states = 64;
+constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
-constexpr double far = 100;  // times the error wanted: estimates may be off by nearly as much (docs/choosing.md)
+constexpr double far = 1000;                 // times the error wanted: estimates may be off by nearly as much
+constexpr double quickly = 30;               // times further apart than motions of different frequencies get
+
+// Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
+std::uint64_t scrambled(std::int64_t number) {
+    std::uint64_t z = static_cast<std::uint64_t>(number) * 0x9e3779b97f4a7c15;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+    return z ^ (z >> 31);
+}
 
 }  // namespace
 
@@ -30,7 +41,16 @@ std::vector<int> unit_groups(const Scene& scene) {
     return groups;
 }
 
-StepJudge::StepJudge(const Scene& scene) : groups_(unit_groups(scene)) {}
+StepJudge::StepJudge(const Scene& scene) : groups_(unit_groups(scene)), rows_a_step_(1 + scene.outputs.dense) {}
+
+void StepJudge::keep(std::int64_t number, std::vector<double> row) {
+    const std::uint64_t place = scrambled(number);
+    if (some_.size() == most_states) {
+        if (place > std::prev(some_.end())->first) return;
+        some_.erase(std::prev(some_.end()));
+    }
+    some_.emplace(place, State{number, std::move(row)});
+}
 
 void StepJudge::look(const Records& records) {
     const std::size_t columns = static_cast<std::size_t>(records.columns);
@@ -41,20 +61,20 @@ void StepJudge::look(const Records& records) {
             least_[k - 1] = std::min(least_[k - 1], row[k]);
             most_[k - 1] = std::max(most_[k - 1], row[k]);
         }
-        if (seen_++ % stride_ != 0) continue;
-        some_.emplace_back(row, row + columns);
-        if (some_.size() < 2 * most_states) continue;
-        for (std::size_t j = 0; j < most_states; ++j) some_[j] = some_[2 * j];  // every other one
-        some_.resize(most_states);
-        stride_ *= 2;
+        const std::int64_t number = seen_++;
+        if (number % rows_a_step_ == 0 && (some_.size() < most_states || scrambled(number) < some_.rbegin()->first))
+            keep(number, {row, row + columns});
     }
 }
 
 std::vector<double> StepJudge::seen() const {
-    std::vector<double> all{static_cast<double>(seen_), static_cast<double>(stride_)};
+    std::vector<double> all{static_cast<double>(seen_)};
     all.insert(all.end(), least_.begin(), least_.end());
     all.insert(all.end(), most_.begin(), most_.end());
-    for (const std::vector<double>& row : some_) all.insert(all.end(), row.begin(), row.end());
+    for (const auto& [place, state] : some_) {
+        all.push_back(static_cast<double>(state.number));
+        all.insert(all.end(), state.row.begin(), state.row.end());
+    }
     return all;
 }
 
@@ -66,18 +86,19 @@ void StepJudge::go_on_after(const std::vector<double>& seen) {
         at += count;
         return part;
     };
-    if (std::ssize(seen) < 2 + 2 * width) return;  // nothing was kept yet
+    if (std::ssize(seen) < 1 + 2 * width) return;  // nothing was kept yet
     seen_ = std::llround(*at++);
-    stride_ = std::llround(*at++);
     least_ = take(width);
     most_ = take(width);
-    while (seen.end() - at > width) some_.push_back(take(1 + width));
+    while (seen.end() - at > 1 + width) {
+        const std::int64_t number = std::llround(*at++);
+        keep(number, take(1 + width));
+    }
 }
 
 StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel& kernel,
                                       const TrajectoryRequest& request, const TrajectoryResult& result) const {
     Judgement judgement;
-    judgement.limit = stability_limit(derivation.quadrature);
     LoadedStepper<double> stepper(kernel);
     if (some_.empty() || stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return judgement;
     const std::size_t n = groups_.size();
@@ -90,33 +111,53 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
             }
     for (double& value : scale)
         if (!(value > 0)) value = 1;
-    double jump = 0;
-    for (const std::vector<double>& row : some_) {
-        const auto middle = row.begin() + 1 + static_cast<std::ptrdiff_t>(n);
-        const std::vector<double> q(row.begin() + 1, middle), p(middle, row.end());
-        const auto look_at = [&](double time, const std::vector<double>& position,
-                                 const std::vector<double>& momentum) {
-            const double frequency =
-                n <= frequency_limit ? largest_frequency(stepper, time, position, momentum) : std::nan("");
-            if (request.step * frequency > judgement.radians) judgement.radians = request.step * frequency;
-        };
-        look_at(row[0], q, p);
-        if (kernel->has_dense == 0) continue;
-        const double here = polynomial_defect(stepper, row[0], q, p, scale);
-        if (here > jump) jump = here;
+    const auto look_at = [&](double time, const std::vector<double>& q, const std::vector<double>& p) {
+        const double radians = std::fabs(request.step) * largest_frequency(stepper, time, q, p);
+        if (radians > judgement.radians) judgement.radians = radians;
+    };
+    int looks = 0;
+    for (const auto& [place, state] : some_) {
+        if (n > frequency_limit || looks++ == frequency_looks) break;
+        const auto middle = state.row.begin() + 1 + static_cast<std::ptrdiff_t>(n);
+        const std::vector<double> q(state.row.begin() + 1, middle), p(middle, state.row.end());
+        look_at(state.row[0], q, p);
         // Inside the step too: at the ends all may be slow.
-        std::vector<double> middle_q, middle_v;
-        const double time = row[0] + 1.5 * request.step;
-        if (stepper.dense(0.5, middle_q, middle_v) == LOBATTO_OK)
-            look_at(time, middle_q, stepper.momentum(time, middle_q, middle_v));
+        lobatto_advance one{};
+        one.steps = 1;
+        std::vector<double> within, velocity;
+        if (kernel->has_dense == 0 || stepper.start(state.row[0], q, p) != LOBATTO_OK ||
+            stepper.advance(one) != LOBATTO_OK || stepper.dense(0.5, within, velocity) != LOBATTO_OK)
+            continue;
+        const double time = state.row[0] + request.step / 2;
+        look_at(time, within, stepper.momentum(time, within, velocity));
     }
-    const double steps = static_cast<double>(result.steps_done);
-    const double estimate = ErrorEstimate(derivation.quadrature).after(steps, jump);
-    // Polynomials that miss one another by as much as the motion itself tell nothing. What a tolerance leaves out, a
-    // random part of it in each step, comes on top.
-    if (kernel->has_dense != 0 && estimate < 1)
-        judgement.error = std::fmin(1, estimate + request.tolerance * std::sqrt(steps));
+    judgement.limit = stability_limit(derivation.quadrature, judgement.radians);
+
+    std::map<std::int64_t, std::vector<double>> in_time;
+    for (const auto& [place, state] : some_) in_time.emplace(state.number, state.row);
+    States<double> states;
+    for (const auto& [number, row] : in_time) states.push_back(row);
+    const ErrorEstimate estimate(derivation.quadrature);
+    const bool energy_tells = kernel->has_energy != 0 && derivation.system.autonomous && !has_forces(derivation) &&
+                              derivation.quadrature.method.family == Family::lobatto;
+    const Evidence evidence = evidence_of(stepper, states, request.parameters, request.step, scale,
+                                          error_power(derivation.quadrature.method), energy_tells);
+    const double steps = static_cast<double>(result.steps_done), duration = steps * std::fabs(request.step);
+    const double random = std::numeric_limits<double>::epsilon() + request.tolerance;
+    judgement.error = std::fmin(1, estimate.after(steps, duration, evidence, random));
+    const double way = evidence.rate * duration;
+    judgement.neighbours = evidence.growth == 0              ? Neighbours::unknown
+                           : evidence.growth > quickly * way ? Neighbours::part_quickly
+                                                             : Neighbours::stay;
     return judgement;
+}
+
+std::string StepJudge::Judgement::text() const {
+    if (error >= 1) return "as large as the motion itself";
+    const char* const supposed = neighbours == Neighbours::unknown        ? ", if neighbouring motions stay near"
+                                 : neighbours == Neighbours::part_quickly ? "; neighbouring motions part quickly"
+                                                                          : "";
+    return fmt::format("{:.1g} of the amplitude at the end{}", error, supposed);
 }
 
 std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double wanted_error) {
@@ -126,11 +167,10 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
             "the step is beyond the linear stability limit: h omega = {:.3g} is more than {:.4g}, omega the largest "
             "frequency met. Take a step below {:.2g} times this one, or Gauss, which has no limit",
             judgement.radians, judgement.limit, judgement.limit / judgement.radians));
-    if (wanted_error > 0 && judgement.error && *judgement.error > far * wanted_error)
-        texts.push_back(
-            fmt::format("the scene asks for an error of {:.2g}, and the steps' polynomials speak of {:.1g}; "
-                        "`lobatto tune` chooses a step",
-                        wanted_error, *judgement.error));
+    if (wanted_error > 0 && judgement.error > far * wanted_error)
+        texts.push_back(fmt::format(
+            "the scene asks for an error of {:.2g}, and it is probably near {:.1g}; `lobatto tune` chooses a step",
+            wanted_error, judgement.error));
     return texts;
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,7 +14,8 @@ namespace lobatto {
 
 class StepJudge {
 public:
-    // Looks at the kept states go by: how far the motion goes, and a few states of all its times.
+    // Looks at the kept states go by: how far the motion goes, and a few states of all its times, chosen as if at
+    // random: equal distances could go along with the motion's own rhythm.
     explicit StepJudge(const Scene& scene);
     void look(const Records& records);
 
@@ -22,10 +23,13 @@ public:
     std::vector<double> seen() const;
     void go_on_after(const std::vector<double>& seen);
 
+    enum class Neighbours { unknown, stay, part_quickly };  // motions that begin beside this one
     struct Judgement {
-        std::optional<double> error;  // estimated, relative to the amplitude; nothing without dense output
-        double radians = 0;           // h times the largest frequency met; 0: not looked for
-        double limit = 0;             // of that, by linear stability; infinite for Gauss
+        double error = 0;                             // estimated, relative to the amplitude, at most 1
+        Neighbours neighbours = Neighbours::unknown;  // unknown of long runs
+        double radians = 0;                           // h times the largest frequency met; 0: not looked for
+        double limit = 0;          // of that, by linear stability; infinite when it lies above, and for Gauss
+        std::string text() const;  // of the error, one line
     };
     Judgement judge(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
@@ -33,10 +37,16 @@ public:
     static std::vector<std::string> warnings(const Judgement& judgement, double wanted_error);
 
 private:
-    std::vector<int> groups_;                // coordinates of the same unit have the same number
-    std::vector<double> least_, most_;       // 2n
-    std::vector<std::vector<double>> some_;  // rows of t, q, p
-    std::int64_t seen_ = 0, stride_ = 1;
+    std::vector<int> groups_;           // coordinates of the same unit have the same number
+    std::int64_t rows_a_step_;          // states between the steps are less accurate than those at them
+    std::vector<double> least_, most_;  // 2n
+    struct State {
+        std::int64_t number;
+        std::vector<double> row;  // t, q, p
+    };
+    std::map<std::uint64_t, State> some_;  // by a scrambled number: those with the smallest
+    std::int64_t seen_ = 0;
+    void keep(std::int64_t number, std::vector<double> row);
 };
 
 // Coordinates of the same unit have the same number.

@@ -73,7 +73,8 @@ void tradeoff(const TradeoffOptions& options) {
     }
     say.clear();
     if (interrupted && (!begun || begun->notebook().all().empty())) {
-        fmt::print(stderr, "lobatto: interrupted before anything was measured.\n");
+        fmt::print(stderr,
+                   "lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
         throw CLI::RuntimeError(interrupted_exit);
     }
     Laboratory& laboratory = *begun;
@@ -87,7 +88,7 @@ void tradeoff(const TradeoffOptions& options) {
     write(folder + "/tradeoff.csv", csv_of(laboratory));
     const std::string json = json_of(laboratory);
     write(folder + "/tradeoff.json", json);
-    fmt::print("\n{}", estimate_text(laboratory));
+    fmt::print("\n{}", calibration_text(calibration_of(laboratory)));
     if (!interrupted) {
         const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
         write(folder + "/report.html", report_page(laboratory, folder, pictures, json));

@@ -85,7 +85,7 @@ TEST_CASE("a run says how good it is and where its trajectory is") {
         "  energy error            \\S+ at most, relative \\S+\n"
         "  symplectic defect       \\S+\n"
         "  position error          \\S+ rad at most, against the exact elliptic solution\n"
-        "  estimated error         \\S+ of the amplitude at the end, from the steps' polynomials\n"
+        "  estimated error         \\S+ of the amplitude at the end\n"
         "  trajectory              \\S+/run.csv, 2401 states\n");
     CHECK_MESSAGE(std::regex_match(first.out, table), first.out);
     const test::Finished second = place.run({pendulum, "-o", place.file("again.csv")});

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "cli/step_judge.hpp"
 #include "cli/summary.hpp"
@@ -19,8 +18,9 @@ namespace lobatto {
 namespace {
 
 constexpr int few_coordinates = 10, some_coordinates = 20;
-constexpr double extended_reach = 3e-13;  // what two references in long double can be asked to agree to
-constexpr double reference_share = 0.4;   // of the seconds
+constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
+constexpr double reference_share = 0.4;        // of the seconds
+const std::string measurements_version = "2";  // of what is measured: older notebooks are begun anew
 
 // In quadruple precision where that is asked for and affordable. Order 22; of large systems the equations of a step are
 // large too, and order 10 does.
@@ -32,7 +32,7 @@ Member reference_member(const Scene& scene, double wanted) {
 
 // What is measured and on what machine: another text, other measurements.
 std::string subject_of(const Scene& scene, const Workshop& workshop, const Member& reference, double until) {
-    std::string text = workshop.digest(reference) + processor_identity() + exact_text(until);
+    std::string text = measurements_version + workshop.digest(reference) + processor_identity() + exact_text(until);
     for (const auto* values : {&scene.initial_position, &scene.initial_rate})
         for (const GiNaC::ex& value : *values)
             text += " " + exact_text(scene.evaluate(value, "an initial value").to_double());
@@ -114,13 +114,6 @@ Measurement Laboratory::measure(const Candidate& candidate, bool all) {
     }
     Measurement measurement = measurer_->measure(workshop_.kernel(candidate.member), candidate, all);
     measurement.compile_seconds = workshop_.compile_seconds(candidate.member);
-    if (measurement.jump > 0) {
-        const Member type_free{candidate.member.family, candidate.member.points};
-        auto estimate = estimates_.find(type_free);
-        if (estimate == estimates_.end())
-            estimate = estimates_.emplace(type_free, quadrature_of(type_free.method())).first;
-        measurement.estimate = estimate->second.after(static_cast<double>(candidate.steps), measurement.jump);
-    }
     return notebook_.add(measurement);
 }
 

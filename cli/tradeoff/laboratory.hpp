@@ -4,11 +4,9 @@
 
 #include <chrono>
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 
-#include "cli/error_estimate.hpp"
 #include "cli/tradeoff/measuring.hpp"
 #include "cli/tradeoff/notebook.hpp"
 #include "cli/tradeoff/workshop.hpp"
@@ -67,7 +65,6 @@ private:
     Reference reference_;
     std::optional<Measurer> measurer_;
     Notebook notebook_;
-    std::map<Member, ErrorEstimate> estimates_;
     bool knows_symmetries_ = false;
 };
 

@@ -6,19 +6,20 @@
 #include <ctime>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <string>
 
 #include "runtime/diagnostics.hpp"
 #include "runtime/extrapolation.hpp"
-#include "runtime/polynomial_estimate.hpp"
 
 namespace lobatto {
 
 namespace {
 
-constexpr double lost = 0.01;            // of the amplitude: the motion is another one
-constexpr std::int64_t energies = 128;   // samples at which the energy is looked at
-constexpr int estimates = 48;            // places where the polynomials are compared
+constexpr double lost = 0.01;           // of the amplitude: the motion is another one
+constexpr std::int64_t energies = 128;  // samples at which the energy is looked at
+constexpr int estimate_states = 64;     // that the estimate looks at
+constexpr double golden = 0.6180339887498949;
 constexpr std::int64_t looks = 1500;     // steps whose error is looked at
 constexpr int defect_limit = 32;         // coordinates; tangent maps of more take long
 constexpr double timing_seconds = 4e-3;  // of repetitions in all
@@ -230,18 +231,30 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
     run.stepper.prepare(run.start.parameters, run.h);
     if (kernel->has_tangent != 0 && static_cast<int>(n) <= defect_limit && conserves_ && candidate.tolerance == 0)
         result.defect = static_cast<double>(symplectic_defect(run.stepper, run.start.q, run.start.p));
-    if (kernel->has_dense != 0) {
-        for (int place = 0; place < estimates; ++place) {
-            const std::int64_t meeting = run.meetings * place / estimates;
-            if (place > 0 && meeting == run.meetings * (place - 1) / estimates) continue;
-            state_at(meeting);
-            const auto time =
-                static_cast<real>(reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings));
-            const double defect = polynomial_defect(run.stepper, time, std::vector<real>(q.begin(), q.end()),
-                                                    std::vector<real>(p.begin(), p.end()), reference_.scale);
-            if (defect > result.jump) result.jump = defect;
-        }
+    // As `lobatto run` does it: the start and some other states, at distances that do not go along with the motion's
+    // own.
+    run.stepper.prepare(run.start.parameters, run.h);
+    std::set<std::int64_t> places = {0};
+    for (int i = 1; i < estimate_states; ++i)
+        places.insert(static_cast<std::int64_t>(std::fmod(i * golden, 1.0) * static_cast<double>(run.meetings + 1)));
+    States<real> states;
+    for (const std::int64_t meeting : places) {
+        state_at(meeting);
+        states.emplace_back();
+        states.back().push_back(run.h * static_cast<real>(meeting * run.every));
+        for (const auto* part : {&q, &p})
+            for (const Wide value : *part) states.back().push_back(static_cast<real>(value));
     }
+    const std::pair kind(candidate.member.family, candidate.member.points);
+    if (estimates_.count(kind) == 0) estimates_.emplace(kind, quadrature_of(candidate.member.method()));
+    const ErrorEstimate& estimate = estimates_.at(kind);
+    const bool energy_tells = conserves_ && candidate.member.family == Family::lobatto;
+    const Evidence evidence = evidence_of(run.stepper, states, run.start.parameters, run.h, reference_.scale,
+                                          error_power(candidate.member.method()), energy_tells);
+    result.jump = evidence.jump;
+    result.growth = evidence.growth;
+    result.estimate = std::fmin(1, estimate.after(static_cast<double>(candidate.steps), reference_.until, evidence,
+                                                  rounding_of(candidate.member.precision) + candidate.tolerance));
     return result;
 }
 

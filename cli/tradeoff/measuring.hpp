@@ -2,10 +2,12 @@
 // A candidate, run and compared with the reference.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "cli/error_estimate.hpp"
 #include "cli/exact_start.hpp"
 #include "cli/tradeoff/candidate.hpp"
 #include "cli/tradeoff/reference.hpp"
@@ -57,6 +59,7 @@ private:
     bool conserves_;
     const volatile int* interrupted_;
     std::vector<Symmetry> symmetries_;
+    mutable std::map<std::pair<Family, int>, ErrorEstimate> estimates_;  // made when first needed
 };
 
 }  // namespace lobatto

@@ -5,19 +5,24 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "cli/tradeoff/measurement_json.hpp"
 #include "runtime/error.hpp"
+#include "runtime/partial_file.hpp"
 
 namespace lobatto {
 
 Notebook::Notebook(const std::string& path, const std::string& subject) : path_(path) {
-    std::string kept;
+    std::string kept = "# " + subject + '\n';
+    std::uintmax_t size = 0;
     {
         std::ifstream file(path);
         std::string line;
         if (std::getline(file, line) && line == "# " + subject) {
+            std::error_code unknown;
+            size = std::filesystem::file_size(path, unknown);
             while (std::getline(file, line) && !file.eof()) {  // the last line ends with a line's end, or is torn
                 try {
                     const Measurement measurement = measurement_of(nlohmann::json::parse(line));
@@ -30,8 +35,12 @@ Notebook::Notebook(const std::string& path, const std::string& subject) : path_(
         }
     }
     found_ = measurements_.size();
-    file_.open(path, std::ios::trunc);
-    file_ << "# " << subject << '\n' << kept << std::flush;
+    if (kept.size() != size) {  // never half of it, whenever this process ends
+        PartialFile fresh(path, "the measurements");
+        fresh.write(kept);
+        fresh.finish();
+    }
+    file_.open(path, std::ios::app);
     if (!file_) throw MachineError(fmt::format("cannot write {}; choose another folder with -o", path));
 }
 

@@ -52,19 +52,10 @@ std::vector<Measurement> front_rows_of(const Laboratory& laboratory) {
     return rows;
 }
 
-std::string estimate_text(const Laboratory& laboratory) {
-    std::vector<double> ratios;
-    for (const auto& [key, m] : laboratory.notebook().all())
-        if (m.complete && m.candidate.tolerance == 0 && m.candidate.member.precision == Precision::double_ &&
-            m.estimate > 0 && m.estimate < 1 && m.error > 1e-12 && m.error < 0.1)
-            ratios.push_back(m.error / m.estimate);
-    if (ratios.size() < 10 || laboratory.is_chaotic()) return "";
-    std::sort(ratios.begin(), ratios.end());
-    return fmt::format(
-        "On this motion true errors are {:.2g} times what `lobatto run` estimates, from {:.2g} to {:.2g} times for "
-        "eight runs "
-        "of ten.\n",
-        ratios[ratios.size() / 2], ratios[ratios.size() / 10], ratios[ratios.size() * 9 / 10]);
+Calibration calibration_of(const Laboratory& laboratory) {
+    std::vector<Measurement> measurements;
+    for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(m);
+    return calibrate(telling(measurements, std::fmax(1e-12, 100 * laboratory.reference().disagreement.back())));
 }
 
 std::string front_table(const Laboratory& laboratory) {
@@ -100,6 +91,13 @@ std::string json_of(const Laboratory& laboratory) {
     nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
     for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(json_of(m));
     for (const Measurement& m : pareto_front(laboratory)) front.push_back(json_of(m));
+    nlohmann::ordered_json calibration = nlohmann::ordered_json::array();
+    for (const Calibration::Law& law : calibration_of(laboratory).laws)
+        calibration.push_back({{"family", law.member.family == Family::lobatto ? "lobatto" : "gauss"},
+                               {"points", law.member.points},
+                               {"factor", law.factor},
+                               {"power", law.power},
+                               {"runs", law.runs}});
     const nlohmann::ordered_json json = {{"scene", laboratory.scene().name},
                                          {"title", laboratory.scene().title},
                                          {"until", laboratory.until()},
@@ -111,6 +109,7 @@ std::string json_of(const Laboratory& laboratory) {
                                            {"samples", reference.samples},
                                            {"frequency", reference.frequency}}},
                                          {"chaotic", laboratory.is_chaotic()},
+                                         {"calibration", calibration},
                                          {"front", front},
                                          {"measurements", measurements}};
     return json.dump(1) + '\n';

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/tradeoff/calibration.hpp"
 #include "cli/tradeoff/laboratory.hpp"
 
 namespace lobatto {
@@ -12,8 +13,8 @@ namespace lobatto {
 // What is to be said before any number: what the errors are errors of.
 std::string reference_text(const Laboratory& laboratory);
 
-// How `lobatto run`'s estimate of the error follows the true one here; empty when too little was measured.
-std::string estimate_text(const Laboratory& laboratory);
+// How the estimates of the error follow the true one here.
+Calibration calibration_of(const Laboratory& laboratory);
 
 // Pareto's front, thinned to about two rows a decade.
 std::vector<Measurement> front_rows_of(const Laboratory& laboratory);
