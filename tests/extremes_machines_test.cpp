@@ -108,40 +108,43 @@ double family_error(bool gauss) {
     return largest;
 }
 
-// The kernels of a compiler and an instruction set of its own, by a script in place of the compiler.
-struct Machine {
-    std::string compiler, flags;
-};
-State<double> state_by(const Machine& machine, const lobatto::test::Motion& motion, const std::string& method) {
+// After 200 steps, from the kernel of a compiler and an instruction set of its own, by a script in place of the
+// compiler.
+State<double> state_by(const std::string& compiler, const std::string& flags, const lobatto::test::Motion& motion) {
     const TemporaryFolder folder;
-    // The last of several -march is the one that counts.
-    write_script(folder / machine.compiler, "exec /usr/bin/" + machine.compiler + " \"$@\" " + machine.flags + "\n");
-    const EnvironmentVariable compiler("CXX", (folder / machine.compiler).string());
+    write_script(folder / compiler, "exec /usr/bin/" + compiler + " \"$@\" " + flags + "\n");
+    const EnvironmentVariable program("CXX", (folder / compiler).string());
     const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
-    const Kernel kernel = kernel_in_own_cache(derivation_of(motion, method), Precision::double_);
+    const Kernel kernel = kernel_in_own_cache(derivation_of(motion, "points = 4"), Precision::double_);
     return travel(kernel, motion.parameters, motion.q, motion.v, motion.step, 200);
 }
 
-const Machine native_gcc{"g++", ""}, native_clang{"clang++", ""}, unfused_gcc{"g++", "-mno-fma"},
-    unfused_clang{"clang++", "-mno-fma"}, plain_gcc{"g++", "-march=x86-64"}, plain_clang{"clang++", "-march=x86-64"};
+// All instructions of this machine, none fused, plain x86-64 (the last of several -march counts): by g++ and clang++.
+using Pair = std::pair<State<double>, State<double>>;
+const std::vector<Pair>& machines(const lobatto::test::Motion& motion) {
+    static std::map<const lobatto::test::Motion*, std::vector<Pair>> made;
+    std::vector<Pair>& all = made[&motion];
+    if (all.empty())
+        for (const std::string flags : {"", "-mno-fma", "-march=x86-64"})
+            all.emplace_back(state_by("g++", flags, motion), state_by("clang++", flags, motion));
+    return all;
+}
 
 double largest_difference(const lobatto::test::Motion& motion) {
-    const State<double> first = state_by(native_gcc, motion, "points = 4");
-    double largest = first.status == LOBATTO_OK ? 0 : HUGE_VAL;
-    for (const Machine& machine : {native_clang, unfused_gcc, unfused_clang, plain_gcc, plain_clang}) {
-        const State<double> other = state_by(machine, motion, "points = 4");
-        if (other.status != LOBATTO_OK) return HUGE_VAL;
-        largest = std::fmax(largest, std::fmax(distance_of(first.q, other.q), distance_of(first.p, other.p)));
-    }
+    const State<double>& first = machines(motion).front().first;
+    double largest = 0;
+    for (const auto& [gcc, clang] : machines(motion))
+        for (const State<double>* other : {&gcc, &clang}) {
+            if (other->status != LOBATTO_OK) return HUGE_VAL;
+            largest = std::fmax(largest, std::fmax(distance_of(first.q, other->q), distance_of(first.p, other->p)));
+        }
     return largest;
 }
 
 bool compilers_agree(const lobatto::test::Motion& motion) {
-    const auto agree = [&](const Machine& a, const Machine& b) {
-        const State<double> one = state_by(a, motion, "points = 4"), other = state_by(b, motion, "points = 4");
-        return one.status == LOBATTO_OK && one.q == other.q && one.p == other.p;
-    };
-    return agree(native_gcc, native_clang) && agree(plain_gcc, plain_clang);
+    return std::all_of(machines(motion).begin(), machines(motion).end(), [](const Pair& pair) {
+        return pair.first.status == LOBATTO_OK && pair.first.q == pair.second.q && pair.first.p == pair.second.p;
+    });
 }
 
 const Extremes table(
