@@ -16,6 +16,7 @@ void add_check(CLI::App& program);
 void add_derive(CLI::App& program);
 void add_emit(CLI::App& program);
 void add_gallery(CLI::App& program);
+void add_roundoff(CLI::App& program);
 void add_run(CLI::App& program);
 void add_paper(CLI::App& program);
 void add_stability(CLI::App& program);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The method on the command line, instead of the scene's: --points or --stages, --tolerance.
+// The method on the command line, instead of the scene's: --points or --stages, --tolerance or --arithmetic.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <optional>
+#include <string>
 
 #include "generator/scene.hpp"
 
@@ -12,6 +13,7 @@ namespace lobatto {
 struct MethodOption {
     std::optional<int> points, stages;
     std::optional<double> tolerance;
+    std::optional<std::string> arithmetic;
 
     void add_to(CLI::App& command);
     void apply(Scene& scene) const;

@@ -146,6 +146,7 @@ bool is_member_name(const std::string& name) {
                                                   "linear",
                                                   "unrolled",
                                                   "absorbed",
+                                                  "clean",
                                                   "any_number",
                                                   "costly",
                                                   "diagonal_part",

@@ -45,6 +45,8 @@ std::string separable_shapes(const Structure& structure, int nodes, Precision pr
         line(text, fmt::format("bool neighbours = {}", structure.neighbours && has_lanes(precision)),
              structure.neighbours ? "formulas go along neighbouring coordinates, which lie in lanes"
                                   : "coordinates are taken one by one");
+        line(text, fmt::format("bool clean = {}", structure.clean),
+             structure.clean ? "round-off-clean steps" : "steps as fast as can be");
         line(text, fmt::format("bool absorbed = {}", structure.absorbed),
              structure.absorbed ? "Newton's iteration has the Jacobian of V's quadratic part"
                                 : "Newton's iteration has its own Jacobians");

@@ -149,10 +149,22 @@ Id raised(Graph& graph, Id base, int exponent) {
     return graph.raw(Op::multiply, {raised(graph, base, exponent - 1), base});
 }
 
+// sqrt(x)^exponent with an odd exponent, as a power of x times a root: rounding of the root is not raised with it.
+Id raised_root(Graph& graph, Id root, int exponent) {
+    Id x = graph[root].operands[0];
+    if (exponent < 0) {
+        x = graph.raw(Op::power, {x}, -1);
+        root = graph.raw(Op::sqrt, {x});
+    }
+    const int whole = (std::abs(exponent) - 1) / 2;
+    return whole == 0 ? root : graph.raw(Op::multiply, {raised(graph, x, whole), root});
+}
+
 }  // namespace
 
 Programs multiply_powers(const Programs& programs) {
-    // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...
+    // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...; with a
+    // root as base, r = 1/x, then sqrt(r), r sqrt(r) ...
     std::map<Id, std::set<int>> negative;
     for (const Id id : programs.graph.topological(roots_of(programs)))
         if (programs.graph[id].op == Op::power && programs.graph[id].index < 0)
@@ -160,8 +172,10 @@ Programs multiply_powers(const Programs& programs) {
     return rewrite(programs, [&negative](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
         if (node.op != Op::power) return same(graph, node, std::move(operands));
-        if (node.index < 0 && negative[node.operands[0]].size() > 1)
-            return raised(graph, graph.raw(Op::power, {operands.front()}, -1), -node.index);
+        const bool shares = node.index < 0 && negative[node.operands[0]].size() > 1;
+        if (graph[operands.front()].op == Op::sqrt && node.index % 2 != 0 && (node.index != -1 || shares))
+            return raised_root(graph, operands.front(), node.index);
+        if (shares) return raised(graph, graph.raw(Op::power, {operands.front()}, -1), -node.index);
         return raised(graph, operands.front(), node.index);
     });
 }

@@ -15,11 +15,24 @@ const Discretisation& Derivation::discretisation() const {
     return *discretisation_;
 }
 
+namespace {
+
+// Clean steps are steps of systems with a constant mass matrix.
+void check_arithmetic(const Scene& scene, const System& system) {
+    if (scene.method.arithmetic == StepArithmetic::clean && !system.separable)
+        scene.source.fail(scene.lagrangian_at,
+                          "there is no clean arithmetic for this Lagrangian: " + system.not_separable +
+                              "; leave arithmetic = \"clean\" out, or --arithmetic");
+}
+
+}  // namespace
+
 Derivation derive(const Scene& scene, bool general) {
     const Limits limits(scene.path);
     Derivation derivation;
     derivation.scene = scene;
     derivation.system = build_system(scene);
+    check_arithmetic(scene, derivation.system);
     check_start(scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     derivation.structure = find_structure(scene, derivation.system, derivation.quadrature, general);

@@ -74,7 +74,7 @@ private:
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
-                          "[method]", {"family", "points", "stages", "tolerance"});
+                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic"});
         const Entry *family = table.find("family"), *points = table.find("points"), *stages = table.find("stages");
         if (family != nullptr) {
             const Value& value = family->value;
@@ -101,6 +101,18 @@ private:
                 fail(tolerance->value.at, fmt::format("the tolerance is {}; it must be above 0 and at most 0.001; "
                                                       "leave it out to iterate to rounding",
                                                       shown(value)));
+        }
+        if (const Entry* arithmetic = table.find("arithmetic")) {
+            const Value& value = arithmetic->value;
+            const bool text = value.kind == Value::Kind::text;
+            if (!text || (value.text.value != "plain" && value.text.value != "clean"))
+                fail(value.at, "unknown arithmetic; there are \"plain\" and \"clean\"");
+            if (value.text.value == "clean") scene_.method.arithmetic = StepArithmetic::clean;
+            if (scene_.method.arithmetic == StepArithmetic::clean && scene_.method.tolerance > 0)
+                fail(
+                    value.at,
+                    "clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave one of both "
+                    "out");
         }
     }
 
@@ -212,8 +224,10 @@ private:
 }  // namespace
 
 std::string Method::name() const {
-    return family == Family::lobatto ? fmt::format("Lobatto, {} points", points)
-                                     : fmt::format("Gauss, {} {}", points, points == 1 ? "stage" : "stages");
+    const std::string suffix = arithmetic == StepArithmetic::clean ? ", clean" : "";
+    return (family == Family::lobatto ? fmt::format("Lobatto, {} points", points)
+                                      : fmt::format("Gauss, {} {}", points, points == 1 ? "stage" : "stages")) +
+           suffix;
 }
 
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,

@@ -33,11 +33,15 @@ struct Parameter {
 
 enum class Family { lobatto, gauss };
 
+// How a step is computed: as fast as possible, or so that what rounding leaves is random (kernel_clean.hpp).
+enum class StepArithmetic { plain, clean };
+
 // Quadrature points of one step: Lobatto with 2 to 12, Gauss with 1 to 10 (its stages).
 struct Method {
     Family family = Family::lobatto;
     int points = 4;
     double tolerance = 0;  // of the last increment, relative to the displacement in a step; 0: to rounding
+    StepArithmetic arithmetic = StepArithmetic::plain;
 
     int order() const { return family == Family::lobatto ? 2 * points - 2 : 2 * points; }
     std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage"

@@ -107,7 +107,8 @@ public:
     }
 
     Structure run() {
-        result_.linear = system_.linear && !result_.general;
+        result_.clean = scene_.method.arithmetic == StepArithmetic::clean && !result_.general;
+        result_.linear = system_.linear && !result_.general && !result_.clean;
         result_.closed_solution = closed_solution(system_);
         choose_form();
         if (result_.form == Form::general)
@@ -149,7 +150,13 @@ private:
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         result_.diagonal_mass = system_.separable && diagonal;
-        result_.unrolled = interior_ <= unrolled_limit;
+        result_.unrolled = interior_ <= unrolled_limit && !result_.clean;
+        if (result_.clean) {
+            find("round-off-clean arithmetic", true,
+                 "asked for: every step is iterated until nothing changes and its increments are added without error, "
+                 "so that rounding errors grow like a random walk");
+            return;
+        }
         const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
         if (!system_.separable || (!result_.diagonal_mass && !result_.unrolled))
             result_.form = Form::general;
@@ -205,6 +212,7 @@ private:
         repetition();
         absorption();
         neighbourhood();
+        if (result_.clean) return;
         find("small enough to write out", result_.unrolled,
              result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
                                             interior_, unrolled_limit)
@@ -256,7 +264,7 @@ private:
     // Terms of V, or of L, that are one formula of many variables.
     void repetition() {
         const bool general = result_.form == Form::general;
-        if (result_.form == Form::linear_map || (!general && result_.unrolled)) return;
+        if (result_.form == Form::linear_map || (!general && (result_.unrolled || !result_.diagonal_mass))) return;
         std::vector<ex> terms;
         std::vector<std::pair<int, ex>> forces;
         for (const ex& term : general ? system_.terms : all_at(system_.terms, system_.v, 0))
@@ -283,7 +291,7 @@ private:
 
     // The quadratic part of V: worth taking out of the iteration when the rest bends the forces less at the start.
     void absorption() {
-        if (result_.form != Form::separable || result_.linear || interior_ == 0 || !result_.diagonal_mass) return;
+        if (result_.linear || result_.clean || interior_ == 0 || !result_.diagonal_mass) return;
         result_.constant_hessian = SparseMatrix(n_, n_);
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
@@ -331,7 +339,7 @@ private:
     }
 
     void neighbourhood() {
-        if (result_.form != Form::separable || !result_.looped || result_.linear) return;
+        if (!result_.looped || result_.linear || result_.clean) return;
         result_.neighbours = !result_.general && !result_.diagonal_part && are_neighbours(result_.elements);
         find("neighbouring coordinates", result_.neighbours,
              result_.neighbours      ? "formulas go along coordinates that stand side by side: vector lanes hold these"

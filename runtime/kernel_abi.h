@@ -22,7 +22,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 3u
+#define LOBATTO_ABI_VERSION 4u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -100,6 +100,8 @@ typedef struct lobatto_kernel {
                      const void* p); /* forgets what earlier steps left */
     int32_t (*advance)(void* stepper, lobatto_advance* call);
     void (*state)(const void* stepper, void* time, void* q, void* p);
+    /* Position and velocity, each the sum of two numbers, q + q_rest; null without clean arithmetic. */
+    void (*two_fold_state)(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest);
     /* Position and velocity at t + theta h inside the last step, on its polynomial. */
     int32_t (*dense)(const void* stepper, const void* theta, void* q, void* velocity);
 

@@ -14,8 +14,8 @@
 //   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of kernel_separable.hpp are the
 //   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of kernel_solve.hpp order the
 //   unknowns, `neighbours` that acceleration can go SideBySide (kernel_neighbours.hpp), and `absorbed` says that
-//   quadratic_part(k, S0) gives a constant part of S to iterate with. Gauss's nodes stand between two ends of weight
-//   zero.
+//   quadratic_part(k, S0) gives a constant part of S to iterate with; `clean` (in loops) that steps are those of
+//   kernel_clean.hpp. Gauss's nodes stand between two ends of weight zero.
 // Form::general: see kernel_general.hpp.
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
@@ -109,6 +109,15 @@ struct Formulas {
     }
 };
 
+// Whether K's steps are those of kernel_clean.hpp.
+template <class K>
+constexpr bool is_clean() {
+    if constexpr (K::form == Form::separable)
+        return K::clean;
+    else
+        return false;
+}
+
 // What the steppers of all forms carry.
 template <class K>
 struct Motion {
@@ -133,7 +142,7 @@ struct Motion {
 
 // One trajectory of kernel K. Usage: prepare, start, then step as often as wanted. Not thread-safe; copy freely. A step
 // that fails leaves the state of the last good one.
-template <class K, Form form = K::form>
+template <class K, Form form = K::form, bool clean = is_clean<K>()>
 struct Stepper;
 
 // When to try sweeps: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.

@@ -120,7 +120,7 @@ private:
 // Lanes side by side: one or two coordinates leave registers for two packs at once, which hide each other's latency.
 template <class K>
 constexpr int ensemble_lanes() {
-    if (native_lanes<typename K::real> == 1 || !K::any_number) return 0;
+    if (native_lanes<typename K::real> == 1 || !K::any_number || is_clean<K>()) return 0;
     if (K::form == Form::general && K::coordinates > most_full) return 0;
     return native_lanes<typename K::real> * (K::form != Form::general && K::coordinates <= 2 ? 2 : 1);
 }

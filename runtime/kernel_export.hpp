@@ -165,6 +165,18 @@ struct Export {
         of(stepper).momentum(out(p));
     }
 
+    static void read_two_fold(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest) {
+        if constexpr (is_clean<K>()) {
+            for (int k = 0; k < n; ++k) {
+                out(q)[k] = of(stepper).q[k];
+                out(q_rest)[k] = of(stepper).q_rest[k];
+                out(velocity)[k] = of(stepper).u[k];
+                out(velocity_rest)[k] = of(stepper).u_rest[k];
+            }
+        }
+    }
+    static constexpr auto two_fold_state = is_clean<K>() ? read_two_fold : nullptr;
+
     static std::int32_t dense(const void* stepper, const void* theta, void* q, void* velocity) {
         if constexpr (has_dense) {
             if (of(stepper).has_history) {
@@ -240,6 +252,7 @@ struct Export {
                                              start,
                                              advance,
                                              state,
+                                             two_fold_state,
                                              dense,
                                              energy,
                                              momentum,

@@ -184,7 +184,7 @@ inline number discrete_energy(const given* E, const number* q, const number* p) 
 
 // The stepper of an affine map: the whole step is K::propagate.
 template <class K>
-struct Stepper<K, Form::linear_map> : Motion<K> {
+struct Stepper<K, Form::linear_map, false> : Motion<K> {
     using typename Motion<K>::real;
     using Motion<K>::n, Motion<K>::coefficients, Motion<K>::q;
     static constexpr int N = 0;

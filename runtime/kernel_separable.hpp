@@ -134,8 +134,13 @@ struct LoopedStages {
     // (D14) delta = -J^-1 F with J factored; `sorted` is room for N.
     void solve(const real* base, const real* Q, const real* W, const Matrix& matrix, real* delta, real* sorted) const {
         residual(base, Q, W, delta);
+        for (int i = 0; i < N; ++i) delta[i] = -delta[i];
+        solve_for(matrix, delta, sorted);
+    }
+    // delta <- J^-1 delta.
+    static void solve_for(const Matrix& matrix, real* delta, real* sorted) {
         for (int k = 0; k < n; ++k)
-            for (int i = 0; i < m; ++i) sorted[Layout::index(k, i)] = -delta[i * n + k];
+            for (int i = 0; i < m; ++i) sorted[Layout::index(k, i)] = delta[i * n + k];
         matrix.solve(sorted);
         for (int k = 0; k < n; ++k)
             for (int i = 0; i < m; ++i) delta[i * n + k] = sorted[Layout::index(k, i)];
@@ -194,7 +199,7 @@ constexpr bool along_coordinates() {
 }
 
 template <class K>
-struct Stepper<K, Form::separable> : Motion<K> {
+struct Stepper<K, Form::separable, false> : Motion<K> {
     using typename Motion<K>::real;
     using Motion<K>::n, Motion<K>::coefficients, Motion<K>::step_size, Motion<K>::q, Motion<K>::iterations,
         Motion<K>::increment;
@@ -212,7 +217,7 @@ struct Stepper<K, Form::separable> : Motion<K> {
             return K::absorbed;
     }
     static constexpr bool is_frozen = N > 0 && !K::unrolled && (K::linear || absorbs());
-    static constexpr bool is_swept = N > 0 && K::any_number && !K::linear;
+    static constexpr bool is_swept = N > 0 && K::any_number && !K::linear && !K::clean;
     static constexpr bool along_coordinates = lobatto::along_coordinates<K>();
 
     struct Nothing {};
@@ -391,6 +396,29 @@ struct Stepper<K, Form::separable> : Motion<K> {
         }
     }
 
+protected:
+    real node_time(int i) const { return this->time() + K::c[i + 1] * step_size; }
+
+    // a.v and a.base of the step from q and u, and its interior nodes by Newton's iteration: a.nodes, a.W_nodes.
+    Status solve_from_start(Arrays& a) {
+        const Stages stages(coefficients, step_size);
+        const real* const W0 = W + (s - 1) * n;
+        stages.drift(q, u, W0, a.v, a.base);
+        Status status = Status::ok;
+        if constexpr (N > 0) {
+            status = Status::not_converged;
+            if (has_history) {
+                stages.extrapolated_start(a.base, W, a.nodes);
+                status = solve_stages(stages, W0, a);
+            }
+            if (status != Status::ok) {
+                stages.simple_start(a.base, W0, a.nodes);
+                status = solve_stages(stages, W0, a);
+            }
+        }
+        return status;
+    }
+
 private:
     template <class AnySwept>
     void begin_sweeps(AnySwept& any) {
@@ -460,21 +488,10 @@ private:
     }
 
     Status step_in(Arrays& a) {
+        const Status solved = solve_from_start(a);
+        if (solved != Status::ok) return solved;
         const Stages stages(coefficients, step_size);
         const real* const W0 = W + (s - 1) * n;
-        stages.drift(q, u, W0, a.v, a.base);
-        if constexpr (N > 0) {
-            Status status = Status::not_converged;
-            if (has_history) {
-                stages.extrapolated_start(a.base, W, a.nodes);
-                status = solve_stages(stages, W0, a);
-            }
-            if (status != Status::ok) {
-                stages.simple_start(a.base, W0, a.nodes);
-                status = solve_stages(stages, W0, a);
-            }
-            if (status != Status::ok) return status;
-        }
         stages.arrive(a.base, a.W_nodes, a.q1);
         Formulas<K>::acceleration(coefficients, this->next_time(), a.q1, a.W1);
         stages.finish(a.v, a.W_nodes, a.W1, a.u1);
@@ -536,8 +553,6 @@ private:
         }
         return true;
     }
-
-    real node_time(int i) const { return this->time() + K::c[i + 1] * step_size; }
 
     template <class AnyStages>
     Status solve_stages(const AnyStages& stages, const real* W0, Arrays& a) {

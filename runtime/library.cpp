@@ -127,6 +127,15 @@ void LoadedStepper<real>::state(real& time, std::vector<real>& q, std::vector<re
 }
 
 template <class real>
+bool LoadedStepper<real>::two_fold_state(std::vector<real>& q, std::vector<real>& q_rest, std::vector<real>& velocity,
+                                         std::vector<real>& velocity_rest) const {
+    if (kernel_->two_fold_state == nullptr) return false;
+    for (std::vector<real>* values : {&q, &q_rest, &velocity, &velocity_rest}) values->resize(kernel_->coordinates);
+    kernel_->two_fold_state(stepper_, q.data(), q_rest.data(), velocity.data(), velocity_rest.data());
+    return true;
+}
+
+template <class real>
 lobatto_status LoadedStepper<real>::dense(real theta, std::vector<real>& q, std::vector<real>& velocity) const {
     q.resize(kernel_->coordinates);
     velocity.resize(kernel_->coordinates);

@@ -62,6 +62,10 @@ public:
     lobatto_status advance(lobatto_advance& call);
     void state(real& time, std::vector<real>& q, std::vector<real>& p) const;
 
+    // Position and velocity as sums of two numbers, of a kernel with clean arithmetic; false for others.
+    bool two_fold_state(std::vector<real>& q, std::vector<real>& q_rest, std::vector<real>& velocity,
+                        std::vector<real>& velocity_rest) const;
+
     // Position and velocity at t + theta h inside the last step, on its polynomial.
     lobatto_status dense(real theta, std::vector<real>& q, std::vector<real>& velocity) const;
 

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto roundoff: what rounding does to a scene in long runs, in plain and in clean arithmetic.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include "cli/commands.hpp"
+#include "cli/drawing.hpp"
+#include "cli/interruption.hpp"
+#include "cli/method_option.hpp"
+#include "cli/output_path.hpp"
+#include "cli/overrides.hpp"
+#include "cli/roundoff_growth.hpp"
+#include "generator/source.hpp"
+#include "runtime/cache.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct RoundoffCommand {
+    std::string scene, output;
+    MethodOption method;
+    Overrides overrides;
+    std::int64_t steps = 100000;
+    int trajectories = 16;
+    bool no_picture = false;
+};
+
+std::string csv_of(const RoundoffResult& result) {
+    std::string text =
+        "steps,plain mean of H,plain rms of H,plain rms of q,clean mean of H,clean rms of H,clean rms of q\n";
+    for (std::size_t i = 0; i < result.plain.rows.size(); ++i) {
+        const RoundoffRow &plain = result.plain.rows[i], &clean = result.clean.rows[i];
+        text +=
+            fmt::format("{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e}\n", plain.steps, plain.energy_mean,
+                        plain.energy_rms, plain.position_rms, clean.energy_mean, clean.energy_rms, clean.position_rms);
+    }
+    return text;
+}
+
+// Rms errors with Brouwer's laws through the last clean ones.
+std::string script_of(const RoundoffResult& result) {
+    const RoundoffRow& last = result.clean.rows.back();
+    const auto steps = static_cast<double>(last.steps);
+    const auto panel = [&](const char* label, int plain, int clean, double value, double power, const char* law) {
+        return fmt::format(
+            "set ylabel \"{}\"\nplot \"roundoff.csv\" skip 1 using 1:{} with linespoints ls 3 title \"plain\", \"\" "
+            "skip 1 using 1:{} with linespoints ls 2 title \"clean\", {:.6e}*x**{} with lines ls 1 title \"{}\"\n",
+            label, plain, clean, value / std::pow(steps, power), power, law);
+    };
+    return "set multiplot layout 2,1 margins 0.12,0.97,0.11,0.94 spacing 0,0.08\nset logscale xy\nset format y "
+           "\"10^{%T}\"\nset format x \"\"\nset key inside top left vertical maxrows 3\n" +
+           panel("energy, rms", 3, 6, last.energy_rms, 0.5, "√N") +
+           "set format x \"10^{%T}\"\nset xlabel \"steps N\"\n" +
+           panel("position, rms", 4, 7, last.position_rms, 1.5, "N^{3/2}") + "unset multiplot\n";
+}
+
+void print(const RoundoffResult& result) {
+    fmt::print("{:>10}  {:^32}  {:^32}\n{:>10}  {:>10} {:>10} {:>10}  {:>10} {:>10} {:>10}\n", "", "plain", "clean",
+               "steps", "H, mean", "H, rms", "q, rms", "H, mean", "H, rms", "q, rms");
+    for (std::size_t i = 0; i < result.plain.rows.size(); ++i) {
+        const RoundoffRow &plain = result.plain.rows[i], &clean = result.clean.rows[i];
+        fmt::print("{:>10}  {:>10.1e} {:>10.1e} {:>10.1e}  {:>10.1e} {:>10.1e} {:>10.1e}\n", plain.steps,
+                   plain.energy_mean, plain.energy_rms, plain.position_rms, clean.energy_mean, clean.energy_rms,
+                   clean.position_rms);
+    }
+    const auto exponent = [](double value) {
+        return std::isfinite(value) ? fmt::format("N^{:.2f}", value) : std::string("-");
+    };
+    fmt::print("\n{:>10}  {:>10} {:>10} {:>10}  {:>10} {:>10} {:>10}\n", "growth", "",
+               exponent(result.plain.energy_exponent), exponent(result.plain.position_exponent), "",
+               exponent(result.clean.energy_exponent), exponent(result.clean.position_exponent));
+    fmt::print("{:>10}  {:>32}  {:>32}\n", "a step",
+               fmt::format("{:.0f} ns, {:.2f} iterations", result.plain.nanoseconds, result.plain.iterations),
+               fmt::format("{:.0f} ns, {:.2f} iterations", result.clean.nanoseconds, result.clean.iterations));
+}
+
+void roundoff(const RoundoffCommand& options) {
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    apply(options.overrides, scene);
+    scene.method.arithmetic = StepArithmetic::clean;
+    scene.method.tolerance = 0;
+    const std::string name = scene.method.name(), path = scene.path, scene_name = scene.name;
+    const std::string step = fmt::format("{:.6g}", scene.evaluate(scene.run.step, "the step").to_double());
+    const Interruption interruption;
+    const RoundoffResult result =
+        roundoff_growth(std::move(scene), options.steps, options.trajectories, Interruption::flag());
+    fmt::print(
+        "{}: {}, h = {}, {} trajectories.\nWhat rounding changes, against the same steps in long double: H "
+        "relative to |H(0)|, q to its largest.\n\n",
+        path, name, step, options.trajectories);
+    print(result);
+    if (!result.plain.rows.empty()) {
+        const std::string folder = output_path(options.output, scene_name + "_roundoff");
+        std::error_code error;
+        std::filesystem::create_directories(folder, error);
+        if (error) throw MachineError(fmt::format("cannot create the folder {}: {}", folder, error.message()));
+        write_file(folder + "/roundoff.csv", csv_of(result));
+        if (!options.no_picture)
+            draw(folder, "roundoff", script_of(result), 900, 640,
+                 "Install it (apt install gnuplot-nox) or leave the picture out with --no-picture.");
+        fmt::print("\n{}/roundoff.csv{} has all of it.\n", folder,
+                   options.no_picture ? "" : " and roundoff.svg beside it");
+    }
+    if (result.interrupted) {
+        fmt::print(stderr, "lobatto: interrupted after {} steps; the table has what was computed\n", result.steps);
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+}
+
+}  // namespace
+
+void add_roundoff(CLI::App& program) {
+    const auto options = std::make_shared<RoundoffCommand>();
+    CLI::App* command = program.add_subcommand(
+        "roundoff", "Measure how errors of rounding grow in long runs, in plain and in clean arithmetic");
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command->add_option("--steps", options->steps, "how many (default 100000)")
+        ->check(CLI::Range(std::int64_t{10}, std::int64_t{1000000000}));
+    command->add_option("--trajectories", options->trajectories, "whose mean is taken (default 16)")
+        ->check(CLI::Range(2, 1000));
+    options->method.add_to(*command);
+    command->add_option("--step", options->overrides.step,
+                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
+    command
+        ->add_option("--set", options->overrides.set,
+                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
+        ->allow_extra_args(false);
+    command->add_option("-o,--output", options->output,
+                        "Folder of the table and the picture (default: out/NAME_roundoff)");
+    command->add_flag("--no-picture", options->no_picture, "the table alone, without gnuplot");
+    command->footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
+    command->callback([options] { roundoff(*options); });
+}
+
+}  // namespace lobatto

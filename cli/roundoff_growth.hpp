@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// How errors of rounding grow with the number of steps: the same steps in double, plain and clean, and in long double.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "generator/scene.hpp"
+
+namespace lobatto {
+
+// What rounding has done after `steps` steps, over all trajectories.
+struct RoundoffRow {
+    std::int64_t steps = 0;
+    double energy_mean = 0, energy_rms = 0;  // of H - H without rounding, relative to |H(0)|
+    double position_rms = 0;                 // largest |q - q without rounding|, relative to the largest |q| so far
+};
+
+// A straight line through the logarithms of rms values, from 1000 steps on: their exponents; NaN with fewer than three.
+struct RoundoffGrowth {
+    std::vector<RoundoffRow> rows;
+    double energy_exponent = 0, position_exponent = 0;
+    double nanoseconds = 0;  // a step, the fastest trajectory
+    double iterations = 0;   // a step, on average
+};
+
+struct RoundoffResult {
+    RoundoffGrowth plain, clean;
+    std::int64_t steps = 0;  // that all trajectories took
+    bool interrupted = false;
+};
+
+// Trajectory i begins at (1 + i/2^20) times the scene's positions and momenta. What rounding does is seen beside clean
+// steps in long double from the very same numbers, energies are evaluated in quadruple precision, of both numbers that
+// clean arithmetic has for a position. Nothing is said of the method's own error, which both share. ComputationError
+// where a step fails; InputError without a constant mass matrix. Ends early once `interrupted` is raised.
+RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, const volatile int* interrupted);
+
+}  // namespace lobatto
