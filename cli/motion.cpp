@@ -30,6 +30,13 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
         throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}",
                                      overrides.step.empty() ? scene.path : "--step", step.to_double()));
     }
+    const double size = step.to_double();
+    if (!(size >= 1e-152 && size <= 1e152)) {
+        throw InputError(fmt::format(
+            "{}: the step must be between 1e-152 and 1e152, because its square stands in the formulas, but is {:.6g}; "
+            "choose another unit of time",
+            overrides.step.empty() ? scene.path : "--step", size));
+    }
     if (until.is_negative()) {
         throw InputError(fmt::format("{}: the end time must not be negative, but is {:.6g}",
                                      overrides.until.empty() ? scene.path : "--until", until.to_double()));

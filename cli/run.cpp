@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "cli/commands.hpp"
+#include "cli/energy_watch.hpp"
 #include "cli/interruption.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/method_option.hpp"
@@ -77,6 +78,14 @@ std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult
                        result.iterations_most);
 }
 
+std::string defect_text(const LoadedStepper<double>& stepper, const TrajectoryRequest& request) {
+    try {
+        return fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p));
+    } catch (const ComputationError&) {
+        return "not measured: the first step has no derivative in this precision";
+    }
+}
+
 // The stepper is prepared.
 void print_table(const Derivation& derivation, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
                  const TrajectoryResult& result, const Watch& watch) {
@@ -94,15 +103,13 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
         print_row(conserves ? "energy error" : "energy change",
                   fmt::format("{:.2g} at most{}", result.energy_error_largest,
                               relative ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
-        if (relative && kernel.linear != 0 && result.energy_error_largest > 1e3 * H0)
-            print_row("", "it grows without bound: the step is probably beyond the stability limit");
     }
     if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
     if (kernel.has_tangent != 0 && !has_forces(derivation))  // of the first step, its equations solved to rounding
         print_row("symplectic defect",
                   request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
-                                        : fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p)));
+                                        : defect_text(stepper, request));
     if (const auto error = watch.position_error()) {
         const std::string& unit = derivation.scene.coordinates.front().unit;
         print_row("position error",
@@ -155,15 +162,18 @@ void run(const RunOptions& options) {
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
     Watch watch(scene, derivation.structure, stepper, velocity);
     StepJudge judge(scene);
+    EnergyWatch energy_watch(derivation, kernel);
     std::vector<double> counts(1 + event_kinds, 0);  // of the states and of each kind of event
     std::optional<Checkpoint> from;
     if (options.resume) {
-        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.seen().size());
+        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.seen().size() + 1);
         if (from) {
             const auto by_watch = from->watched.begin() + std::ssize(counts),
-                       by_judge = by_watch + std::ssize(watch.seen());
+                       by_energy = by_watch + std::ssize(watch.seen()) + 1,
+                       by_judge = by_energy + std::llround(*(by_energy - 1));
             std::copy(from->watched.begin(), by_watch, counts.begin());
-            watch.go_on_after({by_watch, by_judge});
+            watch.go_on_after({by_watch, by_energy - 1});
+            energy_watch.go_on_after({by_energy, by_judge});
             judge.go_on_after({by_judge, from->watched.end()});
             request.from = &from->halfway;
         }
@@ -192,7 +202,9 @@ void run(const RunOptions& options) {
                 event_file->sync();
                 checkpoint.sizes.push_back(event_file->size());
             }
-            for (const std::vector<double>& seen : {watch.seen(), judge.seen()})
+            const std::vector<double> by_energy = energy_watch.seen();
+            for (const std::vector<double>& seen :
+                 {watch.seen(), {static_cast<double>(by_energy.size())}, by_energy, judge.seen()})
                 checkpoint.watched.insert(checkpoint.watched.end(), seen.begin(), seen.end());
             write_checkpoint(checkpoint_path(path), checkpoint);
         };
@@ -201,6 +213,7 @@ void run(const RunOptions& options) {
         file.write(records);
         watch.look(records);
         judge.look(records);
+        energy_watch.look(records);
         counts[0] += static_cast<double>(records.count);
     };
     TrajectoryResult result;
@@ -233,11 +246,19 @@ void run(const RunOptions& options) {
         throw ComputationError(
             fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
     }
+    const std::string departure = result.interrupted ? "" : energy_watch.departure(derivation, kernel, request);
+    if (!departure.empty())
+        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, path));
     if (scene.outputs.energy && !std::isfinite(result.energy_error_largest)) {
-        throw ComputationError(fmt::format(
-            "{}: the energy left the range of numbers: the motion grows without bound. The step is probably beyond the "
-            "stability limit; try a smaller one. What was computed is in {}.",
-            scene.path, path));
+        throw ComputationError(
+            std::isfinite(result.energy_start)
+                ? fmt::format("{}: the energy became infinite or not a number: the motion grows without bound, or has "
+                              "gone where the Lagrangian is not real. Try a smaller step, such as h = {:.6g}, an "
+                              "earlier end, or start elsewhere. What was computed is in {}.",
+                              scene.path, request.step / 2, path)
+                : fmt::format("{}: the energy of the start is too large for a number, though the motion is not. Try "
+                              "other units, or energy = false under [output]. What was computed is in {}.",
+                              scene.path, path));
     }
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, path,

@@ -21,7 +21,7 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "53ebdb83061157a5";
+    static constexpr const char* digest = "1e326f4961b7fc96";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -94,6 +94,7 @@ struct harmonic_oscillator {
         k.Phi_minus_I[4] = k.Phi_minus_I[0];
         k.Phi_minus_I[5] = k.Phi_minus_I[2];
         if (pivot_1 == real(0)) return Status::singular_mass;
+        if (delta == real(0)) return Status::singular_jacobian;
         if (!lobatto::is_finite(k.m, k.omega_squared, k.k1, k.inverse_m, k.k2, k.Phi_minus_I[0], k.Phi_minus_I[1],
             k.Phi_minus_I[2], k.Phi_minus_I[3], k.Phi_minus_I[4], k.Phi_minus_I[5])) return Status::not_finite;
         lobatto::round_to_unit_determinant(k.Phi_minus_I);

@@ -434,7 +434,7 @@ private:
     // do not act on one another.
     Numbers correction(const Numbers& F, const Numbers& J) {
         const std::size_t N = F.size();
-        machine_.run("correction");
+        machine_.run_in_order("correction");
         Numbers delta(N, cln::cl_R(0));
         std::vector<bool> is_left(N, false);
         for (const Solve& solve : solves_) {

@@ -198,7 +198,7 @@ private:
 
     std::string prepare(const std::string& name) const {
         std::vector<Statement> statements;
-        std::string pivots, finite;
+        std::string pivots, finite, determinant;
         for (const Id id : hoisted_.order) {
             statements.push_back({"k." + hoisted_.names.at(id), id});
             finite += (finite.empty() ? "k." : ", k.") + hoisted_.names.at(id);
@@ -214,6 +214,8 @@ private:
             } else if (program.name == "prepare_map") {
                 for (const Output& output : program.outputs) {
                     statements.push_back({output.target, output.value});
+                    if (output.target.rfind("const real delta", 0) == 0 && !p_.graph.is_constant(output.value))
+                        determinant = output.target.substr(std::string("const real ").size());
                     if (output.target.rfind("k.", 0) == 0) finite += (finite.empty() ? "" : ", ") + output.target;
                 }
             }
@@ -230,6 +232,8 @@ private:
         if (d_.structure.looped) text += looped_.after_prepare();
         if (!pivots.empty())
             text += wrapped("        if (" + pivots + ") return Status::singular_mass;", "            ");
+        if (!determinant.empty())
+            text += fmt::format("        if ({} == real(0)) return Status::singular_jacobian;\n", determinant);
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <utility>
 
 namespace lobatto {
@@ -281,10 +282,10 @@ ex parse_expression(const Source& source, const Text& text, const Scope& scope) 
 
 GiNaC::numeric value_in_range(const Source& source, Position at, const ex& expression, const std::string& formula,
                               const GiNaC::exmap& symbols) {
-    static const numeric largest = GiNaC::pow(numeric(10), numeric(300));
     try {
         const numeric value = real_value(expression, symbols);
-        if (!value.is_zero() && (abs(value) > largest || abs(value) < 1 / largest))
+        const double size = std::fabs(value.to_double());  // 1e-300 itself is in range, though its double is below it
+        if (!value.is_zero() && !(size >= 1e-300 && size <= 1e300))
             source.fail(at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", formula));
         return value;
     } catch (const NoValue& error) {

@@ -154,8 +154,12 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     const auto assign = [&](const Statement& statement) {
         if (statement.target == "return")
             text_ += wrapped(fmt::format("        return {};", text_of(statement.value)), "            ");
-        else if (statement.target == "return finite")
-            text_ += wrapped(fmt::format("        return lobatto::is_finite({});", text_of(statement.value)),
+        else if (statement.target == "require reciprocal")
+            text_ +=
+                wrapped(fmt::format("        if (!lobatto::is_reciprocal({})) return false;", text_of(statement.value)),
+                        "            ");
+        else if (statement.target == "return reciprocal")
+            text_ += wrapped(fmt::format("        return lobatto::is_reciprocal({});", text_of(statement.value)),
                              "            ");
         else if (statement.target.ends_with("+=") || statement.target.ends_with("-="))
             text_ += wrapped(fmt::format("        {} {};", statement.target, text_of(statement.value)), "            ");

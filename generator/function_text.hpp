@@ -19,7 +19,8 @@ struct Hoisted {
     std::map<Id, std::string> names;  // field names: the scene's, those of the derivation, else k1, k2, ...
 };
 
-// One assignment: `target = value;`. The targets "return" and "return finite" end the function.
+// One assignment: `target = value;`. "require reciprocal" ends the function with false where the value is none, "return
+// reciprocal" in any case.
 struct Statement {
     std::string target;
     Id value = 0;

@@ -2,6 +2,7 @@
 // The programs of systems with a constant mass matrix: mechanics, one affine map, or the step with implicit interior
 // nodes (D11 ... D20).
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -309,14 +310,28 @@ private:
                 p_.solves.push_back({mark, unknowns});
             }
         }
-        if (!reciprocals.empty()) program.outputs.push_back({"return finite", g().add(reciprocals)});
+        for (const Id& reciprocal : reciprocals)
+            program.outputs.push_back(
+                {&reciprocal == &reciprocals.back() ? "return reciprocal" : "require reciprocal", reciprocal});
         p_.programs.push_back(std::move(program));
     }
 
     // delta = -adj(J) F / det(J) over some unknowns; the value is 1 / det(J).
     Id cramer(const Ids& F, const Rows& J, const std::vector<std::size_t>& unknowns, Program& program) {
         const std::size_t N = unknowns.size();
-        const auto entry = [&](std::size_t row, std::size_t column) { return J[unknowns[row]][unknowns[column]]; };
+        // Each a local of its own: in products written out the powers of h would be hoisted, and overflow or vanish.
+        std::map<std::pair<std::size_t, std::size_t>, Id> locals;
+        const auto entry = [&](std::size_t row, std::size_t column) {
+            const std::size_t r = unknowns[row], c = unknowns[column];
+            if (g().is_constant(J[r][c])) return J[r][c];
+            const auto [known, is_new] = locals.try_emplace({r, c}, 0);
+            if (is_new) {
+                const std::string name = "J_" + std::to_string(r + 1) + "_" + std::to_string(c + 1);
+                program.outputs.push_back({"const real " + name, J[r][c]});
+                known->second = g().input({name, name, Stage::iterate});
+            }
+            return known->second;
+        };
         const auto minor = [&](std::size_t row, std::size_t column) {  // signed cofactor
             std::vector<std::size_t> r, c;
             for (std::size_t i = 0; i < N; ++i) {

@@ -23,6 +23,22 @@ real symplectic_defect(const LoadedStepper<real>& stepper, const std::vector<rea
         throw ComputationError("the symplectic defect cannot be measured: the step from this state fails");
     const auto size = [](real x) { return x < real(0) ? -x : x; };
     real defect = 0, squares = 0;
+    // Units of q and p in which the blocks dq1/dp and dp1/dq are of one size: else the larger one's square hides all.
+    real to_q = 0, to_p = 0;
+    for (std::size_t a = 0; a < n; ++a)
+        for (std::size_t b = n; b < rows; ++b) {
+            to_q = size(T[a * rows + b]) > to_q ? size(T[a * rows + b]) : to_q;
+            to_p = size(T[b * rows + a]) > to_p ? size(T[b * rows + a]) : to_p;
+        }
+    const double exponent =
+        std::round(std::log2(static_cast<double>(to_q)) / 2 - std::log2(static_cast<double>(to_p)) / 2);
+    const real unit =
+        std::fabs(exponent) < 1000 ? static_cast<real>(std::ldexp(1.0, static_cast<int>(exponent))) : real(1);
+    for (std::size_t a = 0; a < n; ++a)
+        for (std::size_t b = n; b < rows; ++b) {
+            T[a * rows + b] /= unit;
+            T[b * rows + a] *= unit;
+        }
     for (const real entry : T) squares += entry * entry;
     for (std::size_t a = 0; a < rows; ++a) {
         for (std::size_t b = 0; b < a; ++b) {           // T^T J T - J is antisymmetric

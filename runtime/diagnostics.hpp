@@ -10,7 +10,7 @@
 namespace lobatto {
 
 // max |T^T J T - J| over the entries, T the tangent map of one step from (q, p): the symplectic defect. Relative to
-// max(1, |T|^2).
+// max(1, |T|^2), in units of q and p (powers of two) in which dq1/dp and dp1/dq are of one size.
 template <class real>
 real symplectic_defect(const LoadedStepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p);
 

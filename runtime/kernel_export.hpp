@@ -92,7 +92,10 @@ struct Export {
     static std::int32_t prepare(void* stepper, const void* parameters, const void* step) {
         typename K::Parameters values;
         for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
-        return code((new (stepper) S)->prepare(values, *in(step)));
+        S* const fresh = new (stepper) S;
+        if (*in(step) == real(0)) return LOBATTO_TIME_STANDS_STILL;
+        if (!is_finite(*in(step))) return LOBATTO_NOT_FINITE;
+        return code(fresh->prepare(values, *in(step)));
     }
 
     static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {

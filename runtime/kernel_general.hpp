@@ -730,7 +730,8 @@ private:
             if (!is_finite(not_finite_part(a.g, r * Z))) return Status::not_finite;
             a.matrix.clear();
             assemble(a.H, entry_room, a.matrix);
-            if (!a.matrix.factor()) return Status::singular_jacobian;
+            if (!a.matrix.factor())
+                return is_finite(not_finite_part(a.H, r * entry_room)) ? Status::singular_jacobian : Status::not_finite;
             const real e = apply_increment(a.matrix, a);
             increment = e;
             if (!is_finite(e)) return Status::not_finite;

@@ -583,9 +583,9 @@ private:
                 Formulas<K>::node(coefficients, node_time(i), a.nodes + i * n, a.W_nodes + i * n, a.S + i * K::entries);
             ++iterations;
             if constexpr (K::unrolled) {
-                if (!stages.correction(a.base, a.nodes, a.W_nodes, a.S, a.delta)) return Status::singular_jacobian;
+                if (!stages.correction(a.base, a.nodes, a.W_nodes, a.S, a.delta)) return why_not_solved(a.S);
             } else {
-                if (!stages.factor(a.S, K::entries, a.loop.matrix)) return Status::singular_jacobian;
+                if (!stages.factor(a.S, K::entries, a.loop.matrix)) return why_not_solved(a.S);
                 stages.solve(a.base, a.nodes, a.W_nodes, a.loop.matrix, a.delta, a.loop.sorted);
             }
             const real e = apply_increments(a);
@@ -602,6 +602,15 @@ private:
             previous = e;
         }
         return Status::not_converged;
+    }
+
+    // Of entries h^2 S far beyond 1 / epsilon products overflow, and their matrix only looks singular.
+    Status why_not_solved(const real* S) const {
+        for (int e = 0; e < m * K::entries; ++e) {
+            const real entry = fabs(step_size * (step_size * S[e])) * Limits<real>::epsilon * Limits<real>::epsilon;
+            if (!(entry <= real(1))) return Status::not_finite;
+        }
+        return Status::singular_jacobian;
     }
 
     // The constant part of S and the Jacobian with it.

@@ -10,6 +10,12 @@
 
 namespace lobatto {
 
+// Of a pivot, or of a determinant: neither it nor its reciprocal is zero, infinite or not a number.
+template <class real>
+inline bool is_reciprocal(real inverse) {
+    return is_finite(inverse) && inverse != real(0);
+}
+
 // A X = B with A of size x size and B of size x columns, both row-major and overwritten; X ends in B. Gaussian
 // elimination with partial pivoting. False when a pivot is zero or not finite.
 template <int size, int columns, class real>
@@ -32,7 +38,7 @@ inline bool solve(real* A, real* B) {
             }
         }
         const real inverse = real(1) / A[k * size + k];
-        if (!is_finite(inverse)) return false;
+        if (!is_reciprocal(inverse)) return false;
         for (int i = k + 1; i < size; ++i) {
             const real factor = A[i * size + k] * inverse;
             if (factor == real(0)) continue;
@@ -74,7 +80,7 @@ inline bool factor_dense(real* A, std::int32_t* pivots, Size size) {
             }
         }
         const real inverse = real(1) / A[k * size + k];
-        if (!is_finite(inverse)) return false;
+        if (!is_reciprocal(inverse)) return false;
         A[k * size + k] = inverse;
         for (int i = k + 1; i < size; ++i) {
             const real factor = A[i * size + k] * inverse;
@@ -128,7 +134,7 @@ inline bool factor_band(real* A, std::int32_t* pivots, Size size, Band band) {
             }
         }
         const real inverse = real(1) / row[k];
-        if (!is_finite(inverse)) return false;
+        if (!is_reciprocal(inverse)) return false;
         row[k] = inverse;
         for (int i = k + 1; i <= last; ++i) {
             real* const below = A + i * width + band - i;

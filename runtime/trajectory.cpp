@@ -108,11 +108,14 @@ private:
     double pause_ = checkpoint_seconds;
 };
 
-std::string list(const std::vector<double>& values) {
-    return fmt::format("({:.6g})", fmt::join(values, ", "));
-}
-
 }  // namespace
+
+std::string list_text(const std::vector<double>& values) {
+    constexpr std::size_t shown = 16;
+    if (values.size() <= shown) return fmt::format("({:.6g})", fmt::join(values, ", "));
+    return fmt::format("({:.6g}, ... {} in all)", fmt::join(values.begin(), values.begin() + shown, ", "),
+                       values.size());
+}
 
 TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request) {
     TrajectoryResult result;
@@ -123,12 +126,14 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     result.status = stepper.prepare(request.parameters, request.step);
     if (result.status == LOBATTO_OK) result.status = stepper.start(request.time, request.q, request.p);
     if (result.status != LOBATTO_OK) return result;
+    result.started = true;
 
     Keeper keeper(stepper, request, result);
     if (request.from == nullptr) {
         keeper.keep_last();
     } else {
         result = request.from->result;
+        result.started = true;
         result.interrupted = false;
         stepper.restore(request.from->stepper);
     }
@@ -207,6 +212,13 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
             advice = smaller + ", or start elsewhere";
             break;
         case LOBATTO_NOT_FINITE:
+            if (!result.started) {
+                why =
+                    "a number computed from the parameters, the step and this start alone is infinite or not a number: "
+                    "they are too large or too small together, or the start is at a singularity";
+                advice = "other units, so that numbers are nearer to 1, or start elsewhere";
+                break;
+            }
             why =
                 "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
                 "potential or away to infinity, or the "
@@ -242,10 +254,12 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
             break;
     }
     const std::string where =
-        result.steps_done == 0
+        !result.started ? fmt::format("the run cannot begin at t = {:.6g}", result.time)
+        : result.steps_done == 0
             ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
             : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);
-    return fmt::format("{}, from q = {}, p = {}: {}. Try {}.", where, list(result.q), list(result.p), why, advice);
+    return fmt::format("{}, from q = {}, p = {}: {}. Try {}.", where, list_text(result.q), list_text(result.p), why,
+                       advice);
 }
 
 }  // namespace lobatto

@@ -30,6 +30,7 @@ struct EventRecords {
 
 struct TrajectoryResult {
     lobatto_status status = LOBATTO_OK;
+    bool started = false;  // parameters, step and start were accepted
     bool interrupted = false;
     std::int64_t steps_done = 0;
     std::int64_t iterations = 0;
@@ -73,6 +74,9 @@ struct TrajectoryRequest {
 };
 
 TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request);
+
+// (1.25, -3); of long lists the beginning and the number.
+std::string list_text(const std::vector<double>& values);
 
 // What to tell a person when a run stopped: step, time, state, residual, why, and what to try. One paragraph.
 std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request);

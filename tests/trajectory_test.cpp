@@ -241,6 +241,7 @@ TEST_CASE("a step that does not converge stops the run, keeps the steps before a
 TEST_CASE("each way to stop has its own explanation") {
     TrajectoryRequest request = from_two(0.5, 100);
     TrajectoryResult result;
+    result.started = true;
     result.steps_done = 41;
     result.time = 20.5;
     result.q = {1.25, -3};
@@ -286,6 +287,23 @@ TEST_CASE("each way to stop has its own explanation") {
         "the run stopped in its first step, at t = 0, from q = (1.25, -3), p = (0, 1e+10): the kernel was compiled "
         "without what is asked of it: states between steps, events, energies or tangent maps. Try to compile it from a "
         "scene whose [output] asks for it.");
+}
+
+TEST_CASE("a start that makes numbers too large is told apart from a motion that does, and long states are shortened") {
+    TrajectoryRequest request = from_two(0.5, 100);
+    TrajectoryResult result;
+    result.status = LOBATTO_NOT_FINITE;
+    result.q = {1.25};
+    result.p = std::vector<double>(20, 0.5);
+    CHECK(
+        explain_stop(result, request) ==
+        "the run cannot begin at t = 0, from q = (1.25), p = (0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, "
+        "0.5, 0.5, 0.5, 0.5, 0.5, ... 20 in all): a number computed from the parameters, the step and this start alone "
+        "is infinite or not a number: they are too large or too small together, or the start is at a singularity. Try "
+        "other units, so that numbers are nearer to 1, or start elsewhere.");
+    request.q = {1e300};
+    request.parameters = {1, 1e200};
+    CHECK(!integrate(pendulum(), request).started);
 }
 
 TEST_CASE("a start that is impossible keeps nothing and says why") {

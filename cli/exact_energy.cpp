@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/exact_energy.hpp"
+
+namespace lobatto {
+
+ExactEnergy::ExactEnergy(const Derivation& derivation, const std::vector<double>& parameters)
+    : system_(derivation.system) {
+    for (std::size_t i = 0; i < parameters.size(); ++i)
+        formulas_.set(system_.parameters[i], float_of(GiNaC::numeric(parameters[i])));
+    GiNaC::ex energy = -system_.lagrangian;
+    for (std::size_t k = 0; k < system_.q.size(); ++k) {
+        energy += system_.v[k] * system_.momentum[k];
+        for (const GiNaC::symbol& symbol : {system_.q[k], system_.v[k]}) formulas_.set(symbol, 0);
+    }
+    energy_ = formulas_.convert({energy});
+}
+
+std::optional<ExactEnergy::Energy> ExactEnergy::at(const std::vector<double>& q, const std::vector<double>& velocity) {
+    const auto energy_with = [&](bool moving) {
+        for (std::size_t k = 0; k < q.size(); ++k) {
+            formulas_.set(system_.q[k], float_of(GiNaC::numeric(q[k])));
+            formulas_.set(system_.v[k], float_of(GiNaC::numeric(moving ? velocity[k] : 0.0)));
+        }
+        return formulas_.evaluate_sized(energy_).front();
+    };
+    try {
+        const Sized whole = energy_with(true), resting = energy_with(false);
+        return Energy{whole.value, whole.value - resting.value, whole.size};
+    } catch (const DomainError&) {
+        return std::nullopt;
+    }
+}
+
+}  // namespace lobatto
