@@ -72,6 +72,7 @@ Checked check(const CheckCommand& options) {
     result.derivation = derive(scene, options.general);
     result.operations = operations_of(emit(result.derivation));
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    scene.method.arithmetic = StepArithmetic::plain;  // which the general path has alone
     result.without = options.general ? result.derivation : derive(scene, true);
     result.operations_without = options.general ? result.operations : operations_of(emit(result.without));
     result.outputs = outputs_of(result.derivation, result.operations);

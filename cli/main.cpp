@@ -71,8 +71,8 @@ void describe(CLI::App& program) {
     add_derive(program);
     add_emit(program);
     add_run(program);
-    add_roundoff(program);
     add_stability(program);
+    add_roundoff(program);
     add_sweep(program);
     add_tradeoff(program);
     add_tune(program);

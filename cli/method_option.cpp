@@ -4,39 +4,46 @@
 #include <cstdlib>
 #include <string>
 
+#include "generator/source.hpp"
+
 namespace lobatto {
 
-void MethodOption::add_to(CLI::App& command) {
+void MethodOption::add_members_to(CLI::App& command) {
     CLI::Option* lobatto = command.add_option("--points", points, "Lobatto with this many points: order 2 points - 2");
     CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
     lobatto->check(CLI::Range(2, 12));
     gauss->check(CLI::Range(1, 10))->excludes(lobatto);
-    CLI::Option* limit =
-        command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative");
-    limit->check([](const std::string& text) {
-        const double value = std::strtod(text.c_str(), nullptr);
-        return value > 0 && value <= 1e-3 ? ""
-                                          : "the tolerance is " + text +
-                                                "; it must be above 0 and at most 0.001; leave it out to iterate "
-                                                "to rounding";
-    });
+}
+
+void MethodOption::add_to(CLI::App& command) {
+    add_members_to(command);
+    command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
+        ->check([](const std::string& text) {
+            const double value = std::strtod(text.c_str(), nullptr);
+            return value > 0 && value <= 1e-3 ? ""
+                                              : "the tolerance is " + text +
+                                                    "; it must be above 0 and at most 0.001; leave it out to iterate "
+                                                    "to rounding";
+        });
     command
         .add_option("--arithmetic", arithmetic,
                     "plain, or clean: rounding errors grow like a random walk only (slower)")
-        ->check(CLI::IsMember({"plain", "clean"}))
-        ->excludes(limit);
+        ->check(CLI::IsMember({"plain", "clean"}));
 }
 
 void MethodOption::apply(Scene& scene) const {
     Method& method = scene.method;
     if (points) method.family = Family::lobatto, method.points = *points;
     if (stages) method.family = Family::gauss, method.points = *stages;
-    if (tolerance) {
-        method.tolerance = *tolerance;
-        method.arithmetic = StepArithmetic::plain;
-    }
     if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
-    if (method.arithmetic == StepArithmetic::clean) method.tolerance = 0;
+    if (tolerance) {
+        if (method.arithmetic == StepArithmetic::clean)
+            throw InputError(scene.path +
+                             ": clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave "
+                             "out --tolerance, or add --arithmetic plain");
+        method.tolerance = *tolerance;
+    }
+    if (method.arithmetic == StepArithmetic::clean) method.tolerance = 0;  // the scene's, with --arithmetic clean
 }
 
 }  // namespace lobatto

@@ -16,6 +16,7 @@ struct MethodOption {
     std::optional<std::string> arithmetic;
 
     void add_to(CLI::App& command);
+    void add_members_to(CLI::App& command);  // --points and --stages alone
     void apply(Scene& scene) const;
 };
 

@@ -42,15 +42,17 @@ std::string csv_of(const RoundoffResult& result) {
     return text;
 }
 
-// Rms errors with Brouwer's laws through the last clean ones.
+// Rms errors with Brouwer's laws through the last clean ones. Empty where rounding changes nothing.
 std::string script_of(const RoundoffResult& result) {
-    const RoundoffRow& last = result.clean.rows.back();
+    const RoundoffRow &last = result.clean.rows.back(), &plain = result.plain.rows.back();
+    if (!(last.energy_rms > 0 && last.position_rms > 0 && plain.energy_rms > 0 && plain.position_rms > 0)) return "";
     const auto steps = static_cast<double>(last.steps);
-    const auto panel = [&](const char* label, int plain, int clean, double value, double power, const char* law) {
+    const auto panel = [&](const char* label, int plain_column, int clean_column, double value, double power,
+                           const char* law) {
         return fmt::format(
             "set ylabel \"{}\"\nplot \"roundoff.csv\" skip 1 using 1:{} with linespoints ls 3 title \"plain\", \"\" "
             "skip 1 using 1:{} with linespoints ls 2 title \"clean\", {:.6e}*x**{} with lines ls 1 title \"{}\"\n",
-            label, plain, clean, value / std::pow(steps, power), power, law);
+            label, plain_column, clean_column, value / std::pow(steps, power), power, law);
     };
     return "set multiplot layout 2,1 margins 0.12,0.97,0.11,0.94 spacing 0,0.08\nset logscale xy\nset format y "
            "\"10^{%T}\"\nset format x \"\"\nset key inside top left vertical maxrows 3\n" +
@@ -101,11 +103,11 @@ void roundoff(const RoundoffCommand& options) {
         std::filesystem::create_directories(folder, error);
         if (error) throw MachineError(fmt::format("cannot create the folder {}: {}", folder, error.message()));
         write_file(folder + "/roundoff.csv", csv_of(result));
-        if (!options.no_picture)
-            draw(folder, "roundoff", script_of(result), 900, 640,
+        const std::string script = options.no_picture ? "" : script_of(result);
+        if (!script.empty())
+            draw(folder, "roundoff", script, 900, 640,
                  "Install it (apt install gnuplot-nox) or leave the picture out with --no-picture.");
-        fmt::print("\n{}/roundoff.csv{} has all of it.\n", folder,
-                   options.no_picture ? "" : " and roundoff.svg beside it");
+        fmt::print("\n{}/roundoff.csv{} has all of it.\n", folder, script.empty() ? "" : " and roundoff.svg beside it");
     }
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted after {} steps; the table has what was computed\n", result.steps);
@@ -124,7 +126,7 @@ void add_roundoff(CLI::App& program) {
         ->check(CLI::Range(std::int64_t{10}, std::int64_t{1000000000}));
     command->add_option("--trajectories", options->trajectories, "whose mean is taken (default 16)")
         ->check(CLI::Range(2, 1000));
-    options->method.add_to(*command);
+    options->method.add_members_to(*command);
     command->add_option("--step", options->overrides.step,
                         "Step h; may use the scene's parameters, as in 2*pi/omega/50");
     command

@@ -50,9 +50,9 @@ struct Kernels {
 template <class real>
 class Runner {
 public:
-    Runner(const Kernel& kernel, const std::vector<real>& parameters, double step, const std::vector<real>& q,
-           const std::vector<real>& p)
-        : stepper_(kernel), n_(q.size()) {
+    Runner(const char* name, const Kernel& kernel, const std::vector<real>& parameters, double step,
+           const std::vector<real>& q, const std::vector<real>& p)
+        : name_(name), stepper_(kernel), n_(q.size()), step_(step) {
         succeed(stepper_.prepare(parameters, static_cast<real>(step)));
         succeed(stepper_.start(0, q, p));
     }
@@ -72,7 +72,7 @@ public:
         std::vector<real> value(n_), rest(n_), rate(n_), rate_rest(n_);
         if (stepper_.two_fold_state(value, rest, rate, rate_rest)) {
             q = sum(value, rest);
-            p = exact.momentum(0, q, sum(rate, rate_rest));
+            p = exact.momentum(time(), q, sum(rate, rate_rest));
         } else {
             real time;
             stepper_.state(time, value, rate);
@@ -81,13 +81,18 @@ public:
         }
     }
 
+    Quad time() const { return static_cast<Quad>(static_cast<double>(taken)) * static_cast<Quad>(step_); }
+
     double seconds = 0;
     std::int64_t iterations = 0, taken = 0;
 
 private:
     void succeed(lobatto_status status) const {
         if (status != LOBATTO_OK)
-            throw ComputationError(fmt::format("a step after {} fails; `lobatto run` explains such a stop", taken));
+            throw ComputationError(
+                fmt::format("in {}, a step after {} fails; `lobatto run` with the same options and "
+                            "--arithmetic says why",
+                            name_, taken));
     }
     std::vector<Quad> sum(const std::vector<real>& value, const std::vector<real>& rest) const {
         std::vector<Quad> result;
@@ -95,8 +100,10 @@ private:
         return result;
     }
 
+    const char* name_;
     LoadedStepper<real> stepper_;
     std::size_t n_;
+    double step_;
 };
 
 struct Difference {
@@ -122,8 +129,8 @@ Course follow(const Kernels& kernels, const ExactStart& start, double step, int 
     const std::vector<Quad> parameters = quad_of(in_double.parameters);
     LoadedStepper<Quad> exact(kernels.exact);
     exact.prepare(parameters, static_cast<Quad>(step));
-    Runner<double> plain(kernels.plain, in_double.parameters, step, in_double.q, in_double.p);
-    Runner<double> clean(kernels.clean, in_double.parameters, step, in_double.q, in_double.p);
+    Runner<double> plain("plain arithmetic", kernels.plain, in_double.parameters, step, in_double.q, in_double.p);
+    Runner<double> clean("clean arithmetic", kernels.clean, in_double.parameters, step, in_double.q, in_double.p);
 
     // The reference begins where the clean steps do: at momenta that give the velocity in double.
     std::vector<Quad> q, p, q_exact, p_exact;
@@ -133,10 +140,14 @@ Course follow(const Kernels& kernels, const ExactStart& start, double step, int 
         for (const Quad value : values) result.push_back(static_cast<long double>(value));
         return result;
     };
-    Runner<long double> reference(kernels.extended, extended_of(parameters), step, extended_of(q), extended_of(p));
-    Quad H0 = 0, H = 0, H_exact = 0;
+    Runner<long double> reference("long double", kernels.extended, extended_of(parameters), step, extended_of(q),
+                                  extended_of(p));
+    // Energies are relative to H(0), or to the kinetic energy where that is larger.
+    Quad H0 = 0, V0 = 0, H = 0, H_exact = 0;
     exact.energy(0, q, p, H0);
-    const Quad scale = H0 < 0 ? -H0 : H0 > 0 ? H0 : Quad(1);
+    exact.energy(0, q, std::vector<Quad>(p.size(), Quad(0)), V0);
+    const auto size = [](Quad value) { return value < 0 ? -value : value; };
+    const Quad larger = std::max(size(H0), size(H0 - V0)), scale = larger > 0 ? larger : Quad(1);
     double largest = 0;
     Course course;
     for (const std::int64_t look : looks) {
@@ -146,11 +157,11 @@ Course follow(const Kernels& kernels, const ExactStart& start, double step, int 
         clean.advance(more);
         reference.advance(more);
         reference.state(exact, q_exact, p_exact);
-        exact.energy(0, q_exact, p_exact, H_exact);
+        exact.energy(reference.time(), q_exact, p_exact, H_exact);
         for (const Quad value : q_exact) largest = std::max(largest, std::fabs(static_cast<double>(value)));
         const auto compare = [&](const Runner<double>& runner) {
             runner.state(exact, q, p);
-            exact.energy(0, q, p, H);
+            exact.energy(runner.time(), q, p, H);
             Difference difference;
             difference.energy = static_cast<double>((H - H_exact) / scale);
             for (std::size_t k = 0; k < q.size(); ++k)

@@ -12,7 +12,7 @@ namespace lobatto {
 // What rounding has done after `steps` steps, over all trajectories.
 struct RoundoffRow {
     std::int64_t steps = 0;
-    double energy_mean = 0, energy_rms = 0;  // of H - H without rounding, relative to |H(0)|
+    double energy_mean = 0, energy_rms = 0;  // of H - H without rounding, relative to |H(0)| or the kinetic energy
     double position_rms = 0;                 // largest |q - q without rounding|, relative to the largest |q| so far
 };
 

@@ -126,12 +126,13 @@ private:
     // Whether second derivatives save more evaluations than they cost.
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
-        // Measured: what a second derivative saves in evaluations it costs in products, five times in a step.
+        // With second derivatives a step takes an evaluation less, about, and five products for each of them
+        // (measured).
         const double evaluation = cost_of("acceleration", "_slope"), with_slopes = cost_of("node", "_node");
         const bool is_costly = with_slopes + 5 * static_cast<double>(d_.structure.entries.size()) <= 2 * evaluation;
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", is_costly),
                            is_costly ? "forces are evaluated less often for having second derivatives"
-                                     : "forces cost less than what their second derivatives would save");
+                                     : "second derivatives would cost more than the evaluations they save");
     }
 
     std::string parameters() const {

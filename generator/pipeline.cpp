@@ -17,12 +17,16 @@ const Discretisation& Derivation::discretisation() const {
 
 namespace {
 
-// Clean steps are steps of systems with a constant mass matrix.
-void check_arithmetic(const Scene& scene, const System& system) {
-    if (scene.method.arithmetic == StepArithmetic::clean && !system.separable)
+// Clean steps are steps of systems with a constant mass matrix and forces without velocities.
+void check_arithmetic(const Scene& scene, const System& system, bool general) {
+    if (scene.method.arithmetic != StepArithmetic::clean) return;
+    if (general)
+        throw InputError(scene.path +
+                         ": the general path has no clean arithmetic; leave out --general, or add --arithmetic plain");
+    if (!system.separable)
         scene.source.fail(scene.lagrangian_at,
-                          "there is no clean arithmetic for this Lagrangian: " + system.not_separable +
-                              "; leave arithmetic = \"clean\" out, or --arithmetic");
+                          "clean arithmetic needs a constant mass matrix and forces without velocities, but " +
+                              system.not_separable + "; use plain arithmetic (--arithmetic plain)");
 }
 
 }  // namespace
@@ -32,7 +36,7 @@ Derivation derive(const Scene& scene, bool general) {
     Derivation derivation;
     derivation.scene = scene;
     derivation.system = build_system(scene);
-    check_arithmetic(scene, derivation.system);
+    check_arithmetic(scene, derivation.system, general);
     check_start(scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     derivation.structure = find_structure(scene, derivation.system, derivation.quadrature, general);
@@ -44,6 +48,7 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
     other.scene = derivation.scene;
     other.scene.method = method;
     other.system = derivation.system;
+    check_arithmetic(other.scene, other.system, derivation.structure.general);
     other.quadrature = quadrature_of(method);
     other.structure = find_structure(other.scene, other.system, other.quadrature, derivation.structure.general);
     return other;

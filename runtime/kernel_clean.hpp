@@ -7,8 +7,10 @@
 //     |h| < 2^e, gamma_i ~ h c_i; beta_i = h - gamma_i; eta_ij ~ h A_ij / b_j for i <= j, and below the diagonal
 //     eta_ij = eta_ji + gamma_i - gamma_j, all without rounding. With impulses f_j = -h b_j W(Q_j), however rounded,
 //         Q_i = q + gamma_i (u + f_1) + sum_j eta_ij f_j,   q1 = q + h (u + f_1) + sum_j beta_j f_j,   u1 = u + sum f
-//     is symplectic, since eta_ij - eta_ji = gamma_i - gamma_j.
-//   Sweeps go on until they give the same bits again, or no smaller increments.
+//     is symplectic, since eta_ij - eta_ji = gamma_i - gamma_j. (In the nodes f and positions are rounded once.)
+//   Sweeps go on until they give the same bits again, or those of the sweep before, in turn: whatever the scale of a
+//     coordinate, an iteration that converges ends so, and no other does; a longer cycle of last bits is left after
+//     eight sweeps.
 //   Position and velocity are sums of two numbers each, and the increments of a step are added without error: products
 //     with b_j too, whose rounding is not random where b_j is a simple fraction.
 // The scheme is that of Antonana, Makazaga and Murua (Numer. Algorithms 76, 2017) for Gauss' methods, in the form that
@@ -73,23 +75,11 @@ struct TwoFold {
     }
 };
 
-// When an iteration in rounded arithmetic is over: once increments, in units of rounding, no longer shrink.
+// What a sweep has done to the positions.
 template <class real>
-struct Stagnation {
-    static constexpr real most = real(1024);  // units: larger ones that do not shrink are no rounding
-    real least = Limits<real>::largest;
-    int stood = 0;
-
-    // True when no further iteration is worth it.
-    bool is_over(real increment) {
-        if (increment < least) {
-            least = increment;
-            stood = 0;
-            return increment == real(0);
-        }
-        return ++stood > 1;
-    }
-    bool is_rounding() const { return least <= most; }
+struct Change {
+    bool none, back;  // the same bits as before; those of before the last change
+    real size;        // the largest change, relative to the motion
 };
 
 // A multiple of `unit`, a power of 2, next to x; |x| < unit / epsilon * 2.
@@ -106,12 +96,13 @@ struct CleanSweeps {
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
     using Layout = NodeLayout<real, real, m>;
     using V = typename Layout::V;
-    static constexpr int width = Layout::width, evaluation_limit = 60;
+    static constexpr int width = Layout::width, evaluation_limit = 30, correction_limit = 12, patience = 8;
+    static constexpr real noise = real(64) * Limits<real>::epsilon;  // changes below may stay as they are
     static constexpr int parts = m > 0 ? Layout::parts_of(m) : 1;
 
     struct Arrays {
-        V first[parts * n], X[parts * n], W[parts * n];
-        real flat[parts * width], in_roundings[n], next[s * n];
+        V first[parts * n], X[parts * n], older[parts * n], W[parts * n];
+        real flat[parts * width], inverse_scale[n], next[s * n];
         real q1[n], q1_rest[n], u1[n], u1_rest[n];
     };
 
@@ -125,7 +116,7 @@ struct CleanSweeps {
     real beta[s];     // h, then h - gamma
     real h{};
     int evaluations{};  // of the last step
-    real increment{};   // the last one of the last step, in units of rounding
+    real increment{};   // the last one of the last step, relative
 
     Status prepare(real step) {
         h = step;
@@ -163,15 +154,22 @@ struct CleanSweeps {
         return Status::ok;
     }
 
-    // What the positions of a step are made of before any iteration. W: the accelerations of the step before.
+    // What the positions of a step are made of before any iteration. W: the accelerations of the step before. A
+    // coordinate that hardly moves has a thousandth of the largest motion as its measure: its neighbours' rounding.
     void set_out(const real* q, const real* u, const real* u_rest, const real* W, Arrays& a) const {
+        if constexpr (m == 0) return;
+        real largest_scale = real(0);
         for (int c = 0; c < n; ++c) {
             real rest;
             const real rate = add_with_error(u[c], impulse[0] * W[(s - 1) * n + c], rest);
             rest += u_rest[c];
-            const real size = Limits<real>::epsilon * (fabs(q[c]) + fabs(h * rate));
-            a.in_roundings[c] = size > Limits<real>::smallest ? real(1) / size : real(0);
             for (int p = 0; p < parts; ++p) a.first[p * n + c] = fused(gamma[p], V(rate), gamma[p] * V(rest));
+            a.inverse_scale[c] = fabs(q[c]) + fabs(h * rate);
+            largest_scale = maximum(largest_scale, a.inverse_scale[c]);
+        }
+        for (int c = 0; c < n; ++c) {
+            const real scale = maximum(a.inverse_scale[c], largest_scale / real(1024));
+            a.inverse_scale[c] = scale > Limits<real>::smallest ? real(1) / scale : real(0);
         }
     }
 
@@ -180,6 +178,9 @@ struct CleanSweeps {
     template <class Given>
     bool solve(const Given& k, real time, const real* q, const real* q_rest, const real* W, bool has_history,
                Arrays& a) {
+        evaluations = 0;
+        increment = real(0);
+        if constexpr (m == 0) return true;
         for (int c = 0; c < n; ++c)
             for (int p = 0; p < parts; ++p) {
                 V Z = a.first[p * n + c];
@@ -187,24 +188,29 @@ struct CleanSweeps {
                     for (int l = 0; l < s; ++l) Z = fused(before[l][p], V(W[l * n + c]), Z);
                 else
                     Z = fused(simple[p], V(W[(s - 1) * n + c]), Z);
-                a.X[p * n + c] = V(q[c]) + Z;
+                a.older[p * n + c] = a.X[p * n + c] = V(q[c]) + Z;
             }
-        evaluations = 0;
-        if constexpr (m == 0) return true;
-        Stagnation<real> stagnation;
+        real last = Limits<real>::largest;
+        int noisy = 0;  // sweeps that changed no more than rounding may
         while (evaluations < evaluation_limit) {
             for (int p = 0; p < parts; ++p)
                 Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
             ++evaluations;
-            increment = sweep(q, q_rest, a);
-            if (stagnation.is_over(increment)) return stagnation.is_rounding();
+            const Change<real> change = sweep(q, q_rest, a);
+            increment = change.size;
+            if (change.none || change.back) return true;
+            noisy += change.size <= noise ? 1 : 0;
+            if (noisy > patience) return true;  // in a longer cycle
+            if (evaluations > 3 && change.size > noise && !(change.size < real(0.8) * last)) return false;
+            last = change.size;
         }
         return false;
     }
 
-    // The positions that a.W gives, in place of X; the largest change, in units of rounding.
-    real sweep(const real* q, const real* q_rest, Arrays& a) const {
+    // The positions that a.W gives, in place of X.
+    Change<real> sweep(const real* q, const real* q_rest, Arrays& a) const {
         V worst = V(real(0));
+        bool none = true, back = true;
         for (int c = 0; c < n; ++c) {
             for (int p = 0; p < parts; ++p) {
                 const V f = weight[p] * a.W[p * n + c];
@@ -217,12 +223,15 @@ struct CleanSweeps {
                     V& sum = j % 2 == 0 ? even : odd;
                     sum = fused(eta[j][p], V(a.flat[j]), sum);
                 }
-                const V X = V(q[c]) + (even + odd), moved = fabs(X - a.X[p * n + c]) * V(a.in_roundings[c]);
-                worst = maximum(worst, moved);
+                const V X = V(q[c]) + (even + odd), old = a.X[p * n + c];
+                none = none && all(X == old);
+                back = back && all(X == a.older[p * n + c]);
+                worst = maximum(worst, fabs(X - old) * V(a.inverse_scale[c]));
+                a.older[p * n + c] = old;
                 a.X[p * n + c] = X;
             }
         }
-        return largest(worst);
+        return {none, back, largest(worst)};
     }
 
     // `use` is given a Pack of the type to use and the first coordinate of its lanes.
@@ -237,10 +246,10 @@ struct CleanSweeps {
     // The end of the step from the accelerations a.W at its inner nodes: q, u, their rests and W, of all nodes, move
     // on. False, and nothing has moved, where a number is not finite.
     template <class Given>
-    bool finish(const Given& k, real time, real* q, real* q_rest, real* u, real* u_rest, real* W, Arrays& a) const {
+    bool finish(const Given& k, real end_time, real* q, real* q_rest, real* u, real* u_rest, real* W, Arrays& a) const {
         real* const next = a.next;
         for (int c = 0; c < n; ++c) {
-            for (int p = 0; p < parts; ++p) lay_flat<1>(&a.W[p * n + c], 1, a.flat + p * width);
+            for (int p = 0; m > 0 && p < parts; ++p) lay_flat<1>(&a.W[p * n + c], 1, a.flat + p * width);
             next[c] = W[(s - 1) * n + c];
             for (int j = 0; j < m; ++j) next[(j + 1) * n + c] = a.flat[j];
         }
@@ -258,7 +267,7 @@ struct CleanSweeps {
             moved.value.store(a.q1 + c);
             moved.rest.store(a.q1_rest + c);
         });
-        Formulas<K>::acceleration(k, real(time + h), static_cast<const real*>(a.q1), next + (s - 1) * n);
+        Formulas<K>::acceleration(k, end_time, static_cast<const real*>(a.q1), next + (s - 1) * n);
         over_coordinates([&](auto lanes, int c) LOBATTO_FORMULA {
             using L = decltype(lanes);
             TwoFold<L> change{L(real(0)), L(real(0))};
@@ -321,7 +330,7 @@ private:
             u_old[c] = u[c];
         }
         sweeps.set_out(q, u, u_rest, W, a);
-        const auto finish = [&] { return sweeps.finish(coefficients, time, q, q_rest, u, u_rest, W, a); };
+        const auto finish = [&] { return sweeps.finish(coefficients, this->next_time(), q, q_rest, u, u_rest, W, a); };
         if (pause.count_down() && sweeps.solve(coefficients, time, q, q_rest, W, has_history, a) && finish()) {
             pause.succeed();
             iterations = static_cast<std::int32_t>(sweeps.evaluations);
@@ -335,54 +344,53 @@ private:
             q_before[c] = q_old[c];
             u_before[c] = u_old[c];
         }
-        increment = sweeps.increment * Limits<real>::epsilon;
+        increment = sweeps.increment;
         has_history = true;
         ++this->steps;
         return Status::ok;
     }
 
     // Where sweeps do not contract: Newton's iteration for the plain equations, then with its last Jacobian corrections
-    // of the clean ones, X -= J^-1 (X - sweep(X)), until they no longer shrink.
+    // of the clean ones, X -= J^-1 (X - sweep(X)), while they change anything and do not grow.
     Status newton(typename Plain::Arrays& plain, typename Sweeps::Arrays& a) {
+        const Status status = this->solve_from_start(plain);
         if constexpr (m > 0) {
-            const Status status = this->solve_from_start(plain);
             if (status != Status::ok) return status;
-            Stagnation<real> stagnation;
             constexpr int width = Sweeps::width;
-            const auto lane = [](typename Sweeps::V* values, int i, int c) -> decltype(auto) {
-                return values[(i / width) * n + c];
-            };
-            for (int correction = 0; correction < Sweeps::evaluation_limit; ++correction) {
-                for (int i = 0; i < m; ++i) {
+            real last = Limits<real>::largest;
+            for (int correction = 0; correction < Sweeps::correction_limit; ++correction) {
+                for (int i = 0; i < m; ++i)
                     Formulas<K>::acceleration(coefficients, this->node_time(i),
                                               static_cast<const real*>(plain.nodes + i * n), plain.W_nodes + i * n);
+                for (int lane = 0; lane < Sweeps::parts * width; ++lane)
                     for (int c = 0; c < n; ++c) {
-                        set_lane(lane(a.W, i, c), i % width, plain.W_nodes[i * n + c]);
-                        set_lane(lane(a.X, i, c), i % width, plain.nodes[i * n + c]);
+                        const int place = (lane / width) * n + c, i = lane < m ? lane : m - 1;
+                        set_lane(a.W[place], lane % width, plain.W_nodes[i * n + c]);
+                        set_lane(a.X[place], lane % width, plain.nodes[i * n + c]);
+                        set_lane(a.older[place], lane % width, plain.nodes[i * n + c]);
                     }
-                }
                 ++iterations;
                 sweeps.sweep(q, q_rest, a);
                 for (int i = 0; i < m; ++i)
                     for (int c = 0; c < n; ++c)
-                        plain.delta[i * n + c] = lane_of(lane(a.X, i, c), i % width) - plain.nodes[i * n + c];
+                        plain.delta[i * n + c] = lane_of(a.X[(i / width) * n + c], i % width) - plain.nodes[i * n + c];
                 LoopedStages<K>::solve_for(plain.loop.matrix, plain.delta, plain.loop.sorted);
+                bool changes = false;
                 real worst = real(0);
                 for (int i = 0; i < m; ++i)
                     for (int c = 0; c < n; ++c) {
-                        const real moved = fabs(plain.delta[i * n + c]) * a.in_roundings[c];
-                        if (!is_finite(moved)) return Status::not_finite;
-                        worst = moved > worst ? moved : worst;
+                        const real delta = plain.delta[i * n + c], node = plain.nodes[i * n + c];
+                        if (!is_finite(delta)) return Status::not_finite;
+                        changes = changes || node + delta != node;
+                        worst = maximum(worst, fabs(delta) * a.inverse_scale[c]);
                     }
                 sweeps.increment = worst;
-                if (stagnation.is_over(worst)) return stagnation.is_rounding() ? Status::ok : Status::not_converged;
+                if (!changes || (correction > 1 && !(worst < last))) break;
+                last = worst;
                 for (int i = 0; i < m * n; ++i) plain.nodes[i] += plain.delta[i];
             }
-            return Status::not_converged;
-        } else {
-            (void)plain, (void)a;
-            return Status::ok;
         }
+        return status;
     }
 };
 

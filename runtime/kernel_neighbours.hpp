@@ -97,7 +97,9 @@ struct RowLoop {
             V sum = adds ? load(W + r) : V(real_of<number>(0));
             each(every, [&](auto j) LOBATTO_FORMULA {
                 V& result = rows.result[j];
-                if constexpr (!is_whole) result = first_lanes(result, count - r);
+                if constexpr (in_lanes) {
+                    if constexpr (!is_whole) result = first_lanes(result, count - r);
+                }
                 if constexpr (offset(j) > width)
                     store(load(W + offset(j) + r) + result, W + offset(j) + r);
                 else if constexpr (!adds && j == 0)

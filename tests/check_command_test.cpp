@@ -78,7 +78,7 @@ TEST_CASE("check says what it found, what that saves, and what it looked for in 
                       "  tangent                     the derivative of a step, from the matrix of its equations\n"
                       "  dense                       not asked for, left out\n"
                       "  events                      not asked for, left out\n"
-                      "  operations                  125 in all its formulas, each counted once; 24 without what was "
+                      "  operations                  122 in all its formulas, each counted once; 24 without what was "
                       "found, for one\n"
                       "                              point of a step\n"
                       "  derived and written in      TIME s\n");

@@ -45,7 +45,9 @@ std::vector<Measurement> telling(const std::vector<Measurement>& measurements, d
     std::vector<Measurement> runs;
     double rounding = 1;
     for (const Measurement& m : measurements) {
-        if (!m.complete || m.candidate.tolerance != 0 || m.candidate.member.precision != Precision::double_) continue;
+        if (!m.complete || m.candidate.tolerance != 0 || m.candidate.member.precision != Precision::double_ ||
+            m.candidate.member.arithmetic != StepArithmetic::plain)
+            continue;
         rounding = std::fmin(rounding, m.error);
         runs.push_back(m);
     }

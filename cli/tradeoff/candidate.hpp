@@ -17,10 +17,11 @@ struct Member {
     Family family = Family::lobatto;
     int points = 4;
     Precision precision = Precision::double_;
+    StepArithmetic arithmetic = StepArithmetic::plain;
 
-    Method method(double tolerance = 0) const { return {family, points, tolerance}; }
+    Method method(double tolerance = 0) const { return {family, points, tolerance, arithmetic}; }
     int order() const { return method().order(); }
-    auto key() const { return std::tuple(family, points, precision); }
+    auto key() const { return std::tuple(family, points, precision, arithmetic); }
     friend bool operator==(const Member& a, const Member& b) { return a.key() == b.key(); }
     friend bool operator<(const Member& a, const Member& b) { return a.key() < b.key(); }
 };
@@ -52,7 +53,7 @@ struct Candidate {
     double tolerance = 0;    // of the iteration; 0: to stagnation
 
     auto key() const { return std::tuple(member.key(), steps, tolerance); }
-    std::string name() const;  // "Lobatto 8"
+    std::string name() const;  // "Lobatto 8", "Gauss 6 clean"
 };
 
 // Errors of states are relative to the amplitudes of the motion (Reference::scale), those of energies to its energy.

@@ -20,7 +20,7 @@ namespace {
 constexpr int few_coordinates = 10, some_coordinates = 20;
 constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
 constexpr double reference_share = 0.4;        // of the seconds
-const std::string measurements_version = "2";  // of what is measured: older notebooks are begun anew
+const std::string measurements_version = "3";  // of what is measured: older notebooks are begun anew
 
 // In quadruple precision where that is asked for and affordable. Order 22; of large systems the equations of a step are
 // large too, and order 10 does.

@@ -30,6 +30,10 @@ constexpr std::array<Column, 14> columns = {{{"error_end", &Measurement::error_e
                                              {"compile_seconds", &Measurement::compile_seconds}}};
 constexpr std::array precisions = {Precision::single, Precision::double_, Precision::extended, Precision::quadruple};
 
+const char* arithmetic_name(const Member& member) {
+    return member.arithmetic == StepArithmetic::clean ? "clean" : "plain";
+}
+
 }  // namespace
 
 nlohmann::ordered_json json_of(const Measurement& measurement) {
@@ -37,6 +41,7 @@ nlohmann::ordered_json json_of(const Measurement& measurement) {
     nlohmann::ordered_json json = {{"family", candidate.member.family == Family::lobatto ? "lobatto" : "gauss"},
                                    {"points", candidate.member.points},
                                    {"precision", precision_name(candidate.member.precision)},
+                                   {"arithmetic", arithmetic_name(candidate.member)},
                                    {"steps", candidate.steps},
                                    {"tolerance", candidate.tolerance},
                                    {"complete", measurement.complete}};
@@ -57,6 +62,7 @@ Measurement measurement_of(const nlohmann::json& json) {
     candidate.member.points = json.at("points");
     for (const Precision precision : precisions)
         if (json.at("precision") == precision_name(precision)) candidate.member.precision = precision;
+    if (json.at("arithmetic") == "clean") candidate.member.arithmetic = StepArithmetic::clean;
     candidate.steps = json.at("steps");
     candidate.tolerance = json.at("tolerance");
     measurement.complete = json.at("complete");
@@ -67,18 +73,18 @@ Measurement measurement_of(const nlohmann::json& json) {
 }
 
 std::string csv_header() {
-    std::string text = "family,points,precision,steps,step,tolerance,complete";
+    std::string text = "family,points,precision,arithmetic,steps,step,tolerance,complete";
     for (const auto& [name, member] : columns) text += fmt::format(",{}", name);
     return text + '\n';
 }
 
 std::string csv_row(const Measurement& measurement, double until) {
     const Candidate& candidate = measurement.candidate;
-    std::string text =
-        fmt::format("{},{},{},{},{},{},{}", candidate.member.family == Family::lobatto ? "lobatto" : "gauss",
-                    candidate.member.points, precision_name(candidate.member.precision), candidate.steps,
-                    exact_text(until / static_cast<double>(candidate.steps)), exact_text(candidate.tolerance),
-                    measurement.complete ? 1 : 0);
+    std::string text = fmt::format(
+        "{},{},{},{},{},{},{},{}", candidate.member.family == Family::lobatto ? "lobatto" : "gauss",
+        candidate.member.points, precision_name(candidate.member.precision), arithmetic_name(candidate.member),
+        candidate.steps, exact_text(until / static_cast<double>(candidate.steps)), exact_text(candidate.tolerance),
+        measurement.complete ? 1 : 0);
     for (const auto& [name, member] : columns)
 
         text += "," + (std::isfinite(measurement.*member) ? exact_text(measurement.*member) : std::string());

@@ -19,6 +19,7 @@ std::vector<std::string> method_lines(const Choice& choice) {
     const bool lobatto = candidate.member.family == Family::lobatto;
     std::vector<std::string> lines = {fmt::format("family = \"{}\"", lobatto ? "lobatto" : "gauss"),
                                       fmt::format("{} = {}", lobatto ? "points" : "stages", candidate.member.points)};
+    if (candidate.member.arithmetic == StepArithmetic::clean) lines.push_back("arithmetic = \"clean\"");
     if (candidate.tolerance > 0) lines.push_back("tolerance = " + exact_text(candidate.tolerance));
     return lines;
 }
@@ -109,7 +110,7 @@ void write_method(const Choice& choice, const Scene& scene, double error, bool u
     const Candidate& candidate = choice.measurement.candidate;
     const Scene back = read_scene(Source(scene.path, text));
     if (back.method.family != candidate.member.family || back.method.points != candidate.member.points ||
-        back.method.tolerance != candidate.tolerance ||
+        back.method.tolerance != candidate.tolerance || back.method.arithmetic != candidate.member.arithmetic ||
         back.evaluate(back.run.step, "the step").to_double() != choice.step())
         throw InputError(
             fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "

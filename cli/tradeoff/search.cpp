@@ -127,7 +127,7 @@ Measurement polish(Laboratory& laboratory, const Measurement& crossing, double g
     const double exponent = std::floor(std::log10(goal));
     const bool iterates = laboratory.workshop().kernel(member)->linear == 0;
     for (const double below : {0.0, 1.0, 2.0, 3.0, 4.0}) {
-        if (!iterates) break;
+        if (!iterates || member.arithmetic == StepArithmetic::clean) break;
         const double tolerance = std::pow(10.0, std::clamp(exponent - below, -14.0, -3.0));
         if (tolerances.back() != tolerance) tolerances.push_back(tolerance);
     }
@@ -144,6 +144,24 @@ Measurement polish(Laboratory& laboratory, const Measurement& crossing, double g
     }
     return best;
 }
+
+namespace {
+
+// What the members that came nearest to a goal below their rounding would be in clean arithmetic.
+std::vector<Member> cleaner(const std::map<Member, Crossing>& tried) {
+    std::vector<std::pair<double, Member>> nearest;
+    for (const auto& [member, crossing] : tried)
+        if (member.arithmetic == StepArithmetic::plain) nearest.emplace_back(crossing.least_error, member);
+    std::sort(nearest.begin(), nearest.end());
+    std::vector<Member> members;
+    for (auto& [error, member] : nearest) {
+        member.arithmetic = StepArithmetic::clean;
+        if (members.size() < 3 && tried.count(member) == 0) members.push_back(member);
+    }
+    return members;
+}
+
+}  // namespace
 
 std::vector<Member> first_guess(double goal, std::size_t count) {
     // Higher orders for smaller errors: about half the digits, and some more.
@@ -178,13 +196,17 @@ std::vector<Member> neighbours(const std::map<Member, Crossing>& tried, double b
         if (top_cost > hopeless * best_cost && tried_here >= 3) continue;
         for (const int distance : {1, 2})
             for (const int points : {top->points + distance, top->points - distance}) {
-                if (points < least || points > most || tried.count({family, points}) != 0) continue;
+                Member next = *top;  // in its arithmetic
+                next.points = points;
+                if (points < least || points > most || tried.count(next) != 0) continue;
                 // Beyond a neighbour that is clearly slower nothing is expected.
                 if (distance == 2) {
-                    const auto between = tried.find({family, (points + top->points) / 2});
+                    Member middle = *top;
+                    middle.points = (points + top->points) / 2;
+                    const auto between = tried.find(middle);
                     if (between == tried.end() || cost(between->second.measurement) > 1.15 * top_cost) continue;
                 }
-                wishes.push_back({top_cost * distance, {family, points}});
+                wishes.push_back({top_cost * distance, next});
             }
     }
     std::stable_sort(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -202,6 +224,7 @@ Search search(Laboratory& laboratory, double goal) {
     std::map<Member, Crossing> tried;
     std::vector<Member> queue = first_guess(goal, 4);
     const double reserve = 0.2 * laboratory.request().seconds;  // for polishing
+    bool tried_clean = false;                                   // only where rounding stands in the way
     for (const Member& member : queue) workshop.order(member);
     const auto best_cost = [&] {
         double best = infinity;
@@ -235,6 +258,12 @@ Search search(Laboratory& laboratory, double goal) {
                 if (queue.size() >= std::max(2u, workshop.threads())) break;
             }
         }
+        const bool is_separable = laboratory.derivation().system.separable;
+        if (queue.empty() && !tried_clean && is_separable && best_cost() == infinity && laboratory.left() > 0) {
+            tried_clean = true;
+            queue = cleaner(tried);
+            for (const Member& member : queue) workshop.order(member);
+        }
         if (queue.empty()) {
             result.complete = true;
             break;
@@ -267,7 +296,7 @@ Search search(Laboratory& laboratory, double goal) {
 namespace {
 
 // Members in the order in which they are looked at: first those far apart, then between them.
-std::vector<Member> tour() {
+std::vector<Member> tour(bool is_separable) {
     std::vector<Member> members;
     const auto add = [&](Family family, Precision precision, std::initializer_list<int> points) {
         for (const int count : points) members.push_back({family, count, precision});
@@ -281,6 +310,9 @@ std::vector<Member> tour() {
     add(Family::gauss, Precision::double_, {3, 1});
     add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::extended, {12});
+    if (is_separable)
+        for (const int count : {8, 12})
+            members.push_back({Family::lobatto, count, Precision::double_, StepArithmetic::clean});
     add(Family::lobatto, Precision::double_, {5, 3, 9, 7, 11});
     add(Family::gauss, Precision::double_, {8, 4, 2, 5, 7, 9});
     add(Family::lobatto, Precision::single, {4, 8});
@@ -340,7 +372,8 @@ std::optional<Scan> refinement(const Laboratory& laboratory, const std::set<Scan
         for (const double tolerance : {0.0, 1e-12, 1e-9, 1e-6})
             for (const Member& member : winners) {
                 if (member.precision == Precision::quadruple) continue;
-                if (tolerance > 0 && tolerance < 4 * rounding_of(member.precision)) continue;
+                const bool is_clean = member.arithmetic == StepArithmetic::clean;
+                if (tolerance > 0 && (is_clean || tolerance < 4 * rounding_of(member.precision))) continue;
                 if (const Scan scan{member, ratio, tolerance}; done.count(scan) == 0) return scan;
             }
     return std::nullopt;
@@ -349,7 +382,7 @@ std::optional<Scan> refinement(const Laboratory& laboratory, const std::set<Scan
 }  // namespace
 
 std::vector<Member> first_of_tour() {
-    const std::vector<Member> members = tour();
+    const std::vector<Member> members = tour(false);
     return {members.begin(), members.begin() + 4};
 }
 
@@ -357,7 +390,7 @@ void explore(Laboratory& laboratory) {
     Workshop& workshop = laboratory.workshop();
     const double all = laboratory.request().seconds, reserve = 0.12 * all;
     double last_order = 0.25 * all;  // what is ordered later would not be used
-    std::vector<Member> waiting = tour();
+    std::vector<Member> waiting = tour(laboratory.derivation().system.separable);
     std::set<Scan> done;
     const auto name = [](const Member& member) {
         return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));
