@@ -98,13 +98,14 @@ Scene kepler_scene(const std::string& method) {
 }  // namespace
 
 TEST_CASE("clean steps are plain ones to rounding, of every member and of every kind of scene") {
-    for (const auto& [motion, method] :
-         std::vector<std::pair<Motion, std::string>>{{pendulum, "points = 2"},
-                                                     {pendulum, "family = \"gauss\"\nstages = 3"},
-                                                     {driven_pendulum, "points = 5"},
-                                                     {chain(), "points = 4"},
-                                                     {coupled_masses, "points = 5"},
-                                                     {lattice(), "points = 6"}}) {
+    for (const auto& subject : std::vector<std::pair<Motion, std::string>>{{pendulum, "points = 2"},
+                                                                           {pendulum, "family = \"gauss\"\nstages = 3"},
+                                                                           {driven_pendulum, "points = 5"},
+                                                                           {chain(), "points = 4"},
+                                                                           {coupled_masses, "points = 5"},
+                                                                           {lattice(), "points = 6"}}) {
+        const Motion& motion = subject.first;
+        const std::string& method = subject.second;
         INFO(motion.body << method);
         const double distance = difference<double>(motion, method, Precision::double_, 200, motion.step);
         CHECK(distance < 500);  // 1.6 ... 80 measured
@@ -195,8 +196,9 @@ TEST_CASE("clean steps have the same bits in units that are powers of two apart,
         return std::pair(std::ldexp(state.q[0], -length), std::ldexp(state.p[0], time - length));
     };
     const auto expected = run(0, 0);
-    for (const auto& [length, time] : {std::pair(900, 0), std::pair(-990, 0), std::pair(0, 400), std::pair(0, -400),
-                                       std::pair(300, -300), std::pair(-300, 300)}) {
+    for (const auto& units : {std::pair(900, 0), std::pair(-990, 0), std::pair(0, 400), std::pair(0, -400),
+                              std::pair(300, -300), std::pair(-300, 300)}) {
+        const int length = units.first, time = units.second;
         INFO(length << ' ' << time);
         CHECK(run(length, time) == expected);
     }
