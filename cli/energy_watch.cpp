@@ -102,14 +102,15 @@ std::string EnergyWatch::departure(const Derivation& derivation, const Kernel& k
     const auto energy_of = [&](const State& state) {
         return state.v.empty() ? std::nullopt : energy.at(state.q, state.v);
     };
-    double kinetic = 0;
+    // The start is no moment like others: it counts where there is nothing else.
+    double kinetic = 0, at_start = 0;
     int states = 0;
-    for (std::size_t i = some_.size() > 1 ? 1 : 0; i < some_.size(); ++i)  // the start is no moment like others
+    for (std::size_t i = 0; i < some_.size(); ++i)
         if (const auto here = energy_of(state_of(stepper, some_[i]))) {
-            kinetic += std::fabs(cln::double_approx(here->moving));
-            ++states;
+            (i == 0 ? at_start : kinetic) += std::fabs(cln::double_approx(here->moving));
+            states += i == 0 ? 0 : 1;
         }
-    kinetic /= std::max(states, 1);
+    kinetic = states > 0 ? kinetic / states : at_start;
     const auto start = energy_of(state_of(stepper, leaving_.front()));
     if (!start || !(kinetic > 0)) return "";
     for (const std::vector<double>& row : leaving_) {

@@ -18,6 +18,8 @@
 #ifndef LOBATTO_KERNEL_CLEAN_HPP
 #define LOBATTO_KERNEL_CLEAN_HPP
 
+#include <type_traits>
+
 #include "kernel_contract.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_pack.hpp"
@@ -34,13 +36,28 @@ LOBATTO_INLINE V add_with_error(const V& a, const V& b, V& error) {
     return sum;
 }
 
-// a b = product + error.
+// x = high + low, of half its digits each (Veltkamp).
+inline void split(long double x, long double& high, long double& low) {
+    const long double shifted = 4294967297.0L * x;  // 2^32 + 1
+    high = shifted - (shifted - x);
+    low = x - high;
+}
+
+// a b = product + error, as long as the error is a normal number.
 template <class V>
 LOBATTO_INLINE V multiply_with_error(const V& a, const V& b, V& error) {
     using real = real_of<V>;
     const V product = a * b;
     if constexpr (has_fused && sizeof(real) <= 8) {
         error = fused(a, b, -product);
+    } else if constexpr (std::is_same_v<real, long double>) {  // Dekker's product: the library's fma is slow
+        for (int i = 0; i < lanes_of<V>; ++i) {
+            real a_high, a_low, b_high, b_low;
+            split(lane_of(a, i), a_high, a_low);
+            split(lane_of(b, i), b_high, b_low);
+            set_lane(error, i,
+                     ((a_high * b_high - lane_of(product, i)) + a_high * b_low + a_low * b_high) + a_low * b_low);
+        }
     } else {
         for (int i = 0; i < lanes_of<V>; ++i)
             set_lane(error, i, rounded_once(lane_of(a, i), lane_of(b, i), -lane_of(product, i)));

@@ -81,5 +81,9 @@ TEST_CASE("error-free sums and products have no error") {
         long double rest;
         const long double wide_sum = add_with_error(wide, static_cast<long double>(b), rest);
         CHECK(Quad(wide_sum) + Quad(rest) == Quad(wide) + Quad(b));
+        // The product of two numbers of 64 bits has 128: of 113 the last are rounded.
+        const long double short_one = static_cast<long double>(static_cast<float>(b)) / 1024;
+        const long double wide_product = multiply_with_error(wide, short_one, rest);
+        CHECK(Quad(wide_product) + Quad(rest) == Quad(wide) * Quad(short_one));
     }
 }
