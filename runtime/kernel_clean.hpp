@@ -8,9 +8,8 @@
 //     eta_ij = eta_ji + gamma_i - gamma_j, all without rounding. With impulses f_j = -h b_j W(Q_j), however rounded,
 //         Q_i = q + gamma_i (u + f_1) + sum_j eta_ij f_j,   q1 = q + h (u + f_1) + sum_j beta_j f_j,   u1 = u + sum f
 //     is symplectic, since eta_ij - eta_ji = gamma_i - gamma_j. (In the nodes f and positions are rounded once.)
-//   Sweeps go on until they give the same bits again, or those of the sweep before, in turn: whatever the scale of a
-//     coordinate, an iteration that converges ends so, and no other does; a longer cycle of last bits is left after
-//     eight sweeps.
+//   Sweeps go on until they give the same bits again, or last bits alternate; a longer cycle of last bits is left after
+//     eight sweeps. Newton's iteration takes the steps in which sweeps do not get there.
 //   Position and velocity are sums of two numbers each, and the increments of a step are added without error: products
 //     with b_j too, whose rounding is not random where b_j is a simple fraction.
 // The scheme is that of Antonana, Makazaga and Murua (Numer. Algorithms 76, 2017) for Gauss' methods, in the form that
@@ -18,6 +17,7 @@
 #ifndef LOBATTO_KERNEL_CLEAN_HPP
 #define LOBATTO_KERNEL_CLEAN_HPP
 
+#include <limits>
 #include <type_traits>
 
 #include "kernel_contract.hpp"
@@ -36,7 +36,10 @@ LOBATTO_INLINE V add_with_error(const V& a, const V& b, V& error) {
     return sum;
 }
 
-// x = high + low, of half its digits each (Veltkamp).
+template <class real>
+constexpr bool has_64_bits = std::is_same_v<real, long double>&& std::numeric_limits<real>::digits == 64;
+
+// x = high + low, of half its 64 digits each (Veltkamp).
 inline void split(long double x, long double& high, long double& low) {
     const long double shifted = 4294967297.0L * x;  // 2^32 + 1
     high = shifted - (shifted - x);
@@ -50,7 +53,7 @@ LOBATTO_INLINE V multiply_with_error(const V& a, const V& b, V& error) {
     const V product = a * b;
     if constexpr (has_fused && sizeof(real) <= 8) {
         error = fused(a, b, -product);
-    } else if constexpr (std::is_same_v<real, long double>) {  // Dekker's product: the library's fma is slow
+    } else if constexpr (has_64_bits<real>) {  // Dekker's product: the library's fma is slow
         for (int i = 0; i < lanes_of<V>; ++i) {
             real a_high, a_low, b_high, b_low;
             split(lane_of(a, i), a_high, a_low);
@@ -96,7 +99,8 @@ struct TwoFold {
 template <class real>
 struct Change {
     bool none, back;  // the same bits as before; those of before the last change
-    real size;        // the largest change, relative to the motion
+    real size;        // the largest change, relative to the motion of its coordinate or a thousandth of the largest
+    real own;         // relative to the motion of its coordinate alone
 };
 
 // A multiple of `unit`, a power of 2, next to x; |x| < unit / epsilon * 2.
@@ -119,7 +123,7 @@ struct CleanSweeps {
 
     struct Arrays {
         V first[parts * n], X[parts * n], older[parts * n], W[parts * n];
-        real flat[parts * width], inverse_scale[n], next[s * n];
+        real flat[parts * width], inverse_scale[n], inverse_own[n], next[s * n];
         real q1[n], q1_rest[n], u1[n], u1_rest[n];
     };
 
@@ -171,8 +175,9 @@ struct CleanSweeps {
         return Status::ok;
     }
 
-    // What the positions of a step are made of before any iteration. W: the accelerations of the step before. A
-    // coordinate that hardly moves has a thousandth of the largest motion as its measure: its neighbours' rounding.
+    // What the positions of a step are made of before any iteration, and the measures of changes. W: the accelerations
+    // of the step before. What a coordinate that hardly moves gets from its neighbours' rounding is much by its own
+    // measure.
     void set_out(const real* q, const real* u, const real* u_rest, const real* W, Arrays& a) const {
         if constexpr (m == 0) return;
         real largest_scale = real(0);
@@ -181,13 +186,12 @@ struct CleanSweeps {
             const real rate = add_with_error(u[c], impulse[0] * W[(s - 1) * n + c], rest);
             rest += u_rest[c];
             for (int p = 0; p < parts; ++p) a.first[p * n + c] = fused(gamma[p], V(rate), gamma[p] * V(rest));
-            a.inverse_scale[c] = fabs(q[c]) + fabs(h * rate);
-            largest_scale = maximum(largest_scale, a.inverse_scale[c]);
+            const real scale = maximum(fabs(q[c]) + fabs(h * rate), Limits<real>::smallest);
+            a.inverse_own[c] = real(1) / scale;
+            largest_scale = maximum(largest_scale, scale);
         }
-        for (int c = 0; c < n; ++c) {
-            const real scale = maximum(a.inverse_scale[c], largest_scale / real(1024));
-            a.inverse_scale[c] = scale > Limits<real>::smallest ? real(1) / scale : real(0);
-        }
+        const real most = real(1024) / largest_scale;
+        for (int c = 0; c < n; ++c) a.inverse_scale[c] = minimum(a.inverse_own[c], most);
     }
 
     // The accelerations a.W at the inner nodes of a step, by sweeps. W: those of the step before, node-major. False
@@ -215,8 +219,8 @@ struct CleanSweeps {
             ++evaluations;
             const Change<real> change = sweep(q, q_rest, a);
             increment = change.size;
-            if (change.none || change.back) return true;
-            noisy += change.size <= noise ? 1 : 0;
+            if (change.none || (change.back && change.size <= noise)) return true;
+            noisy += change.own <= noise ? 1 : 0;
             if (noisy > patience) return true;  // in a longer cycle
             if (evaluations > 3 && change.size > noise && !(change.size < real(0.8) * last)) return false;
             last = change.size;
@@ -226,7 +230,7 @@ struct CleanSweeps {
 
     // The positions that a.W gives, in place of X.
     Change<real> sweep(const real* q, const real* q_rest, Arrays& a) const {
-        V worst = V(real(0));
+        V worst = V(real(0)), worst_own = V(real(0));
         bool none = true, back = true;
         for (int c = 0; c < n; ++c) {
             for (int p = 0; p < parts; ++p) {
@@ -243,12 +247,14 @@ struct CleanSweeps {
                 const V X = V(q[c]) + (even + odd), old = a.X[p * n + c];
                 none = none && all(X == old);
                 back = back && all(X == a.older[p * n + c]);
-                worst = maximum(worst, fabs(X - old) * V(a.inverse_scale[c]));
+                const V moved = fabs(X - old);
+                worst = maximum(worst, moved * V(a.inverse_scale[c]));
+                worst_own = maximum(worst_own, moved * V(a.inverse_own[c]));
                 a.older[p * n + c] = old;
                 a.X[p * n + c] = X;
             }
         }
-        return {none, back, largest(worst)};
+        return {none, back, largest(worst), largest(worst_own)};
     }
 
     // `use` is given a Pack of the type to use and the first coordinate of its lanes.

@@ -126,6 +126,39 @@ TEST_CASE("where sweeps do not contract clean steps are found by Newton's iterat
     CHECK(difference<double>(pendulum, "points = 4", Precision::double_, 50, 1.5) < 5000);
 }
 
+TEST_CASE("sweeps that alternate, or that begin at rest, are not taken for solved") {
+    // h omega = 2 with the midpoint rule: each sweep turns the error round, X = a - X, for ever.
+    Motion oscillator = harmonic_oscillator;
+    oscillator.parameters = {1, 1};
+    CHECK(difference<double>(oscillator, "family = \"gauss\"\nstages = 1", Precision::double_, 50, 2) < 1000);
+    // Nothing moves yet, so nothing is small beside the motion; sweeps enlarge errors threefold.
+    const Motion stiff{
+        "time = \"t\"\nlagrangian = \"q'^2/2 - 32*(q - sin(t))^2\"\n[coordinates]\nq = { position = 0, "
+        "velocity = 0 }\n",
+        {},
+        {0},
+        {0},
+        1};
+    CHECK(difference<double>(stiff, "family = \"gauss\"\nstages = 3", Precision::double_, 5, 1) < 1000);
+}
+
+TEST_CASE("a coordinate is solved to its own rounding beside one that moves 1e13 times as far") {
+    // Sweeps leave 0.4 of the error of b, each.
+    Motion both{
+        "lagrangian = \"(a'^2 + b'^2)/2 - a^2/2 - 8.5*b^2/2\"\n[coordinates]\na = { position = 1e13, velocity = 0 }\n"
+        "b = { position = 1, velocity = 0 }\n",
+        {},
+        {1e13, 1},
+        {0, 0},
+        1};
+    const std::string method = "family = \"gauss\"\nstages = 3";
+    auto plain =
+        started<double>(kernel_in_own_cache(derivation_of(both, method, untangent), Precision::double_), both, 1);
+    auto other = started<double>(kernel_in_own_cache(derivation_of(both, clean(method), untangent), Precision::double_),
+                                 both, 1);
+    CHECK(std::fabs(after(other, 50).q[1] - after(plain, 50).q[1]) < 1e-12);
+}
+
 TEST_CASE("clean steps forward and backward return to rounding") {
     const Kernel kernel =
         kernel_in_own_cache(derivation_of(kepler, clean("points = 6"), untangent), Precision::double_);
