@@ -116,7 +116,7 @@ KernelSource source_of(const Problem& problem, Method method) {
     return emit(derive(scene));
 }
 
-Contestants kernel_contestants(const Problem& problem, bool few, bool side_by_side) {
+Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together) {
     const std::vector<Method> methods = methods_in_race(few);
     std::vector<KernelSource> sources;
     for (const Method& method : methods) sources.push_back(source_of(problem, method));
@@ -126,12 +126,12 @@ Contestants kernel_contestants(const Problem& problem, bool few, bool side_by_si
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
         workers.push_back(std::async(std::launch::async, [&] {
             for (std::size_t j; (j = next++) < sources.size();)
-                compile(translation_of(sources[j], Precision::double_, side_by_side));
+                compile(translation_of(sources[j], Precision::double_, together));
         }));
     for (std::future<void>& worker : workers) worker.get();
     Contestants contestants;
     for (std::size_t i = 0; i < methods.size(); ++i) {
-        const Kernel kernel = side_by_side ? ensemble_kernel_of(sources[i], Precision::double_)
+        const Kernel kernel = together > 0 ? ensemble_kernel_of(sources[i], Precision::double_, together)
                                            : kernel_of(sources[i], Precision::double_);
         for (const double tolerance : tolerances)
             contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel));

@@ -10,8 +10,9 @@ namespace lobatto::bench {
 
 KernelSource source_of(const Problem& problem, Method method);
 
-// Of all methods in the race, each iterated to rounding and to tolerances. `few`: of some.
-Contestants kernel_contestants(const Problem& problem, bool few, bool side_by_side);
+// Of all methods in the race, each iterated to rounding and to tolerances. `few`: of some. `together`: how many
+// trajectories go side by side; 0: one alone.
+Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together);
 
 // Seconds from the scene to the loaded kernel, nothing cached.
 double cold_start_seconds(const Problem& problem, Method method);

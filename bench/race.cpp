@@ -145,7 +145,7 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
 #endif
     if (!options.peers_only) {
         say(race, "kernels");
-        enter(kernel_contestants(problem, options.quick, trajectories > 1));
+        enter(kernel_contestants(problem, options.quick, trajectories > 1 ? trajectories : 0));
     }
     for (Contestant& contestant : contestants) {
         say(race, contestant.method);

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <bit>
 #include <sstream>
 
 #include "cli/support_text.hpp"
@@ -33,12 +35,15 @@ Kernel built(const KernelSource& source, const Translation& translation, Compile
 
 }  // namespace
 
-Translation translation_of(const KernelSource& source, Precision precision, bool side_by_side) {
+Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together) {
     Translation translation;
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
-    if (side_by_side) translation.text += "#define LOBATTO_ENSEMBLES\n";
+    if (together > 0) {  // a power of 2: two registers hold 32 numbers at most, and every text is compiled
+        const auto counted = static_cast<std::uint64_t>(std::clamp<std::int64_t>(together, 1, 32));
+        translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", std::bit_floor(counted));
+    }
     for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text})
         append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
@@ -49,8 +54,8 @@ Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* comp
     return built(source, translation_of(source, precision), compiled);
 }
 
-Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, Compiled* compiled) {
-    return built(source, translation_of(source, precision, true), compiled);
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together) {
+    return built(source, translation_of(source, precision, std::max<std::int64_t>(together, 1)), nullptr);
 }
 
 }  // namespace lobatto

@@ -231,7 +231,6 @@ void sweep(const SweepOptions& options) {
 
     const Derivation derivation = derive(as_written);
     const KernelSource source = emit(derivation);
-    const Kernel kernel = ensemble_kernel_of(source, Precision::double_);
     EnsembleRequest request;
     request.count = grid.count();
     request.start = [&](std::int64_t index, EnsembleStart& start) { grid.start(index, start); };
@@ -241,6 +240,7 @@ void sweep(const SweepOptions& options) {
     request.tolerance = scene.method.tolerance;
     request.every = options.overrides.every.value_or(0);
     request.threads = options.threads;
+    const Kernel kernel = ensemble_kernel_of(source, Precision::double_, request.count / thread_count(options.threads));
     refuse_too_much(grid, kernel, request);
 
     const SweepTable::Format format = format_of(options);

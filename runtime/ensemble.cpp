@@ -146,8 +146,7 @@ struct Ended {
 struct Plan {
     std::int64_t threads, group_size, groups, window;  // window: groups in memory
     Plan(const Kernel& kernel, const EnsembleRequest& request) {
-        threads =
-            request.threads > 0 ? request.threads : std::max<std::int64_t>(1, std::thread::hardware_concurrency());
+        threads = thread_count(request.threads);
         const std::int64_t lanes = std::max(kernel->lanes, 1);
         const std::int64_t wanted =
             std::min({largest_group, rows_of_group / rows_kept(request), request.count / (8 * threads)});
@@ -460,6 +459,10 @@ EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
 }
 
 }  // namespace
+
+int thread_count(int threads) {
+    return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
 
 double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
     const Plan plan(kernel, request);

@@ -76,6 +76,9 @@ struct EnsembleResult {
     double seconds = 0;            // that passed meanwhile
 };
 
+// How many threads compute where `threads` are asked for; 0: as many as the machine runs at once.
+int thread_count(int threads);
+
 // The most bytes of kept states in memory at any time.
 double memory_of(const Kernel& kernel, const EnsembleRequest& request);
 

@@ -117,12 +117,17 @@ private:
     }
 };
 
-// Lanes side by side: one or two coordinates leave registers for two packs at once, which hide each other's latency.
+// How many of `trajectories` stand side by side: a register of each value; two, which hide each other's latency, where
+// one or two coordinates leave room for them. None where the lanes serve a single step better.
 template <class K>
-constexpr int ensemble_lanes() {
-    if (native_lanes<typename K::real> == 1 || !K::any_number || is_clean<K>()) return 0;
-    if (K::form == Form::general && K::coordinates > most_full) return 0;
-    return native_lanes<typename K::real> * (K::form != Form::general && K::coordinates <= 2 ? 2 : 1);
+constexpr int ensemble_lanes(int trajectories) {
+    constexpr int native = native_lanes<typename K::real>;
+    if (native == 1 || !K::any_number || is_clean<K>()) return 0;
+    if constexpr (K::form == Form::separable) {
+        if (K::neighbours) return 0;
+    }
+    if (K::form == Form::general) return K::coordinates > most_full ? 0 : native;
+    return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;
 }
 
 template <class K, class T>
@@ -194,10 +199,22 @@ struct Ensemble {
     void start(real time, const real* q, const real* p, Status* status) {
         start_time = time;
         steps = 0;
+        int started = -1;
         for (int lane = 0; lane < width; ++lane) {
             if (status[lane] != Status::ok) continue;
             status[lane] = begin_alone(lane, time, q + lane * n, p + lane * n);
+            if (status[lane] != Status::ok) continue;
             motion.start(single, p + lane * n, lane);
+            started = lane;
+        }
+        if (started < 0) return;
+        // The others compute what one of these computes, so that no function has to leave its path for their numbers.
+        begin_alone(started, time, q + started * n, p + started * n);
+        for (int lane = 0; lane < width; ++lane) {
+            if (status[lane] == Status::ok) continue;
+            set_coefficients<K>(coefficients, lane, coefficients_of[started]);
+            motion.prepare(single, lane);
+            motion.start(single, p + started * n, lane);
         }
     }
 

@@ -17,12 +17,12 @@ struct NothingType {
     struct type {};
 };
 
-// The functions of an ensemble, with LOBATTO_ENSEMBLES defined; none for number types without vector registers.
+// The functions of an ensemble of LOBATTO_ENSEMBLES trajectories or more; none without that.
 template <class K>
 struct ExportEnsemble {
     using real = typename K::real;
 #ifdef LOBATTO_ENSEMBLES
-    static constexpr int lanes = ensemble_lanes<K>();
+    static constexpr int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES);
 #else
     static constexpr int lanes = 0;
 #endif

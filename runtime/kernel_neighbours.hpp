@@ -256,10 +256,10 @@ struct NeighbourSweeps {
     real shrinking{};      // rho, as last measured; 0: never
     int until_measured{};  // steps
     bool has_history{};
-    int now{};                                         // which of the two is the present
-    real q[2][room]{}, u[2][room]{};                   // position and velocity
-    real w[2][inner_room * room]{}, w_end[2][room]{};  // W at the inner nodes of the last step, and at its end
-    real X[inner_room * room]{}, rate[room]{}, inverse_scale[room]{}, change[room]{};
+    int now{};                                                    // which of the two is the present
+    alignas(V) real q[2][room]{}, u[2][room]{};                   // position and velocity
+    alignas(V) real w[2][inner_room * room]{}, w_end[2][room]{};  // W at the inner nodes of the last step, at its end
+    alignas(V) real X[inner_room * room]{}, rate[room]{}, inverse_scale[room]{}, change[room]{};
     int evaluations{};  // of the last step
     real increment{};   // the last one of the last step, relative
 

@@ -366,16 +366,28 @@ struct Pack {
     // The first (0) or second (1) half of the lanes.
     LOBATTO_INLINE Pack<real, (width > 1 ? width / 2 : 1)> half(int which) const {
         using Half = Pack<real, (width > 1 ? width / 2 : 1)>;
-        if constexpr (count > 1) {
+        if constexpr (count > 1)
             return Half::of(LOBATTO_EACH(i) { return part[which * Half::count + i]; });
-        } else {
-            real all_lanes[width];
-            store(all_lanes);
-            return Half::load(all_lanes + which * (width / 2));
-        }
+        else
+            return half_register<Half>(which, std::make_integer_sequence<int, Half::lanes>());
     }
 
 private:
+    template <class Half, int... i>
+    LOBATTO_INLINE Half half_register(int which, std::integer_sequence<int, i...>) const {
+        Half result;
+        if constexpr (Half::lanes == 1) {
+            result.part[0] = (*this)[which];
+        } else {
+#if __has_builtin(__builtin_shufflevector)
+            result.part[0] = which == 0 ? __builtin_shufflevector(part[0], part[0], i...)
+                                        : __builtin_shufflevector(part[0], part[0], (i + Half::lanes)...);
+#else
+            ((result.part[0][i] = part[0][which * Half::lanes + i]), ...);
+#endif
+        }
+        return result;
+    }
     template <int... i>
     LOBATTO_INLINE void copy(const Pack& other, std::integer_sequence<int, i...>) {
         ((part[i] = other.part[i]), ...);

@@ -146,6 +146,19 @@ TEST_CASE("any number of trajectories and of threads gives the same bits") {
     }
 }
 
+TEST_CASE("few trajectories take one register, many two where there is room, with the same bits") {
+    const Derivation derivation = derivation_of(pendulum, "points = 4");
+    const Kernel few = ensemble_kernel_in_own_cache(derivation, 1), many = ensemble_kernel_in_own_cache(derivation, 99);
+    CHECK(few->lanes > 1);
+    CHECK(many->lanes == 2 * few->lanes);
+    const Starts starts = around(pendulum);
+    CHECK(together(few, pendulum, 17, 200, starts) == together(many, pendulum, 17, 200, starts));
+    // A step of a long chain fills the lanes with masses.
+    Motion masses = chain();
+    masses.body.replace(masses.body.find("value = 12"), 10, "value = 40");
+    CHECK(ensemble_kernel_in_own_cache(derivation_of(masses, "points = 4"))->lanes == 0);
+}
+
 TEST_CASE("the bits of a lane do not depend on its neighbours, nor on which lane it is") {
     for (const InLanes& in : all) {
         INFO(in.motion.body);

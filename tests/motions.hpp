@@ -136,8 +136,8 @@ inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
     return kernel_of(source, precision);
 }
 
-inline Kernel ensemble_kernel_in_own_cache(const Derivation& derivation) {
-    return ensemble_kernel_of(emit(derivation), Precision::double_);
+inline Kernel ensemble_kernel_in_own_cache(const Derivation& derivation, std::int64_t together = 32) {
+    return ensemble_kernel_of(emit(derivation), Precision::double_, together);
 }
 
 }  // namespace lobatto::test
