@@ -27,8 +27,13 @@ struct RoundoffCommand {
     Overrides overrides;
     std::int64_t steps = 100000;
     int trajectories = 16;
-    bool no_picture = false;
+    bool no_reference = false, no_picture = false;
 };
+
+// Nothing where there is no number.
+std::string in_csv(double value) {
+    return std::isfinite(value) ? fmt::format("{:.6e}", value) : "";
+}
 
 std::string csv_of(const RoundoffResult& result) {
     std::string text =
@@ -36,8 +41,8 @@ std::string csv_of(const RoundoffResult& result) {
     for (std::size_t i = 0; i < result.plain.rows.size(); ++i) {
         const RoundoffRow &plain = result.plain.rows[i], &clean = result.clean.rows[i];
         text +=
-            fmt::format("{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e}\n", plain.steps, plain.energy_mean,
-                        plain.energy_rms, plain.position_rms, clean.energy_mean, clean.energy_rms, clean.position_rms);
+            fmt::format("{},{:.6e},{:.6e},{},{:.6e},{:.6e},{}\n", plain.steps, plain.energy_mean, plain.energy_rms,
+                        in_csv(plain.position_rms), clean.energy_mean, clean.energy_rms, in_csv(clean.position_rms));
     }
     return text;
 }
@@ -45,7 +50,8 @@ std::string csv_of(const RoundoffResult& result) {
 // Rms errors with Brouwer's laws through the last clean ones. Empty where rounding changes nothing.
 std::string script_of(const RoundoffResult& result) {
     const RoundoffRow &last = result.clean.rows.back(), &plain = result.plain.rows.back();
-    if (!(last.energy_rms > 0 && last.position_rms > 0 && plain.energy_rms > 0 && plain.position_rms > 0)) return "";
+    const bool has_positions = last.position_rms > 0 && plain.position_rms > 0;
+    if (!(last.energy_rms > 0 && plain.energy_rms > 0)) return "";
     const auto steps = static_cast<double>(last.steps);
     const auto panel = [&](const char* label, int plain_column, int clean_column, double value, double power,
                            const char* law) {
@@ -54,21 +60,24 @@ std::string script_of(const RoundoffResult& result) {
             "skip 1 using 1:{} with linespoints ls 2 title \"clean\", {:.6e}*x**{} with lines ls 1 title \"{}\"\n",
             label, plain_column, clean_column, value / std::pow(steps, power), power, law);
     };
-    return "set multiplot layout 2,1 margins 0.12,0.97,0.11,0.94 spacing 0,0.08\nset logscale xy\nset format y "
-           "\"10^{%T}\"\nset format x \"\"\nset key inside top left vertical maxrows 3\n" +
-           panel("energy, rms", 3, 6, last.energy_rms, 0.5, "√N") +
-           "set format x \"10^{%T}\"\nset xlabel \"steps N\"\n" +
-           panel("position, rms", 4, 7, last.position_rms, 1.5, "N^{3/2}") + "unset multiplot\n";
+    const std::string energy = panel("energy, rms", 3, 6, last.energy_rms, 0.5, "√N");
+    const std::string scales =
+        "set logscale xy\nset format y \"10^{%T}\"\nset key inside top left vertical maxrows 3\n";
+    const std::string steps_below = "set format x \"10^{%T}\"\nset xlabel \"steps N\"\n";
+    if (!has_positions) return scales + steps_below + energy;
+    return scales + "set multiplot layout 2,1 margins 0.12,0.97,0.11,0.94 spacing 0,0.08\nset format x \"\"\n" +
+           energy + steps_below + panel("position, rms", 4, 7, last.position_rms, 1.5, "N^{3/2}") + "unset multiplot\n";
 }
 
 void print(const RoundoffResult& result) {
+    const auto known = [](double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "-"; };
     fmt::print("{:>10}  {:^32}  {:^32}\n{:>10}  {:>10} {:>10} {:>10}  {:>10} {:>10} {:>10}\n", "", "plain", "clean",
                "steps", "H, mean", "H, rms", "q, rms", "H, mean", "H, rms", "q, rms");
     for (std::size_t i = 0; i < result.plain.rows.size(); ++i) {
         const RoundoffRow &plain = result.plain.rows[i], &clean = result.clean.rows[i];
-        fmt::print("{:>10}  {:>10.1e} {:>10.1e} {:>10.1e}  {:>10.1e} {:>10.1e} {:>10.1e}\n", plain.steps,
-                   plain.energy_mean, plain.energy_rms, plain.position_rms, clean.energy_mean, clean.energy_rms,
-                   clean.position_rms);
+        fmt::print("{:>10}  {:>10.1e} {:>10.1e} {:>10}  {:>10.1e} {:>10.1e} {:>10}\n", plain.steps, plain.energy_mean,
+                   plain.energy_rms, known(plain.position_rms), clean.energy_mean, clean.energy_rms,
+                   known(clean.position_rms));
     }
     const auto exponent = [](double value) {
         return std::isfinite(value) ? fmt::format("N^{:.2f}", value) : std::string("-");
@@ -90,12 +99,13 @@ void roundoff(const RoundoffCommand& options) {
     const std::string name = scene.method.name(), path = scene.path, scene_name = scene.name;
     const std::string step = fmt::format("{:.6g}", scene.evaluate(scene.run.step, "the step").to_double());
     const Interruption interruption;
-    const RoundoffResult result =
-        roundoff_growth(std::move(scene), options.steps, options.trajectories, Interruption::flag());
-    fmt::print(
-        "{}: {}, h = {}, {} trajectories.\nWhat rounding changes, against the same steps in long double: H "
-        "relative to |H(0)|, q to its largest.\n\n",
-        path, name, step, options.trajectories);
+    const RoundoffResult result = roundoff_growth(std::move(scene), options.steps, options.trajectories,
+                                                  !options.no_reference, Interruption::flag());
+    fmt::print("{}: {}, h = {}, {} trajectories.\n{}\n\n", path, name, step, options.trajectories,
+               options.no_reference
+                   ? "The energy against H(0), relative to |H(0)|: the method's own error is in it."
+                   : "What rounding changes, against the same steps in long double: H relative to |H(0)|, q to its "
+                     "largest.");
     print(result);
     if (!result.plain.rows.empty()) {
         const std::string folder = output_path(options.output, scene_name + "_roundoff");
@@ -135,6 +145,8 @@ void add_roundoff(CLI::App& program) {
         ->allow_extra_args(false);
     command->add_option("-o,--output", options->output,
                         "Folder of the table and the picture (default: out/NAME_roundoff)");
+    command->add_flag("--no-reference", options->no_reference,
+                      "without the steps in long double, which take most of the time: energies alone, against H(0)");
     command->add_flag("--no-picture", options->no_picture, "the table alone, without gnuplot");
     command->footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
     command->callback([options] { roundoff(*options); });

@@ -43,7 +43,9 @@ Kernel kernel_in(const Scene& scene, StepArithmetic arithmetic, Precision precis
 }
 
 struct Kernels {
-    Kernel plain, clean, extended, exact;  // double, double, long double, quadruple
+    Kernel plain, clean;             // double
+    std::optional<Kernel> extended;  // long double; none: energies are compared with the first
+    Kernel exact;                    // quadruple
 };
 
 // One trajectory in one arithmetic; its state in quadruple precision.
@@ -140,31 +142,37 @@ Course follow(const Kernels& kernels, const ExactStart& start, double step, int 
         for (const Quad value : values) result.push_back(static_cast<long double>(value));
         return result;
     };
-    Runner<long double> reference("long double", kernels.extended, extended_of(parameters), step, extended_of(q),
-                                  extended_of(p));
+    std::optional<Runner<long double>> reference;
+    if (kernels.extended)
+        reference.emplace("long double", *kernels.extended, extended_of(parameters), step, extended_of(q),
+                          extended_of(p));
     // Energies are relative to H(0), or to the kinetic energy where that is larger.
     Quad H0 = 0, V0 = 0, H = 0, H_exact = 0;
     exact.energy(0, q, p, H0);
     exact.energy(0, q, std::vector<Quad>(p.size(), Quad(0)), V0);
     const auto size = [](Quad value) { return value < 0 ? -value : value; };
     const Quad larger = std::max(size(H0), size(H0 - V0)), scale = larger > 0 ? larger : Quad(1);
-    double largest = 0;
+    H_exact = H0;
+    double largest = reference ? 0 : std::numeric_limits<double>::quiet_NaN();
     Course course;
     for (const std::int64_t look : looks) {
         if (*interrupted != 0) break;
-        const std::int64_t more = look - reference.taken;
+        const std::int64_t more = look - plain.taken;
         plain.advance(more);
         clean.advance(more);
-        reference.advance(more);
-        reference.state(exact, q_exact, p_exact);
-        exact.energy(reference.time(), q_exact, p_exact, H_exact);
-        for (const Quad value : q_exact) largest = std::max(largest, std::fabs(static_cast<double>(value)));
+        if (reference) {
+            reference->advance(more);
+            reference->state(exact, q_exact, p_exact);
+            exact.energy(reference->time(), q_exact, p_exact, H_exact);
+            for (const Quad value : q_exact) largest = std::max(largest, std::fabs(static_cast<double>(value)));
+        }
         const auto compare = [&](const Runner<double>& runner) {
             runner.state(exact, q, p);
             exact.energy(runner.time(), q, p, H);
             Difference difference;
             difference.energy = static_cast<double>((H - H_exact) / scale);
-            for (std::size_t k = 0; k < q.size(); ++k)
+            difference.position = 0 * largest;
+            for (std::size_t k = 0; k < q_exact.size(); ++k)
                 difference.position =
                     std::max(difference.position, std::fabs(static_cast<double>(q[k] - q_exact[k])) / largest);
             return difference;
@@ -182,7 +190,7 @@ Course follow(const Kernels& kernels, const ExactStart& start, double step, int 
 double exponent(const std::vector<RoundoffRow>& rows, double RoundoffRow::*value) {
     double count = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
     for (const RoundoffRow& row : rows) {
-        if (row.steps < 1000 || !(row.*value > 0)) continue;
+        if (row.steps < 1000 || !(row.*value > 0)) continue;  // not without a reference either
         const double x = std::log(static_cast<double>(row.steps)), y = std::log(row.*value);
         count += 1;
         sx += x;
@@ -225,17 +233,19 @@ RoundoffGrowth growth_of(const std::vector<Course>& courses, std::vector<Differe
 
 }  // namespace
 
-RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, const volatile int* interrupted) {
+RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, bool reference,
+                               const volatile int* interrupted) {
     scene.outputs.energy = true;
     scene.outputs.tangent = false;
     scene.outputs.dense = 0;
     scene.outputs.events.clear();
     const ExactStart start(scene);
     const double step = scene.evaluate(scene.run.step, "the step").to_double();
-    const Kernels kernels = {kernel_in(scene, StepArithmetic::plain, Precision::double_),
-                             kernel_in(scene, StepArithmetic::clean, Precision::double_),
-                             kernel_in(scene, StepArithmetic::clean, Precision::extended),
-                             kernel_in(scene, StepArithmetic::plain, Precision::quadruple)};
+    Kernels kernels = {kernel_in(scene, StepArithmetic::plain, Precision::double_),
+                       kernel_in(scene, StepArithmetic::clean, Precision::double_),
+                       {},
+                       kernel_in(scene, StepArithmetic::plain, Precision::quadruple)};
+    if (reference) kernels.extended = kernel_in(scene, StepArithmetic::clean, Precision::extended);
     const std::vector<std::int64_t> looks = checkpoints(steps);
     std::vector<Course> courses(static_cast<std::size_t>(trajectories));
     std::atomic<int> next = 0;

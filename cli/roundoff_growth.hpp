@@ -13,7 +13,7 @@ namespace lobatto {
 struct RoundoffRow {
     std::int64_t steps = 0;
     double energy_mean = 0, energy_rms = 0;  // of H - H without rounding, relative to |H(0)| or the kinetic energy
-    double position_rms = 0;                 // largest |q - q without rounding|, relative to the largest |q| so far
+    double position_rms = 0;  // largest |q - q without rounding|, relative to the largest |q| so far; NaN: not known
 };
 
 // A straight line through the logarithms of rms values, from 1000 steps on: their exponents; NaN with fewer than three.
@@ -32,8 +32,11 @@ struct RoundoffResult {
 
 // Trajectory i begins at (1 + i/2^20) times the scene's positions and momenta. What rounding does is seen beside clean
 // steps in long double from the very same numbers, energies are evaluated in quadruple precision, of both numbers that
-// clean arithmetic has for a position. Nothing is said of the method's own error, which both share. ComputationError
-// where a step fails; InputError without a constant mass matrix. Ends early once `interrupted` is raised.
-RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, const volatile int* interrupted);
+// clean arithmetic has for a position. Nothing is said of the method's own error, which both share. Without the
+// `reference` in long double energies are compared with H(0), so that the method's own error is in them, and positions
+// with nothing. ComputationError where a step fails; InputError without a constant mass matrix. Ends early once
+// `interrupted` is raised.
+RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, bool reference,
+                               const volatile int* interrupted);
 
 }  // namespace lobatto

@@ -2,10 +2,13 @@
 // Motions on which fast ways through a step are compared with slow ones: a scene, its numbers, a start, a step.
 #pragma once
 
+#include <doctest/doctest.h>
+
 #include <string>
 #include <vector>
 
 #include "cli/kernel_of.hpp"
+#include "runtime/library.hpp"
 #include "tests/scenes.hpp"
 
 namespace lobatto::test {
@@ -138,6 +141,21 @@ inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
 
 inline Kernel ensemble_kernel_in_own_cache(const Derivation& derivation, std::int64_t together = 32) {
     return ensemble_kernel_of(emit(derivation), Precision::double_, together);
+}
+
+template <class real>
+std::vector<real> converted(const std::vector<double>& numbers) {
+    return {numbers.begin(), numbers.end()};
+}
+
+// At the start of the motion, from its velocities.
+template <class real>
+LoadedStepper<real> started(const Kernel& kernel, const Motion& motion, double step) {
+    LoadedStepper<real> stepper(kernel);
+    REQUIRE(stepper.prepare(converted<real>(motion.parameters), static_cast<real>(step)) == LOBATTO_OK);
+    const auto q = converted<real>(motion.q);
+    REQUIRE(stepper.start(0, q, stepper.momentum(0, q, converted<real>(motion.v))) == LOBATTO_OK);
+    return stepper;
 }
 
 }  // namespace lobatto::test

@@ -38,20 +38,6 @@ struct State {
 };
 
 template <class real>
-std::vector<real> converted(const std::vector<double>& numbers) {
-    return {numbers.begin(), numbers.end()};
-}
-
-template <class real>
-LoadedStepper<real> started(const Kernel& kernel, const Motion& motion, double step) {
-    LoadedStepper<real> stepper(kernel);
-    REQUIRE(stepper.prepare(converted<real>(motion.parameters), static_cast<real>(step)) == LOBATTO_OK);
-    const auto q = converted<real>(motion.q);
-    REQUIRE(stepper.start(0, q, stepper.momentum(0, q, converted<real>(motion.v))) == LOBATTO_OK);
-    return stepper;
-}
-
-template <class real>
 State<real> after(LoadedStepper<real>& stepper, std::int64_t steps) {
     lobatto_advance call{};
     call.steps = steps;
@@ -193,7 +179,7 @@ TEST_CASE("a clean kernel tells positions and velocities in two numbers each, a 
 
 TEST_CASE("rounding grows by Brouwer's law in clean arithmetic, and is below 1e-15 where plain is not") {
     const volatile int interrupted = 0;
-    const RoundoffResult result = roundoff_growth(kepler_scene("points = 6"), 20000, 16, &interrupted);
+    const RoundoffResult result = roundoff_growth(kepler_scene("points = 6"), 20000, 16, true, &interrupted);
     const RoundoffRow &plain = result.plain.rows.back(), &clean = result.clean.rows.back();
     REQUIRE(clean.steps == 20000);
     CHECK(clean.energy_rms < 8e-16);                 // 4.5e-16 measured; 9.5e-16 after 100000
@@ -205,6 +191,17 @@ TEST_CASE("rounding grows by Brouwer's law in clean arithmetic, and is below 1e-
     CHECK(result.clean.position_exponent < 1.9);  // 1.5
 }
 
+TEST_CASE("without steps in long double energies are compared with the first, and positions with nothing") {
+    const volatile int interrupted = 0;
+    const Scene scene = kepler_scene("points = 10");  // whose own error of H is far below rounding
+    const RoundoffResult with = roundoff_growth(scene, 2000, 4, true, &interrupted),
+                         without = roundoff_growth(scene, 2000, 4, false, &interrupted);
+    CHECK(without.clean.rows.back().energy_rms == doctest::Approx(with.clean.rows.back().energy_rms).epsilon(0.05));
+    CHECK(without.plain.rows.back().energy_rms == doctest::Approx(with.plain.rows.back().energy_rms).epsilon(0.05));
+    CHECK(std::isnan(without.clean.rows.back().position_rms));
+    CHECK(std::isnan(without.clean.position_exponent));
+}
+
 TEST_CASE("steps that visit the same phases again and again gain no energy steadily") {
     // Ten steps a period; with h b_2 = 1/24 rounded before it is multiplied the mean was 8e-14 after 200000.
     Scene scene = read_scene(Source(
@@ -213,7 +210,7 @@ TEST_CASE("steps that visit the same phases again and again gain no energy stead
         "\"pi/2\", velocity = 0 }\n[parameters]\nomega = \"2*pi\"\n[method]\npoints = 4\n[run]\nstep = 0.1\nuntil = "
         "1\n"));
     const volatile int interrupted = 0;
-    const RoundoffResult result = roundoff_growth(scene, 100000, 8, &interrupted);
+    const RoundoffResult result = roundoff_growth(scene, 100000, 8, true, &interrupted);
     CHECK(std::fabs(result.clean.rows.back().energy_mean) < 1e-14);  // 1.1e-15 measured
 }
 

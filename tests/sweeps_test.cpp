@@ -14,24 +14,10 @@ using namespace lobatto::test;
 namespace {
 
 template <class real>
-std::vector<real> converted(const std::vector<double>& numbers) {
-    return {numbers.begin(), numbers.end()};
-}
-
-template <class real>
 struct Path {
     std::vector<real> q, p;
     lobatto_advance call{};
 };
-
-template <class real>
-LoadedStepper<real> started(const Kernel& kernel, const Motion& motion, double step) {
-    LoadedStepper<real> stepper(kernel);
-    REQUIRE(stepper.prepare(converted<real>(motion.parameters), static_cast<real>(step)) == LOBATTO_OK);
-    const auto q = converted<real>(motion.q);
-    REQUIRE(stepper.start(0, q, stepper.momentum(0, q, converted<real>(motion.v))) == LOBATTO_OK);
-    return stepper;
-}
 
 template <class real>
 Path<real> path(LoadedStepper<real>& stepper, std::int64_t steps, double tolerance = 0) {
