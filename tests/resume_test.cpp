@@ -48,7 +48,7 @@ const Subject subjects[] = {
      {"--tolerance", "1e-9"}},
     {"clean",
      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\npoints = 6\n"
-     "[run]\nstep = 0.1\nuntil = 100000\n[output]\nevery = 37\n",
+     "[run]\nstep = 0.1\nuntil = 100000\n[output]\nevery = 37\nevents = [\"q = 0 rising\"]\n",
      {"--arithmetic", "clean"}}};
 
 std::vector<std::string> command(const Subject& subject, const std::filesystem::path& scene, const std::string& out,

@@ -408,6 +408,33 @@ TEST_CASE("what a drive or friction does to the energy is called a change, and n
     CHECK(contains(driven.out, "\n  symplectic defect "));  // a step is still symplectic
 }
 
+TEST_CASE("clean steps have the events and the states between steps of plain ones, to rounding") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 0.7, "
+                     "velocity = 0 }\ny = { position = 0, velocity = 1.3627 }\n[method]\npoints = 6\n"
+                     "[run]\nstep = 0.05\nuntil = 20\n[output]\ndense = 3\nevents = [\"x = 0\", \"y = 0 rising\"]\n");
+    const auto tables = [&](const std::string& arithmetic) {
+        CHECK(place.run({scene, "--arithmetic", arithmetic, "-o", place.file(), "--quiet"}).err == "");
+        return std::pair(read_trajectory(place.file()).rows, read_trajectory(place.file("run.events.csv")).rows);
+    };
+    const auto plain = tables("plain"), clean = tables("clean");
+    REQUIRE(clean.first.size() == 1601);
+    REQUIRE(clean.second.size() == plain.second.size());
+    CHECK(clean.second.size() > 6);
+    double worst = 0, worst_event = 0;
+    for (std::size_t i = 0; i < plain.first.size(); ++i)
+        for (std::size_t k = 0; k < plain.first[i].size(); ++k)
+            worst = std::fmax(worst, std::fabs(plain.first[i][k] - clean.first[i][k]));
+    for (std::size_t i = 0; i < plain.second.size(); ++i)
+        for (std::size_t k = 0; k < plain.second[i].size(); ++k)
+            worst_event = std::fmax(worst_event, std::fabs(plain.second[i][k] - clean.second[i][k]));
+    CHECK(worst < 1e-12);
+    CHECK(worst > 0);
+    CHECK(worst_event < 1e-12);
+}
+
 TEST_CASE("a run without shortcuts gives the same motion to rounding") {
     const Place place;
     const auto last = [&](const std::vector<std::string>& more) {
