@@ -88,7 +88,7 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, dou
 }
 
 // Where the iteration of a step ends, relative to the displacement in it; 0: at rounding.
-constexpr std::array tolerances = {0.0, 1e-12, 1e-9};
+constexpr std::array tolerances = {0.0, 1e-12, 1e-9, 1e-7};
 
 Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);

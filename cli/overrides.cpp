@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 
 #include "generator/expression.hpp"
@@ -68,6 +70,19 @@ Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
         if (i >= begin) text.at.push_back({1, column});
     }
     return text;
+}
+
+void Overrides::add_set_to(CLI::App& command) {
+    command.add_option("--set", set, "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
+        ->allow_extra_args(false);
+}
+
+CLI::Option* Overrides::add_step_to(CLI::App& command) {
+    return command.add_option("--step", step, "Step h; may use the scene's parameters, as in 2*pi/omega/50");
+}
+
+CLI::Option* Overrides::add_until_to(CLI::App& command) {
+    return command.add_option("--until", until, "End time; may use the scene's parameters");
 }
 
 void apply(const Overrides& overrides, Scene& scene) {

@@ -137,12 +137,8 @@ void add_roundoff(CLI::App& program) {
     command->add_option("--trajectories", options->trajectories, "whose mean is taken (default 16)")
         ->check(CLI::Range(2, 1000));
     options->method.add_members_to(*command);
-    command->add_option("--step", options->overrides.step,
-                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
-    command
-        ->add_option("--set", options->overrides.set,
-                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
-        ->allow_extra_args(false);
+    options->overrides.add_step_to(*command);
+    options->overrides.add_set_to(*command);
     command->add_option("-o,--output", options->output,
                         "Folder of the table and the picture (default: out/NAME_roundoff)");
     command->add_flag("--no-reference", options->no_reference,

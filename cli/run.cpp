@@ -278,14 +278,10 @@ void add_run(CLI::App& program) {
     options->method.add_to(*command);
     command->add_flag("--general", options->general,
                       "use nothing of what the scene's structure allows, for comparison");
-    command->add_option("--step", options->overrides.step,
-                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
-    command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
+    options->overrides.add_step_to(*command);
+    options->overrides.add_until_to(*command);
     command->add_option("--every", options->overrides.every, "Keep every EVERY-th state");
-    command
-        ->add_option("--set", options->overrides.set,
-                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
-        ->allow_extra_args(false);
+    options->overrides.add_set_to(*command);
     command->add_flag(
         "--resume", options->resume,
         "go on where the same run was interrupted or killed; its files get the bytes they would have had");

@@ -77,12 +77,8 @@ void add_stability(CLI::App& program) {
         "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
     command->add_option("scene", options->scene, "the scene file (default: none, every member of both families)");
     options->method.add_to(*command);
-    command->add_option("--step", options->overrides.step,
-                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
-    command
-        ->add_option("--set", options->overrides.set,
-                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
-        ->allow_extra_args(false);
+    options->overrides.add_step_to(*command);
+    options->overrides.add_set_to(*command);
     command->add_option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
     command->add_flag("--json", options->json, "for machines (described in docs/stability.md)");
     command->footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");

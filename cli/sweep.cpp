@@ -309,17 +309,12 @@ void add_sweep(CLI::App& program) {
                      "csv, or binary: an array of NumPy (default: binary when the table is named .npy)")
         ->check(CLI::IsMember({"csv", "binary"}));
     options->method.add_to(*command);
-    command->add_option("--step", options->overrides.step,
-                        "Step h; may use the scene's parameters, as in 2*pi/omega/50");
-    CLI::Option* until =
-        command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
+    options->overrides.add_step_to(*command);
+    CLI::Option* until = options->overrides.add_until_to(*command);
     command->add_option("--steps", options->steps, "Number of steps, instead of an end time")->excludes(until);
     command->add_option("--every", options->overrides.every,
                         "Keep the start, every EVERY-th state and the last one (default: the last one alone)");
-    command
-        ->add_option("--set", options->overrides.set,
-                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
-        ->allow_extra_args(false);
+    options->overrides.add_set_to(*command);
     command->add_option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
         ->check(CLI::Range(1, 1024));
     command->add_flag("--quiet", options->quiet, "Print nothing but errors");

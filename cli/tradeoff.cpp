@@ -110,11 +110,8 @@ void add_tradeoff(CLI::App& program) {
     command->add_option("scene", options->scene, "Scene file")->required();
     command->add_option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");
     options->budget.add_to(*command);
-    command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
-    command
-        ->add_option("--set", options->overrides.set,
-                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
-        ->allow_extra_args(false);
+    options->overrides.add_until_to(*command);
+    options->overrides.add_set_to(*command);
     command->footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
     command->callback([options] { tradeoff(*options); });
 }

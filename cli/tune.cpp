@@ -95,12 +95,9 @@ void add_tune(CLI::App& program) {
     command
         ->add_option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
         ->required();
-    command->add_option("--until", options->overrides.until, "End time; may use the scene's parameters");
+    options->overrides.add_until_to(*command);
     options->budget.add_to(*command);
-    command
-        ->add_option("--set", options->overrides.set,
-                     "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
-        ->allow_extra_args(false);
+    options->overrides.add_set_to(*command);
     command->add_flag("--write", options->write, "Write the method and the step into the scene file");
     command->footer("Example:\n  lobatto tune scenes/pendulum.toml --error 1e-8 --until 1000");
     command->callback([options] { tune(*options); });
