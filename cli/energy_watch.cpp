@@ -61,9 +61,13 @@ void EnergyWatch::look(const Records& records) {
         const double* const row = records.rows + static_cast<std::size_t>(i) * columns_;
         if (leaving_.empty()) energy_start_ = records.energy[i];
         const double error = std::fabs(records.energy[i] - energy_start_);
-        if (leaving_.empty() || error > 2 * energy_error_ || (std::isnan(error) && !std::isnan(energy_error_))) {
+        const bool first_lost = std::isnan(error) && !lost_;
+        if (leaving_.empty() || error > 2 * energy_error_ || first_lost) {
             leaving_.emplace_back(row, row + columns_);
-            energy_error_ = error;
+            if (first_lost)
+                lost_ = true;
+            else
+                energy_error_ = error;
         }
         if ((seen_ - 1) / rows_a_step_ % stride_ != 0) continue;
         some_.emplace_back(row, row + columns_);
@@ -75,8 +79,9 @@ void EnergyWatch::look(const Records& records) {
 }
 
 std::vector<double> EnergyWatch::seen() const {
-    std::vector<double> all{static_cast<double>(seen_), static_cast<double>(stride_), energy_start_, energy_error_,
-                            static_cast<double>(leaving_.size())};
+    std::vector<double> all{
+        static_cast<double>(seen_), static_cast<double>(stride_),        energy_start_, energy_error_,
+        static_cast<double>(lost_), static_cast<double>(leaving_.size())};
     for (const Rows& rows : {leaving_, some_})
         for (const std::vector<double>& row : rows) all.insert(all.end(), row.begin(), row.end());
     return all;
@@ -88,6 +93,7 @@ void EnergyWatch::go_on_after(const std::vector<double>& seen) {
     stride_ = std::llround(*at++);
     energy_start_ = *at++;
     energy_error_ = *at++;
+    lost_ = *at++ != 0;
     const auto leaving = static_cast<std::size_t>(std::llround(*at++));
     for (; at < seen.end(); at += static_cast<std::ptrdiff_t>(columns_))
         (leaving_.size() < leaving ? leaving_ : some_).emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
@@ -106,8 +112,8 @@ std::string EnergyWatch::departure(const Derivation& derivation, const Kernel& k
     double kinetic = 0, at_start = 0;
     int states = 0;
     for (std::size_t i = 0; i < some_.size(); ++i)
-        if (const auto here = energy_of(state_of(stepper, some_[i]))) {
-            (i == 0 ? at_start : kinetic) += std::fabs(cln::double_approx(here->moving));
+        if (const auto here = energy_of(state_of(stepper, some_[i])); here && here->moving) {
+            (i == 0 ? at_start : kinetic) += std::fabs(cln::double_approx(*here->moving));
             states += i == 0 ? 0 : 1;
         }
     kinetic = states > 0 ? kinetic / states : at_start;
@@ -115,6 +121,7 @@ std::string EnergyWatch::departure(const Derivation& derivation, const Kernel& k
     if (!start || !(kinetic > 0)) return "";
     for (const std::vector<double>& row : leaving_) {
         const State state = state_of(stepper, row);
+        if (state.v.empty()) continue;  // nothing can be told
         const auto here = energy_of(state);
         const double error = here ? std::fabs(cln::double_approx(here->value - start->value)) : HUGE_VAL;
         if (here && !(error >= departed * kinetic && error > a_rounding * cln::double_approx(here->size))) continue;

@@ -16,19 +16,22 @@ ExactEnergy::ExactEnergy(const Derivation& derivation, const std::vector<double>
 }
 
 std::optional<ExactEnergy::Energy> ExactEnergy::at(const std::vector<double>& q, const std::vector<double>& velocity) {
-    const auto energy_with = [&](bool moving) {
+    const auto energy_with = [&](bool moving) -> std::optional<Sized> {
         for (std::size_t k = 0; k < q.size(); ++k) {
             formulas_.set(system_.q[k], float_of(GiNaC::numeric(q[k])));
             formulas_.set(system_.v[k], float_of(GiNaC::numeric(moving ? velocity[k] : 0.0)));
         }
-        return formulas_.evaluate_sized(energy_).front();
+        try {
+            return formulas_.evaluate_sized(energy_).front();
+        } catch (const DomainError&) {
+            return std::nullopt;
+        }
     };
-    try {
-        const Sized whole = energy_with(true), resting = energy_with(false);
-        return Energy{whole.value, whole.value - resting.value, whole.size};
-    } catch (const DomainError&) {
-        return std::nullopt;
-    }
+    const auto whole = energy_with(true), resting = energy_with(false);
+    if (!whole) return std::nullopt;
+    Energy energy{whole->value, std::nullopt, whole->size};
+    if (resting) energy.moving = whole->value - resting->value;
+    return energy;
 }
 
 }  // namespace lobatto

@@ -18,9 +18,10 @@ public:
     // H = q'.dL/dq' - L at positions and velocities, n each.
     struct Energy {
         cln::cl_R value;
-        cln::cl_R moving;  // H(q, q') - H(q, 0): the kinetic energy, where there is one
-        cln::cl_R size;    // what the rounding of H is measured against (generator/sample.hpp)
+        std::optional<cln::cl_R> moving;  // H(q, q') - H(q, 0), the kinetic energy; none where rest is impossible
+        cln::cl_R size;                   // what the rounding of H is measured against (generator/sample.hpp)
     };
+    // None where H is no real number.
     std::optional<Energy> at(const std::vector<double>& q, const std::vector<double>& velocity);
 
     static constexpr std::size_t most_coordinates = 64;

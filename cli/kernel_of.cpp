@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <sstream>
 
 #include "cli/support_text.hpp"
@@ -40,10 +39,8 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
-    if (together > 0) {  // a power of 2: two registers hold 32 numbers at most, and every text is compiled
-        const auto counted = static_cast<std::uint64_t>(std::clamp<std::int64_t>(together, 1, 32));
-        translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", std::bit_floor(counted));
-    }
+    if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
+        translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
     for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text})
         append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";

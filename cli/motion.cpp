@@ -23,9 +23,8 @@ std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& va
 
 }  // namespace
 
-Steps steps_of(const Scene& scene, const Overrides& overrides) {
-    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step"),
-                         until = scene.evaluate(scene.run.until, "the end time");
+GiNaC::numeric step_of(const Scene& scene, const Overrides& overrides) {
+    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
     if (!step.is_positive()) {
         throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}",
                                      overrides.step.empty() ? scene.path : "--step", step.to_double()));
@@ -37,6 +36,11 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
             "choose another unit of time",
             overrides.step.empty() ? scene.path : "--step", size));
     }
+    return step;
+}
+
+Steps steps_of(const Scene& scene, const Overrides& overrides) {
+    const GiNaC::numeric step = step_of(scene, overrides), until = scene.evaluate(scene.run.until, "the end time");
     if (until.is_negative()) {
         throw InputError(fmt::format("{}: the end time must not be negative, but is {:.6g}",
                                      overrides.until.empty() ? scene.path : "--until", until.to_double()));

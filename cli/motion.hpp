@@ -13,6 +13,7 @@ struct Steps {
     bool reaches_end = true;
 };
 // `overrides` are applied already; errors name them. InputError when the step or the end make no sense.
+GiNaC::numeric step_of(const Scene& scene, const Overrides& overrides = {});
 Steps steps_of(const Scene& scene, const Overrides& overrides = {});
 
 // Prepares and starts the stepper too: a start that is impossible, ComputationError, is known before anything is

@@ -10,6 +10,7 @@
 #include "cli/drawing.hpp"
 #include "cli/interruption.hpp"
 #include "cli/method_option.hpp"
+#include "cli/motion.hpp"
 #include "cli/output_path.hpp"
 #include "cli/overrides.hpp"
 #include "cli/roundoff_growth.hpp"
@@ -97,16 +98,17 @@ void roundoff(const RoundoffCommand& options) {
     scene.method.arithmetic = StepArithmetic::clean;
     scene.method.tolerance = 0;
     const std::string name = scene.method.name(), path = scene.path, scene_name = scene.name;
-    const std::string step = fmt::format("{:.6g}", scene.evaluate(scene.run.step, "the step").to_double());
+    const std::string step = fmt::format("{:.6g}", step_of(scene, options.overrides).to_double());
     const Interruption interruption;
     const RoundoffResult result = roundoff_growth(std::move(scene), options.steps, options.trajectories,
                                                   !options.no_reference, Interruption::flag());
     fmt::print("{}: {}, h = {}, {} trajectories.\n{}\n\n", path, name, step, options.trajectories,
                options.no_reference
-                   ? "The energy against H(0), relative to |H(0)|: the method's own error is in it."
-                   : "What rounding changes, against the same steps in long double: H relative to |H(0)|, q to its "
-                     "largest.");
-    print(result);
+                   ? "The energy against H(0), relative to |H(0)| or the kinetic energy, if that is larger: the "
+                     "method's own error is in it."
+                   : "What rounding changes, against the same steps in long double: H relative to |H(0)| or the "
+                     "kinetic energy, if that is larger, q to its largest.");
+    if (!result.plain.rows.empty()) print(result);
     if (!result.plain.rows.empty()) {
         const std::string folder = output_path(options.output, scene_name + "_roundoff");
         std::error_code error;
@@ -120,7 +122,10 @@ void roundoff(const RoundoffCommand& options) {
         fmt::print("\n{}/roundoff.csv{} has all of it.\n", folder, script.empty() ? "" : " and roundoff.svg beside it");
     }
     if (result.interrupted) {
-        fmt::print(stderr, "lobatto: interrupted after {} steps; the table has what was computed\n", result.steps);
+        fmt::print(stderr, "lobatto: interrupted {}\n",
+                   result.plain.rows.empty() ? "before anything could be told"
+                                             : fmt::format("after {} steps of {} trajectories; the table has these",
+                                                           result.steps, result.trajectories));
         throw CLI::RuntimeError(interrupted_exit);
     }
 }

@@ -15,6 +15,7 @@
 
 #include "cli/exact_start.hpp"
 #include "cli/kernel_of.hpp"
+#include "cli/summary.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
@@ -23,6 +24,8 @@ namespace lobatto {
 namespace {
 
 using Quad = __float128;
+
+constexpr std::int64_t steps_at_once = 10000;  // between two looks at the interruption
 
 std::vector<std::int64_t> checkpoints(std::int64_t steps) {
     std::vector<std::int64_t> result;
@@ -119,9 +122,8 @@ struct Course {
     std::int64_t plain_iterations = 0, clean_iterations = 0;
 };
 
-Course follow(const Kernels& kernels, const ExactStart& start, double step, int number,
+Course follow(const Kernels& kernels, StartIn<double> in_double, double step, int number,
               const std::vector<std::int64_t>& looks, const volatile int* interrupted) {
-    StartIn<double> in_double = start_in(start, kernels.plain, step);
     const double factor = 1 + number * 0x1p-20;
     for (double& q : in_double.q) q *= factor;
     for (double& p : in_double.p) p *= factor;
@@ -156,12 +158,14 @@ Course follow(const Kernels& kernels, const ExactStart& start, double step, int 
     double largest = reference ? 0 : std::numeric_limits<double>::quiet_NaN();
     Course course;
     for (const std::int64_t look : looks) {
-        if (*interrupted != 0) break;
-        const std::int64_t more = look - plain.taken;
-        plain.advance(more);
-        clean.advance(more);
+        while (plain.taken < look && *interrupted == 0) {
+            const std::int64_t more = std::min(look - plain.taken, steps_at_once);
+            plain.advance(more);
+            clean.advance(more);
+            if (reference) reference->advance(more);
+        }
+        if (plain.taken < look) break;
         if (reference) {
-            reference->advance(more);
             reference->state(exact, q_exact, p_exact);
             exact.energy(reference->time(), q_exact, p_exact, H_exact);
             for (const Quad value : q_exact) largest = std::max(largest, std::fabs(static_cast<double>(value)));
@@ -239,6 +243,15 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
     scene.outputs.tangent = false;
     scene.outputs.dense = 0;
     scene.outputs.events.clear();
+    if (!reference) {
+        const Derivation derivation = derive(scene);
+        if (!derivation.system.autonomous || has_forces(derivation))
+            throw InputError(
+                fmt::format("{}: --no-reference compares energies with the first, and a force or the time changes this "
+                            "one's; leave "
+                            "--no-reference away",
+                            scene.path));
+    }
     const ExactStart start(scene);
     const double step = scene.evaluate(scene.run.step, "the step").to_double();
     Kernels kernels = {kernel_in(scene, StepArithmetic::plain, Precision::double_),
@@ -247,6 +260,7 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
                        kernel_in(scene, StepArithmetic::plain, Precision::quadruple)};
     if (reference) kernels.extended = kernel_in(scene, StepArithmetic::clean, Precision::extended);
     const std::vector<std::int64_t> looks = checkpoints(steps);
+    const StartIn<double> in_double = start_in(start, kernels.plain, step);
     std::vector<Course> courses(static_cast<std::size_t>(trajectories));
     std::atomic<int> next = 0;
     std::mutex guard;
@@ -258,7 +272,7 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
         for (int worker = 0; worker < count; ++worker)
             workers.emplace_back([&] {
                 for (int i = next++; i < trajectories; i = next++) try {
-                        courses[static_cast<std::size_t>(i)] = follow(kernels, start, step, i, looks, interrupted);
+                        courses[static_cast<std::size_t>(i)] = follow(kernels, in_double, step, i, looks, interrupted);
                     } catch (...) {
                         const std::lock_guard lock(guard);
                         if (!failure) failure = std::current_exception();
@@ -267,10 +281,15 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
             });
     }
     if (failure) std::rethrow_exception(failure);
-    std::size_t common = looks.size();
+    // Those at their end, or else those that have begun.
+    const bool any_ended = std::any_of(courses.begin(), courses.end(),
+                                       [&](const Course& course) { return course.plain.size() == looks.size(); });
+    std::erase_if(courses, [&](const Course& course) { return course.plain.size() < (any_ended ? looks.size() : 1); });
+    std::size_t common = courses.empty() ? 0 : looks.size();
     for (const Course& course : courses) common = std::min(common, course.plain.size());
     RoundoffResult result;
-    result.interrupted = common < looks.size();
+    result.trajectories = static_cast<int>(courses.size());
+    result.interrupted = result.trajectories < trajectories || common < looks.size();
     result.steps = common > 0 ? looks[common - 1] : 0;
     result.plain = growth_of(courses, &Course::plain, &Course::plain_seconds, &Course::plain_iterations, looks, common);
     result.clean = growth_of(courses, &Course::clean, &Course::clean_seconds, &Course::clean_iterations, looks, common);

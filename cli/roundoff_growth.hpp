@@ -26,7 +26,8 @@ struct RoundoffGrowth {
 
 struct RoundoffResult {
     RoundoffGrowth plain, clean;
-    std::int64_t steps = 0;  // that all trajectories took
+    std::int64_t steps = 0;  // of the last row
+    int trajectories = 0;    // in the rows: all, unless interrupted
     bool interrupted = false;
 };
 
@@ -34,8 +35,9 @@ struct RoundoffResult {
 // steps in long double from the very same numbers, energies are evaluated in quadruple precision, of both numbers that
 // clean arithmetic has for a position. Nothing is said of the method's own error, which both share. Without the
 // `reference` in long double energies are compared with H(0), so that the method's own error is in them, and positions
-// with nothing. ComputationError where a step fails; InputError without a constant mass matrix. Ends early once
-// `interrupted` is raised.
+// with nothing. ComputationError where a step fails; InputError without a constant mass matrix, and where energies
+// would be compared that the motion does not conserve. Ends soon after `interrupted` is raised: with the trajectories
+// that were at their end, or, where none was, as far as all had come that had begun.
 RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, bool reference,
                                const volatile int* interrupted);
 

@@ -240,7 +240,9 @@ void sweep(const SweepOptions& options) {
     request.tolerance = scene.method.tolerance;
     request.every = options.overrides.every.value_or(0);
     request.threads = options.threads;
-    const Kernel kernel = ensemble_kernel_of(source, Precision::double_, request.count / thread_count(options.threads));
+    const bool fills_registers = scene.coordinates.size() > 2;  // there is one kernel then (ensemble_lanes)
+    const Kernel kernel = ensemble_kernel_of(source, Precision::double_,
+                                             fills_registers ? 1 : request.count / thread_count(options.threads));
     refuse_too_much(grid, kernel, request);
 
     const SweepTable::Format format = format_of(options);

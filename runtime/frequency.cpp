@@ -9,6 +9,7 @@ namespace lobatto {
 namespace {
 
 constexpr int iterations = 40;
+constexpr double part = 1e-5;  // of the scale: a difference
 
 template <class real>
 struct Equations {
@@ -38,32 +39,31 @@ double norm(const std::vector<double>& x) {
 
 template <class real>
 double largest_frequency(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
-                         const std::vector<real>& p) {
+                         const std::vector<real>& p, const std::vector<double>& scale) {
     const std::size_t n = q.size();
     const Equations<real> equations{stepper, time, n};
     std::vector<real> y = q;
     y.insert(y.end(), p.begin(), p.end());
-    double size = 0;
-    for (const real value : y) size = std::max(size, std::fabs(static_cast<double>(value)));
-    const double step = 1e-5 * (size > 0 ? size : 1);
 
-    // x -> A x
+    // x -> A x, in units of the scale
     const auto derivative = [&](const std::vector<double>& x, std::vector<double>& Ax) {
         std::vector<real> ahead = y, behind = y, f_ahead, f_behind;
         for (std::size_t i = 0; i < y.size(); ++i) {
-            ahead[i] += static_cast<real>(step * x[i]);
-            behind[i] -= static_cast<real>(step * x[i]);
+            ahead[i] += static_cast<real>(part * scale[i] * x[i]);
+            behind[i] -= static_cast<real>(part * scale[i] * x[i]);
         }
         if (!equations(ahead, f_ahead) || !equations(behind, f_behind)) return false;
         Ax.resize(x.size());
-        for (std::size_t i = 0; i < x.size(); ++i) Ax[i] = static_cast<double>(f_ahead[i] - f_behind[i]) / (2 * step);
+        for (std::size_t i = 0; i < x.size(); ++i)
+            Ax[i] = static_cast<double>(f_ahead[i] - f_behind[i]) / (2 * part * scale[i]);
         return true;
     };
 
     std::vector<double> x(2 * n), Ax, AAx;  // a start that favours no mode
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = i < n ? std::sin(1 + 0.7 * static_cast<double>(i * i)) : 0;
-    double scale = norm(x), growth = 0;
-    for (double& value : x) value /= scale;
+    const double size = norm(x);
+    double growth = 0;
+    for (double& value : x) value /= size;
     for (int iteration = 0; iteration < iterations; ++iteration) {
         if (!derivative(x, Ax)) return std::nan("");
         const double first = norm(Ax);
@@ -80,10 +80,10 @@ double largest_frequency(const LoadedStepper<real>& stepper, real time, const st
 }
 
 template double largest_frequency(const LoadedStepper<double>&, double, const std::vector<double>&,
-                                  const std::vector<double>&);
+                                  const std::vector<double>&, const std::vector<double>&);
 template double largest_frequency(const LoadedStepper<long double>&, long double, const std::vector<long double>&,
-                                  const std::vector<long double>&);
+                                  const std::vector<long double>&, const std::vector<double>&);
 template double largest_frequency(const LoadedStepper<__float128>&, __float128, const std::vector<__float128>&,
-                                  const std::vector<__float128>&);
+                                  const std::vector<__float128>&, const std::vector<double>&);
 
 }  // namespace lobatto

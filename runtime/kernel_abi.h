@@ -125,7 +125,8 @@ and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
     /* Ensembles: `lanes` trajectories side by side, with one step size and one time. Memory of ensemble_bytes bytes
      * that the caller owns, with this alignment. All arrays are lane-major: lane l has parameters[l * parameters ...],
      * q[l * n ...], p[l * n ...]. status: one lobatto_status a lane, which each function sets; a lane whose status is
-     * not LOBATTO_OK on entry of start or advance is left alone. No lane's results depend on its neighbours. */
+     * not LOBATTO_OK on entry of start or advance is left alone: where it has not started, its state means nothing.
+     * No lane's results depend on its neighbours. */
     int32_t lanes; /* 0: none, and the functions are null */
     int32_t ensemble_bytes;
     int32_t ensemble_alignment;

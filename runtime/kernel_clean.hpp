@@ -219,7 +219,7 @@ struct CleanSweeps {
             ++evaluations;
             const Change<real> change = sweep(q, q_rest, a);
             increment = change.size;
-            if (change.none || (change.back && change.size <= noise)) return true;
+            if (change.none || (change.back && change.own <= noise)) return true;
             noisy += change.own <= noise ? 1 : 0;
             if (noisy > patience) return true;  // in a longer cycle
             if (evaluations > 3 && change.size > noise && !(change.size < real(0.8) * last)) return false;

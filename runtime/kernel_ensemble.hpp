@@ -202,20 +202,13 @@ struct Ensemble {
         int started = -1;
         for (int lane = 0; lane < width; ++lane) {
             if (status[lane] != Status::ok) continue;
-            status[lane] = begin_alone(lane, time, q + lane * n, p + lane * n);
-            if (status[lane] != Status::ok) continue;
-            motion.start(single, p + lane * n, lane);
-            started = lane;
+            status[lane] = start_lane(lane, lane, time, q, p);
+            if (status[lane] == Status::ok) started = lane;
         }
         if (started < 0) return;
         // The others compute what one of these computes, so that no function has to leave its path for their numbers.
-        begin_alone(started, time, q + started * n, p + started * n);
-        for (int lane = 0; lane < width; ++lane) {
-            if (status[lane] == Status::ok) continue;
-            set_coefficients<K>(coefficients, lane, coefficients_of[started]);
-            motion.prepare(single, lane);
-            motion.start(single, p + started * n, lane);
-        }
+        for (int lane = 0; lane < width; ++lane)
+            if (status[lane] != Status::ok) start_lane(lane, started, time, q, p);
     }
 
     // At most `count` steps of the lanes whose status is ok; `done` and `iterations` of each.
@@ -278,6 +271,16 @@ private:
         single.coefficients = coefficients_of[lane];
         for (int c = 0; c < n; ++c) q[c] = lane_of(motion.q[c], lane);
         motion.momentum(single, lane, p);
+    }
+
+    // `lane` computes what lane `as` is given.
+    Status start_lane(int lane, int as, real time, const real* q, const real* p) {
+        const Status status = begin_alone(as, time, q + as * n, p + as * n);
+        if (status != Status::ok) return status;
+        set_coefficients<K>(coefficients, lane, coefficients_of[as]);
+        motion.prepare(single, lane);
+        motion.start(single, p + as * n, lane);
+        return status;
     }
 
     Status begin_alone(int lane, real time, const real* q, const real* p) {

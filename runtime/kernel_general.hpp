@@ -249,8 +249,10 @@ struct Stepper<K, Form::general, false> : Motion<K> {
         Formulas<K>::slopes(coefficients, time, position, velocity, Lv, Lq);
     }
 
-    // The velocity of a momentum: Newton's iteration on p = dL/dv from rest. Its increments are halved while the next
-    // one would be longer or is not finite, as with Lagrangians like -sqrt(1 - v^2); lengths: sum |increment residual|.
+    // The velocity of a momentum: Newton's iteration on p = dL/dv from rest, or, where rest is impossible, as in a
+    // frame that rotates faster than light, from the velocity at the end of the last step. Its increments are halved
+    // while the next one would be longer or is not finite, as with Lagrangians like -sqrt(1 - v^2); lengths: sum
+    // |increment residual|.
     Status velocity(real time, const real* position, const real* momentum, real* v) const {
         return mass_workspace.with([&](MassArrays& a) {
             const auto look_at = [&](const real* trial) {
@@ -259,7 +261,11 @@ struct Stepper<K, Form::general, false> : Motion<K> {
                 return is_finite(not_finite_part(a.residual, n) + not_finite_part(a.entries, K::mass_entries));
             };
             for (int k = 0; k < n; ++k) v[k] = real(0);
-            if (!look_at(v)) return Status::not_finite;
+            if (!look_at(v)) {
+                if (!has_history) return Status::not_finite;
+                polynomial(real(1), a.trial, v);
+                if (!look_at(v)) return Status::not_finite;
+            }
             for (int iteration = 0; iteration < 100; ++iteration) {
                 if (iteration > 0 && is_near(a, momentum, v, real(2) * Limits<real>::epsilon)) return Status::ok;
                 a.matrix.clear();

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "runtime/ensemble.hpp"
@@ -157,6 +159,39 @@ TEST_CASE("few trajectories take one register, many two where there is room, wit
     Motion masses = chain();
     masses.body.replace(masses.body.find("value = 12"), 10, "value = 40");
     CHECK(ensemble_kernel_in_own_cache(derivation_of(masses, "points = 4"))->lanes == 0);
+}
+
+TEST_CASE("a lane that did not start has its own parameters when it does") {
+    const Kernel kernel = ensemble_kernel_in_own_cache(derivation_of(pendulum, "points = 4"));
+    const auto lanes = static_cast<std::size_t>(kernel->lanes);
+    std::vector<double> parameters, q(lanes), p(lanes, 0.5), energy(lanes);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+        parameters.insert(parameters.end(), {2 + 0.1 * static_cast<double>(lane), 1.5});
+        q[lane] = 0.1 * static_cast<double>(lane);
+    }
+    // `starts`: a status of the last lane for each start.
+    const auto last_after = [&](const std::vector<std::int32_t>& starts) {
+        std::vector<std::byte> memory(static_cast<std::size_t>(kernel->ensemble_bytes + kernel->ensemble_alignment));
+        void* place = memory.data();
+        std::size_t room = memory.size();
+        REQUIRE(std::align(static_cast<std::size_t>(kernel->ensemble_alignment),
+                           static_cast<std::size_t>(kernel->ensemble_bytes), place, room) != nullptr);
+        std::vector<std::int32_t> status(lanes);
+        std::vector<std::int64_t> done(lanes), iterations(lanes);
+        std::vector<double> q_now(lanes), p_now(lanes);
+        const double h = 0.1, time = 0;
+        kernel->ensemble_prepare(place, parameters.data(), &h, status.data());
+        for (const std::int32_t last : starts) {
+            status.assign(lanes, LOBATTO_OK);
+            status.back() = last;
+            kernel->ensemble_start(place, &time, q.data(), p.data(), status.data());
+        }
+        kernel->ensemble_advance(place, 50, 0, status.data(), done.data(), iterations.data());
+        kernel->ensemble_state(place, q_now.data(), p_now.data());
+        CHECK(done.back() == 50);
+        return std::pair(q_now.back(), p_now.back());
+    };
+    CHECK(last_after({LOBATTO_UNSUPPORTED, LOBATTO_OK}) == last_after({LOBATTO_OK}));
 }
 
 TEST_CASE("the bits of a lane do not depend on its neighbours, nor on which lane it is") {

@@ -2,10 +2,13 @@
 // Clean kernels: the motions of plain ones to rounding, which grows by Brouwer's law.
 #include <doctest/doctest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "cli/roundoff_growth.hpp"
+#include "runtime/error.hpp"
 #include "runtime/library.hpp"
 #include "tests/motions.hpp"
 #include "tests/support.hpp"
@@ -117,6 +120,18 @@ TEST_CASE("sweeps that alternate, or that begin at rest, are not taken for solve
     Motion oscillator = harmonic_oscillator;
     oscillator.parameters = {1, 1};
     CHECK(difference<double>(oscillator, "family = \"gauss\"\nstages = 1", Precision::double_, 50, 2) < 1000);
+    // The same beside a coordinate 1e18 times as large.
+    Motion both{
+        "lagrangian = \"(a'^2 + b'^2)/2 - a^2/8 - 2*b^2\"\n[coordinates]\na = { position = 1e18, velocity = 0 }\nb = { "
+        "position = 1, velocity = 0 }\n",
+        {},
+        {1e18, 1},
+        {0, 0},
+        1};
+    const std::string midpoint = "family = \"gauss\"\nstages = 1";
+    auto beside = started<double>(
+        kernel_in_own_cache(derivation_of(both, clean(midpoint), untangent), Precision::double_), both, 1);
+    CHECK(std::fabs(after(beside, 50).q[1]) < 1.5);  // -1 or 0 or 1
     // Nothing moves yet, so nothing is small beside the motion; sweeps enlarge errors threefold.
     const Motion stiff{
         "time = \"t\"\nlagrangian = \"q'^2/2 - 32*(q - sin(t))^2\"\n[coordinates]\nq = { position = 0, "
@@ -212,6 +227,35 @@ TEST_CASE("steps that visit the same phases again and again gain no energy stead
     const volatile int interrupted = 0;
     const RoundoffResult result = roundoff_growth(scene, 100000, 8, true, &interrupted);
     CHECK(std::fabs(result.clean.rows.back().energy_mean) < 1e-14);  // 1.1e-15 measured
+}
+
+TEST_CASE("a measurement that is interrupted tells what it has") {
+    const Scene scene = kepler_scene("points = 6");
+    volatile int interrupted = 1;  // before it begins
+    const RoundoffResult nothing = roundoff_growth(scene, 1000, 4, false, &interrupted);
+    CHECK(nothing.interrupted);
+    CHECK(nothing.plain.rows.empty());
+    interrupted = 0;
+    std::thread signal([&interrupted] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(500));
+        interrupted = 1;
+    });
+    const RoundoffResult some = roundoff_growth(scene, 1000000000, 4, false, &interrupted);
+    signal.join();
+    CHECK(some.interrupted);
+    CHECK(some.trajectories > 0);
+    REQUIRE(!some.clean.rows.empty());
+    CHECK(some.steps == some.clean.rows.back().steps);
+    CHECK(some.clean.rows.back().energy_rms > 0);
+    CHECK(some.clean.nanoseconds > 0);
+}
+
+TEST_CASE("energies that a motion does not conserve are not compared with the first") {
+    const volatile int interrupted = 0;
+    const Scene driven = read_scene(Source("driven.toml", "title = \"Driven\"\n" + driven_pendulum.body +
+                                                              "[method]\npoints = 4\n[run]\nstep = 0.1\nuntil = 1\n"));
+    CHECK_THROWS_AS(roundoff_growth(driven, 100, 2, false, &interrupted), InputError);
+    CHECK(roundoff_growth(driven, 100, 2, true, &interrupted).clean.rows.back().energy_rms < 1e-13);
 }
 
 TEST_CASE("clean steps have the same bits in units that are powers of two apart, whatever their size") {

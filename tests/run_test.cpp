@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // lobatto run from the outside: what it prints, writes and returns, also when it is interrupted, killed or refused.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -406,6 +407,38 @@ TEST_CASE("what a drive or friction does to the energy is called a change, and n
     CHECK(driven.err == "");
     CHECK(contains(driven.out, "\n  energy change "));
     CHECK(contains(driven.out, "\n  symplectic defect "));  // a step is still symplectic
+}
+
+TEST_CASE("a motion where rest is impossible has an energy") {
+    // A free particle seen from a frame that rotates: from 1/w on whoever rests there moves faster than light.
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "lagrangian = \"-sqrt(1 - (x' - w*y)^2 - (y' + w*x)^2)\"\n[coordinates]\nx = { position = 0, "
+                     "velocity = 0.3 }\ny = { position = 0, velocity = 0.2 }\n[parameters]\nw = 0.5\n[run]\nstep = "
+                     "0.05\nuntil = 10\n");
+    const test::Finished finished = place.run({scene, "-o", place.file()});
+    CHECK(finished.exit_code == 0);
+    CHECK(finished.err == "");
+    CHECK(!contains(finished.out, "nan"));
+    const std::vector<double> last = read_trajectory(place.file()).rows.back();
+    CHECK(last[1] * last[1] + last[2] * last[2] == doctest::Approx(13).epsilon(1e-9));
+}
+
+TEST_CASE("the stability limit is the same in any unit of mass") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    const auto warns = [&](const char* formula, const char* mass) {
+        test::write_text(scene, fmt::format("lagrangian = \"m*({})\"\n[coordinates]\nq = {{ position = 1, velocity = 0 "
+                                            "}}\n[parameters]\nm = 1\n[run]\nstep = 0.1\nuntil = 2\n",
+                                            formula));
+        return contains(place.run({scene, "--set", std::string("m=") + mass, "-o", place.file()}).err,
+                        "beyond the linear stability limit");
+    };
+    for (const char* mass : {"1", "1e9", "1e-9"}) {
+        CHECK(!warns("q'^2/2 - q^2/2 - q^4/40", mass));
+        CHECK(warns("q'^2/2 + 33^2*cos(q)", mass));
+    }
 }
 
 TEST_CASE("clean steps have the events and the states between steps of plain ones, to rounding") {

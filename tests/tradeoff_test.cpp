@@ -178,7 +178,7 @@ TEST_CASE("explicit extrapolation follows the pendulum to 1e-15, and its frequen
     LoadedStepper<long double> stepper(kernel);
     const long double omega = 2 * 3.14159265358979323846264338327950288L;
     REQUIRE(stepper.prepare({1, omega}, 0.1L) == LOBATTO_OK);
-    CHECK(largest_frequency<long double>(stepper, 0, {0}, {0}) ==
+    CHECK(largest_frequency<long double>(stepper, 0, {0}, {0}, {1, 1}) ==
           doctest::Approx(static_cast<double>(omega)).epsilon(1e-6));
     Extrapolation<long double> way(stepper, {1, 6}, 1e-18L);
     way.start(0, {omega / 4}, {0});

@@ -169,12 +169,13 @@ private:
     }
 
     void set_frequency(const States& states, int samples) {
+        const std::vector<double> scale(scale_.begin(), scale_.end());
         for (int look = 0; look <= frequency_looks; ++look) {
             const int i = samples * look / frequency_looks;
             const real* const row = states.data() + static_cast<std::size_t>(i) * 2 * n_;
             const std::vector<real> q(row, row + n_), p(row + n_, row + 2 * n_);
             const auto time = static_cast<real>(request_.until * i / samples);
-            const double frequency = largest_frequency(stepper_, time, q, p);
+            const double frequency = largest_frequency(stepper_, time, q, p, scale);
             if (frequency > reference_.frequency) reference_.frequency = frequency;
             std::vector<real> v;
             if (stepper_.velocity(time, q, p, v) != LOBATTO_OK) continue;
