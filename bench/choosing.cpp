@@ -204,7 +204,7 @@ one core that was not alone. ω is the largest frequency of the motion.
 The fastest in double precision for an error, its step in units of 1/ω, and what a unit of time costs:
 
 {head}{winners}
-- Read along a row: nine more digits cost two to four times as much, not a thousand times. Accuracy is cheap once the order is high.
+- Read along a row: nine more digits cost two to five times as much, not a thousand times. Accuracy is cheap once the order is high.
 - Take **Lobatto with 8 to 10 points, hω near 2,** when you do not want to think; iterate to a tolerance a hundredth of the error wanted, or to rounding when
   energies matter for long times.
 - Low orders (Störmer–Verlet is Lobatto 2) win only where a few per cent of error is enough, or where the force has no smooth derivatives.
@@ -232,7 +232,7 @@ end, relative to the energy of motion (fails: the step's equations have no solut
 
 ## Number types
 
-What float saves at an error of 1e-3, the least error each type reaches, and how many times longer wider types take for 1e-12:
+What float saves at an error of 1e-3, the least error each type reaches within half a second, and how many times longer wider types take for 1e-12:
 
 | scene | float : double at 1e-3 | least, float | double | long double | __float128 | long double : double | __float128 : double |
 |---|---|---|---|---|---|---|---|

@@ -119,13 +119,14 @@ State<double> state_by(const std::string& compiler, const std::string& flags, co
     return travel(kernel, motion.parameters, motion.q, motion.v, motion.step, 200);
 }
 
-// All instructions of this machine, none fused, plain x86-64 (the last of several -march counts): by g++ and clang++.
+// All instructions of this machine, none fused (AVX-512 has its own), plain x86-64 (the last of several -march counts):
+// by g++ and clang++.
 using Pair = std::pair<State<double>, State<double>>;
 const std::vector<Pair>& machines(const lobatto::test::Motion& motion) {
     static std::map<const lobatto::test::Motion*, std::vector<Pair>> made;
     std::vector<Pair>& all = made[&motion];
     if (all.empty())
-        for (const std::string flags : {"", "-mno-fma", "-march=x86-64"})
+        for (const std::string flags : {"", "-mno-fma -mno-avx512f", "-march=x86-64"})
             all.emplace_back(state_by("g++", flags, motion), state_by("clang++", flags, motion));
     return all;
 }

@@ -245,6 +245,17 @@ TEST_CASE("a notebook keeps measurements, and leaves out a torn line and another
     CHECK(Notebook(path, "another").found() == 0);
 }
 
+TEST_CASE("what was measured for its error alone is measured again when everything is asked for") {
+    const Scene scene = read_scene(pendulum);
+    Laboratory laboratory(derive(scene), scene, {});
+    const Candidate candidate{{Family::lobatto, 4}, 2400, 0};
+    const Measurement error_only = laboratory.measure(candidate, false), all = laboratory.measure(candidate);
+    CHECK(std::isnan(error_only.energy_error));
+    CHECK(all.energy_error > 0);
+    CHECK(all.error == error_only.error);
+    CHECK(laboratory.measure(candidate, false).energy_error == all.energy_error);
+}
+
 TEST_CASE("a budget is a time with a unit") {
     const auto seconds = [](const std::string& text) {
         BudgetOption option;

@@ -22,6 +22,11 @@ constexpr double extended_reach = 3e-13;       // what two references in long do
 constexpr double reference_share = 0.4;        // of the seconds
 const std::string measurements_version = "3";  // of what is measured: older notebooks are begun anew
 
+// A run to the end of which nothing but error and time was asked.
+bool knows_errors_only(const Measurement& m) {
+    return m.complete && std::isnan(m.energy_error) && std::isnan(m.defect) && std::isnan(m.momentum_error);
+}
+
 // In quadruple precision where that is asked for and affordable. Order 22; of large systems the equations of a step are
 // large too, and order 10 does.
 Member reference_member(const Scene& scene, double wanted) {
@@ -102,7 +107,8 @@ void Laboratory::check_interruption() const {
 
 Measurement Laboratory::measure(const Candidate& candidate, bool all) {
     check_interruption();
-    if (const Measurement* known = notebook_.find(candidate)) return *known;
+    const Measurement* const known = notebook_.find(candidate);
+    if (known != nullptr && !(all && knows_errors_only(*known))) return *known;
     if (!knows_symmetries_ && candidate.member.precision == Precision::double_) {
         knows_symmetries_ = true;
         const Kernel kernel = workshop_.kernel(candidate.member);
