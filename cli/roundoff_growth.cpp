@@ -194,7 +194,7 @@ Course follow(const Kernels& kernels, StartIn<double> in_double, double step, in
 double exponent(const std::vector<RoundoffRow>& rows, double RoundoffRow::*value) {
     double count = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
     for (const RoundoffRow& row : rows) {
-        if (row.steps < 1000 || !(row.*value > 0)) continue;  // not without a reference either
+        if (row.steps < 1000 || !(row.*value > 0)) continue;  // or not a number
         const double x = std::log(static_cast<double>(row.steps)), y = std::log(row.*value);
         count += 1;
         sx += x;
@@ -248,8 +248,7 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
         if (!derivation.system.autonomous || has_forces(derivation))
             throw InputError(
                 fmt::format("{}: --no-reference compares energies with the first, and a force or the time changes this "
-                            "one's; leave "
-                            "--no-reference away",
+                            "one's; leave --no-reference away",
                             scene.path));
     }
     const ExactStart start(scene);
