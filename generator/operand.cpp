@@ -272,6 +272,8 @@ Operand Arithmetic::raise(const Operand& base, const Operand& exponent) const {
     if (base.value && base.value->is_zero() && exponent.value && exponent.value->is_negative())
         throw Refusal(fmt::format("division by zero in {}", formula_));
     if (base.expression.is_zero() && !exponent.value) throw Refusal("0 to a power that is not a number");
+    if (is_a<numeric>(base.expression) && ex_to<numeric>(base.expression).is_negative() && !exponent.value)
+        throw Refusal("a negative number to a power that is not a number; it is real for whole powers only");
     return compute(
         "^", {&base, &exponent}, bound, [&] { return GiNaC::pow(base.expression, exponent.expression); },
         [&] { return real_power(real_value(*base.value), real_value(*exponent.value)); });
