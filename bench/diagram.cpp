@@ -58,8 +58,7 @@ void draw_diagram(const std::string& folder, const Race& race) {
         data, race.problem->name, race.problem->title,
         race.trajectories > 1 ? fmt::format(", ensemble of {}", race.trajectories) : "",
         race.trajectories > 1 ? " a trajectory" : "", curves);
-    draw(folder, fmt::format("{}{}", race.problem->name, race.trajectories > 1 ? "_ensemble" : ""), script, 1000, 560,
-         "The diagrams need gnuplot: apt-get install gnuplot-nox.");
+    draw(folder, fmt::format("{}{}", race.problem->name, race.trajectories > 1 ? "_ensemble" : ""), script, 1000, 560);
 }
 
 }  // namespace lobatto::bench

@@ -4,10 +4,14 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
-#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
+#include "runtime/partial_file.hpp"
 #include "runtime/process.hpp"
 
 namespace lobatto {
@@ -30,24 +34,64 @@ set style line 14 lc rgb "#009e73" lw 2 dt 3
 set key outside top center horizontal maxrows 1 reverse Left samplen 2 width -1
 )";
 
+constexpr int not_found = 127;  // exit code of env
+
+// A new folder for the files of one drawing, under a name that no text of others is part of; goes with its contents.
+class Workplace {
+public:
+    Workplace(const std::string& folder, const std::string& picture, const std::string& otherwise)
+        : path_(folder + "/.lobatto-drawing-XXXXXX") {
+        if (::mkdtemp(path_.data()) == nullptr) fail_to_write("the picture", picture, errno, otherwise);
+    }
+    ~Workplace() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    Workplace(const Workplace&) = delete;
+    Workplace& operator=(const Workplace&) = delete;
+
+    std::string operator/(const char* file) const { return path_ + "/" + file; }
+    std::string name() const { return std::filesystem::path(path_).filename(); }
+
+private:
+    std::string path_;
+};
+
 }  // namespace
 
 void draw(const std::string& folder, const std::string& name, const std::string& script, int width, int height,
-          const std::string& advice) {
-    const std::string path = folder + "/" + name + ".gnuplot";
-    write_file(path, fmt::format("set terminal svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb "
-                                 "\"white\"{}set output \"{}.svg\"\n{}",
-                                 width, height, style, name, script));
+          const std::string& without) {
+    const std::string path = (std::filesystem::path(folder) / (name + ".svg")).string();
+    const std::string otherwise = without.empty() ? elsewhere : without;
+    const Workplace workplace(folder, path, otherwise);
+    write_whole(workplace / "script", "the picture's script",
+                fmt::format("set terminal svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb "
+                            "\"white\"{}set output \"{}/picture\"\n{}",
+                            width, height, style, workplace.name(), script),
+                otherwise);
     ProcessRequest request;
-    request.arguments = {"/usr/bin/env", "gnuplot", name + ".gnuplot"};
+    request.arguments = {"/usr/bin/env", "gnuplot", workplace.name() + "/script"};
     request.folder = folder;
     request.environment = {{"LC_ALL", "C"}};
     const ProcessResult result = run_process(request);
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-    if (!result.succeeded())
-        throw MachineError(fmt::format("gnuplot could not draw {}: {}{}", name,
-                                       result.output.empty() ? "no message\n" : result.output, advice));
+    if (result.exit_code == not_found)
+        throw MachineError(fmt::format("cannot draw {}: gnuplot is missing. Install it (apt install gnuplot-nox){}",
+                                       path, without.empty() ? "" : ", or " + without));
+    std::ifstream file(workplace / "picture", std::ios::binary);
+    const std::string picture(std::istreambuf_iterator<char>(file), {});
+    // On a full disk gnuplot leaves a part of it, and is content.
+    if (!result.succeeded() || !picture.ends_with("</svg>\n\n"))
+        throw MachineError(fmt::format("gnuplot could not draw {}: {}", path,
+                                       !result.output.empty() ? result.output
+                                       : result.succeeded()   ? "the picture is not whole. Is the disk full?"
+                                                              : "no message"));
+    write_whole(path, "the picture", picture, otherwise);
+}
+
+std::string gnuplot_text(const std::string& text) {
+    std::string result = "'";
+    for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
+    return result + "'";
 }
 
 }  // namespace lobatto

@@ -13,8 +13,8 @@
 #include <iostream>
 
 #include "cli/commands.hpp"
-
 #include "cli/method_option.hpp"
+#include "cli/output_path.hpp"
 #include "cli/support_text.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/compiler.hpp"
@@ -102,13 +102,16 @@ void emit_scene(const EmitCommand& options) {
     fs::create_directories(options.folder, error);
     if (error) fail_to_write(options.folder, error.message());
     const fs::path path = fs::path(options.folder) / (source.name + ".hpp");
+    keep_scene(options.scene, path);
     if (!options.standalone && !options.no_support) {
         if (source.name == "kernel")
             throw InputError(
                 fmt::format("{}: the kernel of this scene and its support header would both be kernel.hpp; "
                             "rename the scene file, or give --standalone or --no-support",
                             options.scene));
-        write_atomically(fs::path(options.folder) / "kernel.hpp", kernel_hpp_text);
+        const fs::path support = fs::path(options.folder) / "kernel.hpp";
+        keep_scene(options.scene, support);
+        write_atomically(support, kernel_hpp_text);
     }
     write_atomically(path, source.header);
     print_report(source.report);

@@ -14,7 +14,9 @@ namespace lobatto {
 
 class EnergyWatch {
 public:
-    // Of systems without time and forces, of up to 64 coordinates; others are not watched.
+    // Systems without time and forces, of up to 64 coordinates. Their kernels need an energy, whether the scene asks
+    // for it or not.
+    static bool can_watch(const Derivation& derivation);
     EnergyWatch(const Derivation& derivation, const Kernel& kernel);
     // Looks at the kept states go by: some of all times, and those where the energy error has doubled.
     void look(const Records& records);
@@ -23,8 +25,9 @@ public:
     std::vector<double> seen() const;
     void go_on_after(const std::vector<double>& seen);
 
-    // The first such state, where the energy is off by half of the mean kinetic energy, or not real: no path of this
-    // Lagrangian goes there. What to tell of it, as of any stop; empty: there is none.
+    // The first such state, where the energy is off by half of the mean kinetic energy, and by more than rounding of
+    // the positions explains, or not real: no path of this Lagrangian goes there. What to tell of it, as of any stop;
+    // empty: there is none.
     std::string departure(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request) const;
 
 private:

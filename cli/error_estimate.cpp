@@ -42,25 +42,6 @@ double size(real x) {
     return std::fabs(static_cast<double>(x));
 }
 
-template <class real>
-lobatto_status start_at(LoadedStepper<real>& stepper, const std::vector<real>& state) {
-    const auto begin = state.begin() + 1, middle = begin + (state.end() - begin) / 2;
-    return stepper.start(state[0], {begin, middle}, {middle, state.end()});
-}
-
-// From where `stepper` is; nothing when a step fails.
-template <class real>
-std::vector<real> state_after(LoadedStepper<real>& stepper, std::int64_t steps) {
-    lobatto_advance call{};
-    call.steps = steps;
-    if (stepper.advance(call) != LOBATTO_OK) return {};
-    real time;
-    std::vector<real> q, p;
-    stepper.state(time, q, p);
-    q.insert(q.end(), p.begin(), p.end());
-    return q;
-}
-
 // The largest distance at the states of a motion that begins beside theirs, in units of that at the start.
 template <class real>
 double growth_of(LoadedStepper<real>& stepper, const States<real>& states, real step,
@@ -85,8 +66,7 @@ double growth_of(LoadedStepper<real>& stepper, const States<real>& states, real 
         const std::vector<real> there = state_after(stepper, steps);
         if (there.empty()) break;
         done += steps;
-        for (std::size_t k = 0; k < scale.size(); ++k)
-            largest = std::fmax(largest, size(there[k] - state[1 + k]) / scale[k]);
+        largest = std::fmax(largest, distance(there, state, scale));
     }
     return largest / first;
 }
@@ -94,23 +74,13 @@ double growth_of(LoadedStepper<real>& stepper, const States<real>& states, real 
 template <class real>
 double local_error_of(LoadedStepper<real>& stepper, const States<real>& states, const std::vector<real>& parameters,
                       real step, const std::vector<double>& scale) {
-    States<real> ends;
-    for (const std::vector<real>& state : states)
-        ends.push_back(start_at(stepper, state) == LOBATTO_OK ? state_after(stepper, 1) : std::vector<real>());
     double sum = 0;
     int count = 0;
-    if (stepper.prepare(parameters, step / 2) != LOBATTO_OK) return 0;
-    for (std::size_t i = 0; i < states.size(); ++i) {
-        if (ends[i].empty() || start_at(stepper, states[i]) != LOBATTO_OK) continue;
-        const std::vector<real> halves = state_after(stepper, 2);
-        if (halves.empty()) continue;
-        double difference = 0;
-        for (std::size_t k = 0; k < scale.size(); ++k)
-            difference = std::fmax(difference, size(halves[k] - ends[i][k]) / scale[k]);
-        sum += difference;
+    for (const Halved<real>& one : halved(stepper, states, parameters, step, scale)) {
+        if (one.end.empty() || !std::isfinite(one.difference)) continue;
+        sum += one.difference;
         ++count;
     }
-    stepper.prepare(parameters, step);
     return count > 0 ? sum / count : 0;
 }
 
@@ -192,36 +162,68 @@ double ErrorEstimate::after(double steps, double duration, const Evidence& evide
                  laws = std::max(
                      {turning * evidence.swing * way, steps * evidence.local, of_oscillation(steps, evidence.jump)}),
                  error = laws + random * std::sqrt(steps);
-    return way > 0 ? error * std::fmax(1, evidence.growth / way) : error;
+    return std::fmax(evidence.certain, way > 0 ? error * std::fmax(1, evidence.growth / way) : error);
+}
+
+template <class real>
+std::vector<Halved<real>> halved(LoadedStepper<real>& stepper, const States<real>& states,
+                                 const std::vector<real>& parameters, real step, const std::vector<double>& scale) {
+    std::vector<Halved<real>> steps(states.size());
+    for (std::size_t i = 0; i < states.size(); ++i)
+        if (start_at(stepper, states[i]) == LOBATTO_OK) steps[i].end = state_after(stepper, 1);
+    if (stepper.prepare(parameters, step / 2) != LOBATTO_OK) return {};
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        if (steps[i].end.empty() || start_at(stepper, states[i]) != LOBATTO_OK) continue;
+        const std::vector<real> end = state_after(stepper, 2);
+        steps[i].difference = end.empty() ? HUGE_VAL : distance(end, steps[i].end, scale);
+    }
+    stepper.prepare(parameters, step);
+    return steps;
+}
+
+template <class real>
+std::vector<double> energies_of(const LoadedStepper<real>& stepper, const States<real>& states) {
+    std::vector<double> energies;
+    real first = 0;
+    for (const std::vector<real>& state : states) {
+        const auto middle = state.begin() + 1 + static_cast<std::ptrdiff_t>(state.size() / 2);
+        real energy = 0;
+        const bool is_known =
+            stepper.energy(state[0], {state.begin() + 1, middle}, {middle, state.end()}, energy) == LOBATTO_OK;
+        if (energies.empty()) first = energy;
+        energies.push_back(is_known ? static_cast<double>(energy - first) : std::nan(""));
+    }
+    return energies;
 }
 
 template <class real>
 Evidence evidence_of(LoadedStepper<real>& stepper, const States<real>& states, const std::vector<real>& parameters,
-                     real step, const std::vector<double>& scale, double power, bool energy_tells) {
+                     real step, const std::vector<double>& scale, double power, const std::vector<double>& energies,
+                     bool energy_tells) {
     const std::size_t n = scale.size() / 2;
     Evidence evidence;
     if (states.size() < 2) return evidence;
-    double sum = 0, motion = 0;
+    double sum = 0, motion = 0, lowest = 0, highest = 0;
     int jumps = 0, motions = 0;
-    real lowest = 0, highest = 0;
-    for (const std::vector<real>& state : states) {
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        const std::vector<real>& state = states[i];
         const auto middle = state.begin() + 1 + static_cast<std::ptrdiff_t>(n);
         const std::vector<real> q(state.begin() + 1, middle), p(middle, state.end());
         std::vector<real> v, Lv, Lq;
         if (stepper.velocity(state[0], q, p, v) != LOBATTO_OK) continue;
         stepper.slopes(state[0], q, v, Lv, Lq);
-        double product = 0;
+        double product = 0, slope = 0;  // of the energy: by an error of the whole amplitude it changes so much
         for (std::size_t k = 0; k < n; ++k) {
             product += static_cast<double>(p[k] * v[k]);
+            slope += size(Lq[k]) * scale[k] + size(v[k]) * scale[n + k];
             evidence.rate = std::fmax(evidence.rate, std::fmax(size(v[k]) / scale[k], size(Lq[k]) / scale[n + k]));
         }
-        real energy = 0;
-        if (energy_tells && stepper.energy(state[0], q, p, energy) == LOBATTO_OK) {
-            if (motions == 0) lowest = highest = energy;
-            lowest = std::min(lowest, energy);
-            highest = std::max(highest, energy);
+        if (!energies.empty() && std::isfinite(energies[i])) {
+            lowest = std::fmin(lowest, energies[i]);
+            highest = std::fmax(highest, energies[i]);
             motion += std::fabs(product);
             ++motions;
+            if (slope > 0) evidence.certain = std::fmax(evidence.certain, std::fabs(energies[i]) / slope);
         }
         const double here = polynomial_defect(stepper, state[0], q, p, scale);
         if (!(here >= 0)) continue;
@@ -229,20 +231,33 @@ Evidence evidence_of(LoadedStepper<real>& stepper, const States<real>& states, c
         ++jumps;
     }
     if (jumps > 0) evidence.jump = std::pow(sum / jumps, 1 / power);
-    if (motion > 0) evidence.swing = static_cast<double>(highest - lowest) / (motion / motions);
+    if (energy_tells && motion > 0) evidence.swing = (highest - lowest) / (motion / motions);
     if (!energy_tells) evidence.local = local_error_of(stepper, states, parameters, step, scale);
     const double work = static_cast<double>((states.back()[0] - states.front()[0]) / step) * static_cast<double>(n);
     if (work <= shadow_work) evidence.growth = growth_of(stepper, states, step, scale);
     return evidence;
 }
 
+template std::vector<Halved<float>> halved(LoadedStepper<float>&, const States<float>&, const std::vector<float>&,
+                                           float, const std::vector<double>&);
+template std::vector<double> energies_of(const LoadedStepper<float>&, const States<float>&);
+template std::vector<Halved<double>> halved(LoadedStepper<double>&, const States<double>&, const std::vector<double>&,
+                                            double, const std::vector<double>&);
+template std::vector<double> energies_of(const LoadedStepper<double>&, const States<double>&);
+template std::vector<Halved<long double>> halved(LoadedStepper<long double>&, const States<long double>&,
+                                                 const std::vector<long double>&, long double,
+                                                 const std::vector<double>&);
+template std::vector<double> energies_of(const LoadedStepper<long double>&, const States<long double>&);
+template std::vector<Halved<__float128>> halved(LoadedStepper<__float128>&, const States<__float128>&,
+                                                const std::vector<__float128>&, __float128, const std::vector<double>&);
+template std::vector<double> energies_of(const LoadedStepper<__float128>&, const States<__float128>&);
 template Evidence evidence_of(LoadedStepper<float>&, const States<float>&, const std::vector<float>&, float,
-                              const std::vector<double>&, double, bool);
+                              const std::vector<double>&, double, const std::vector<double>&, bool);
 template Evidence evidence_of(LoadedStepper<double>&, const States<double>&, const std::vector<double>&, double,
-                              const std::vector<double>&, double, bool);
+                              const std::vector<double>&, double, const std::vector<double>&, bool);
 template Evidence evidence_of(LoadedStepper<long double>&, const States<long double>&, const std::vector<long double>&,
-                              long double, const std::vector<double>&, double, bool);
+                              long double, const std::vector<double>&, double, const std::vector<double>&, bool);
 template Evidence evidence_of(LoadedStepper<__float128>&, const States<__float128>&, const std::vector<__float128>&,
-                              __float128, const std::vector<double>&, double, bool);
+                              __float128, const std::vector<double>&, double, const std::vector<double>&, bool);
 
 }  // namespace lobatto

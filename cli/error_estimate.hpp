@@ -6,19 +6,20 @@
 #include <complex>
 #include <vector>
 
+#include "cli/stepping.hpp"
 #include "generator/quadrature.hpp"
-#include "runtime/library.hpp"
 
 namespace lobatto {
 
 // What some states of a run show. Everything is relative to `scale`, 2n: amplitudes of q and p.
 struct Evidence {
-    double jump = 0;    // (mean of J^b)^(1/b), J = polynomial_defect at a state, b = error_power; 0: no
-                        // dense output
-    double swing = 0;   // of the energy, largest less smallest, in units of the mean of |p v|; 0: does not tell
-    double rate = 0;    // 1/time: the largest |v_k| / scale_k, |p_k'| / scale_{n+k}
-    double local = 0;   // the mean difference, at its end, of a step and two of half its length; 0: not looked at
-    double growth = 0;  // how many times further apart than at the start a neighbouring motion gets; 0: not looked at
+    double jump = 0;     // (mean of J^b)^(1/b), J = polynomial_defect at a state, b = error_power; 0: no
+                         // dense output
+    double swing = 0;    // of the energy, largest less smallest, in units of the mean of |p v|; 0: does not tell
+    double rate = 0;     // 1/time: the largest |v_k| / scale_k, |p_k'| / scale_{n+k}
+    double local = 0;    // the mean difference, at its end, of a step and two of half its length; 0: not looked at
+    double certain = 0;  // the least error that the energy at the states, or single steps, leave possible
+    double growth = 0;   // how many times further apart than at the start a neighbouring motion gets; 0: not looked at
 };
 
 // Of a motion of any kind the error of a run is a (steps) J^b with b = (order + 1)/(degree + 1): one step's error has
@@ -39,7 +40,7 @@ public:
     //   Polynomials: the error of the harmonic oscillation whose polynomials miss one another as much; that of a motion
     // with harmonics is larger.
     // A part `random` of the amplitude, in each step: rounding, or what a tolerance leaves out. Where neighbours part
-    // faster than rate * duration, as on chaotic motions, errors do so too.
+    // faster than rate * duration, as on chaotic motions, errors do so too. Never less than what is certain.
     double after(double steps, double duration, const Evidence& evidence, double random = 0) const;
 
     // The harmonic oscillation of amplitude 1 with z = h omega:
@@ -60,16 +61,28 @@ private:
     double longest_ = 3;  // the largest z of interest
 };
 
-// Rows of t, q, p.
+// One step from a state, and two of half its length.
 template <class real>
-using States = std::vector<std::vector<real>>;
+struct Halved {
+    std::vector<real> end;  // of the step; empty where it fails, or where nothing can be compared
+    double difference = 0;  // of the ends, relative to the amplitude; infinite where only the halves fail
+};
+// `stepper` is prepared with `step`, and its trajectory is lost.
+template <class real>
+std::vector<Halved<real>> halved(LoadedStepper<real>& stepper, const States<real>& states,
+                                 const std::vector<real>& parameters, real step, const std::vector<double>& scale);
+
+// Above that of the first of them; not a number where there is none.
+template <class real>
+std::vector<double> energies_of(const LoadedStepper<real>& stepper, const States<real>& states);
 
 // `states` are some of a run, in the order of time, the first its start; `stepper` is prepared with its step, and its
-// trajectory is lost. `energy_tells`: it is conserved, by the motion and by no quadratic form of the method. Costs two
-// steps a state; three for `local`, which is looked at where the energy does not tell; and for `growth` the run once
-// more where that is short (some 0.1 s).
+// trajectory is lost. `energies` of theirs above the first one's; none where the motion conserves none. `energy_tells`:
+// neither does a quadratic form of the method. Costs two steps a state; three for `local`, which is looked at where the
+// energy does not tell; and for `growth` the run once more where that is short (some 0.1 s).
 template <class real>
 Evidence evidence_of(LoadedStepper<real>& stepper, const States<real>& states, const std::vector<real>& parameters,
-                     real step, const std::vector<double>& scale, double power, bool energy_tells);
+                     real step, const std::vector<double>& scale, double power, const std::vector<double>& energies,
+                     bool energy_tells);
 
 }  // namespace lobatto

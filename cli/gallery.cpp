@@ -12,8 +12,9 @@
 #include "cli/gallery_picture.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/motion.hpp"
-#include "runtime/cache.hpp"
+#include "cli/output_path.hpp"
 #include "runtime/error.hpp"
+#include "runtime/partial_file.hpp"
 
 namespace lobatto {
 
@@ -92,11 +93,7 @@ Picture picture_of_scene(Scene& scene) {
 
 void gallery(const GalleryCommand& options) {
     const std::vector<std::string> paths = options.scenes.empty() ? all_scenes() : options.scenes;
-    std::error_code error;
-    fs::create_directories(options.folder, error);
-    if (error)
-        throw MachineError(fmt::format("cannot create the folder {}: {}. Choose another place with -o", options.folder,
-                                       error.message()));
+    output_folder(options.folder, "");
     std::string page =
         "# Gallery\n\n"
         "Every scene of this folder's pictures is a short text file; `lobatto gallery` derived, compiled and ran each "
@@ -106,8 +103,7 @@ void gallery(const GalleryCommand& options) {
         try {
             Scene scene = read_scene(path);
             const Picture picture = picture_of_scene(scene);
-            draw(options.folder, scene.name, picture.script, picture.width, picture.height,
-                 "Install it (apt install gnuplot-nox).");
+            draw(options.folder, scene.name, picture.script, picture.width, picture.height);
             const std::string svg = scene.name + ".svg";
             const auto bytes = fs::file_size(fs::path(options.folder) / svg);
             fmt::print("{:<44}{:>4} kB  {}\n", (fs::path(options.folder) / svg).generic_string(), (bytes + 999) / 1000,
@@ -121,7 +117,7 @@ void gallery(const GalleryCommand& options) {
             fmt::print(stderr, "{}\n", failure.what());
         }
     }
-    write_file(options.folder + "/README.md", page);
+    write_whole(options.folder + "/README.md", "the page", page);
     fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
                options.folder);
     if (failed > 0) throw CLI::RuntimeError(some_failed);

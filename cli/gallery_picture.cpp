@@ -11,6 +11,7 @@
 #include <numbers>
 #include <optional>
 
+#include "cli/drawing.hpp"
 #include "generator/sample.hpp"
 
 namespace lobatto {
@@ -56,13 +57,6 @@ std::string base_of(const Coordinate& coordinate) {
 
 std::string label_of(const Coordinate& coordinate, const std::string& name) {
     return coordinate.unit.empty() ? name : fmt::format("{} [{}]", name, coordinate.unit);
-}
-
-// For gnuplot, between single quotes.
-std::string quoted(const std::string& text) {
-    std::string result = "'";
-    for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
-    return result + "'";
 }
 
 struct Range {
@@ -170,14 +164,14 @@ Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, c
         left / page_width, 1 - right / page_width, bottom / page_height, 1 - top / page_height);
     script += fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]\n", x.low, x.high, y.low, y.high);
     script += fmt::format("set label 1 {} at screen {:.6f},{:.6f} left noenhanced font ',17' tc rgb '#222222'\n",
-                          quoted(scene.title), 20 / page_width, 1 - 22 / page_height);
+                          gnuplot_text(scene.title), 20 / page_width, 1 - 22 / page_height);
     script += fmt::format("set label 2 {} at screen {:.6f},{:.6f} left noenhanced font ',12' tc rgb '#666666'\n",
-                          quoted(caption), 20 / page_width, 16 / page_height);
+                          gnuplot_text(caption), 20 / page_width, 16 / page_height);
     const double middle_x = (left + width / 2) / page_width, middle_y = (bottom + height / 2) / page_height;
-    script += fmt::format("set label 3 {} at screen {:.6f},{:.6f} center noenhanced\n", quoted(axes.x), middle_x,
+    script += fmt::format("set label 3 {} at screen {:.6f},{:.6f} center noenhanced\n", gnuplot_text(axes.x), middle_x,
                           44 / page_height);
-    script += fmt::format("set label 4 {} at screen {:.6f},{:.6f} center rotate by 90 noenhanced\n", quoted(axes.y),
-                          22 / page_width, middle_y);
+    script += fmt::format("set label 4 {} at screen {:.6f},{:.6f} center rotate by 90 noenhanced\n",
+                          gnuplot_text(axes.y), 22 / page_width, middle_y);
     script += "set xtics autofreq\nset ytics autofreq\n";
     std::string plot;
     for (std::size_t i = 0; i < curves.size(); ++i) {

@@ -15,6 +15,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "cli/commands.hpp"
@@ -27,8 +28,14 @@ using namespace lobatto;
 
 enum Exit { success = 0, wrong_input = 2, failed_computation = 3, failed_machine = 4 };
 
-int complain(Exit code, std::string_view message) {
+// An error is told although the output's reader has gone.
+void flush_before_error() {
+    std::signal(SIGPIPE, SIG_IGN);
     std::cout.flush();
+}
+
+int complain(Exit code, std::string_view message) {
+    flush_before_error();
     const bool styled = isatty(STDERR_FILENO) && std::getenv("NO_COLOR") == nullptr;
     fmt::print(
         stderr, "{} {}\n",
@@ -64,6 +71,15 @@ void flush_output() {
         throw MachineError(fmt::format("cannot write to standard output: {}. Is the disk full?", std::strerror(errno)));
 }
 
+void answer(CLI::App& program, int argc, char** argv) {
+    try {
+        program.parse(argc, argv);
+        if (program.get_subcommands().empty()) std::cout << program.help();
+    } catch (const CLI::Success& help_or_version) {
+        program.exit(help_or_version);  // prints it
+    }
+}
+
 void describe(CLI::App& program) {
     program.set_version_flag("--version", "lobatto " LOBATTO_VERSION);
     program.require_subcommand(0, 1);
@@ -96,24 +112,23 @@ int main(int argc, char** argv) {
                      "lobatto");
     try {
         describe(program);
-        program.parse(argc, argv);
-        if (program.get_subcommands().empty()) std::cout << program.help();
+        answer(program, argc, argv);
         flush_output();
         return success;
     } catch (const CLI::RuntimeError& end) {
         return end.get_exit_code();
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() != success) return complain_of_arguments(program, error);
-        program.exit(error);  // prints the help or the version
-        return success;
+        return complain_of_arguments(program, error);
     } catch (const InputError& error) {
         // Begins with file:line:column, as editors expect of a compiler.
-        std::cout.flush();
+        flush_before_error();
         fmt::print(stderr, "{}\n", error.what());
         return wrong_input;
     } catch (const ComputationError& error) {
         return complain(failed_computation, error.what());
     } catch (const MachineError& error) {
+        return complain(failed_machine, error.what());
+    } catch (const std::system_error& error) {
         return complain(failed_machine, error.what());
     } catch (const std::bad_alloc&) {
         return complain(failed_machine, "out of memory");

@@ -9,4 +9,10 @@ namespace lobatto {
 // `given`, or without one out/NAME; makes the folder then. Throws MachineError.
 std::string output_path(const std::string& given, const std::string& name);
 
+// The same for a folder of results, which is made, and in which files can be made: before they are computed.
+std::string output_folder(const std::string& given, const std::string& name);
+
+// InputError when `path`, where a result is to go, is the scene itself.
+void keep_scene(const std::string& scene, const std::string& path);
+
 }  // namespace lobatto

@@ -4,13 +4,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 
 #include "cli/commands.hpp"
+#include "cli/output_path.hpp"
 #include "cli/paper_document.hpp"
 #include "runtime/error.hpp"
+#include "runtime/partial_file.hpp"
 
 namespace lobatto {
 
@@ -22,6 +22,7 @@ struct PaperOptions {
 };
 
 void validate(const PaperOptions& options) {
+    output_folder(options.folder + (options.figures ? "/paper" : ""), "");
     std::vector<paper::Finding> findings;
     for (const paper::Statement& statement : paper::statements()) findings.push_back(paper::judge(statement));
     fmt::print("{}", walk_lines(findings));
@@ -42,20 +43,13 @@ void validate(const PaperOptions& options) {
         document += table_document(table);
     }
 
-    std::error_code error;
-    std::filesystem::create_directories(options.folder + (options.figures ? "/paper" : ""), error);
-    if (error)
-        throw MachineError(fmt::format("cannot create the folder {}: {}. Choose another place with -o", options.folder,
-                                       error.message()));
     if (options.figures) {
         const std::vector<Figure> figures = draw_figures(options.folder + "/paper");
         fmt::print("{}", growth_lines(figures));
         document += figure_document(figures);
     }
     const std::string path = options.folder + "/paper.md";
-    std::ofstream stream(path, std::ios::binary);
-    if (!(stream << document).flush())
-        throw MachineError(fmt::format("cannot write {}. Is the folder writable, is the disk full?", path));
+    write_whole(path, "the document", document);
     fmt::print(
         "\nWritten: {}{}\n", path,
         options.figures ? fmt::format(", {}/paper/figure1.svg … figure4.svg and their data", options.folder) : "");

@@ -10,18 +10,22 @@
 
 #include "cli/drawing.hpp"
 #include "cli/paper_tables.hpp"
-#include "runtime/cache.hpp"
+#include "runtime/partial_file.hpp"
 
 namespace lobatto {
 
 namespace {
 
 constexpr double omega = 2 * std::numbers::pi;
+const char* const without_figures = "leave the figures out with --no-figures";
 constexpr double steps_of_growth[3] = {0.1, 0.05, 0.025};
 
+void write_data(const std::string& folder, const std::string& name, const std::string& data) {
+    write_whole(folder + "/" + name + ".csv", "the figure's data", data, without_figures);
+}
+
 void draw_figure(const std::string& folder, const std::string& name, const std::string& script, int height) {
-    draw(folder, name, script, 900, height,
-         "Install it (apt install gnuplot-nox) or leave the figures out with --no-figures.");
+    draw(folder, name, script, 900, height, without_figures);
 }
 
 // Figures 1 and 3: exact curve at `fine` points a step, states of the three schemes at the steps; p divided by m omega.
@@ -198,7 +202,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        "divided by mω.",
                        {},
                        ""});
-    write_file(folder + "/figure1.csv", motion_data(PaperSystem::oscillator, 1.0 / 3, 3, 60));
+    write_data(folder, "figure1", motion_data(PaperSystem::oscillator, 1.0 / 3, 3, 60));
     draw_figure(folder, "figure1",
                 motion_script("figure1", "time t (one period T = 1)", "1.02", "-2.1:2.1", "-2.1:2.1"), 640);
 
@@ -216,7 +220,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
          "and 40 steps a period one of them is there from the beginning, and the true slope is some 1e−16. The "
          "caption's rates for these "
          "steps, like ours in double arithmetic, are rounding and depend on the order of the operations."});
-    write_file(folder + "/figure2.csv", oscillator.data);
+    write_data(folder, "figure2", oscillator.data);
     draw_figure(
         folder, "figure2",
         std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:1e5]\n") +
@@ -236,7 +240,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                        "momentum is divided by mω.",
                        {},
                        ""});
-    write_file(folder + "/figure3.csv", motion_data(PaperSystem::pendulum, period / 5, 25, 20));
+    write_data(folder, "figure3", motion_data(PaperSystem::pendulum, period / 5, 25, 20));
     draw_figure(folder, "figure3",
                 motion_script("figure3", "time t (one period 1.180)", fmt::format("{:.3f}", 5.05 * period), "-2.1:2.1",
                               "-1.9:1.9"),
@@ -254,7 +258,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
          "The slope is that of a curve which has long been flat, and falls with h. The caption's rates "
          "are of another kind or unit, which the text does not give: they do not fall with h, though "
          "they would if the first two were exchanged."});
-    write_file(folder + "/figure4.csv", pendulum.data);
+    write_data(folder, "figure4", pendulum.data);
     draw_figure(
         folder, "figure4",
         std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:5000]\n") +

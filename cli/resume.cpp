@@ -44,7 +44,7 @@ std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std
                         path, what));
     const auto n = static_cast<std::size_t>(kernel->coordinates);
     const TrajectoryResult& result = found->halfway.result;
-    if (found->sizes.size() != files || found->watched.size() < watched ||
+    if (found->files.size() != files || found->watched.size() < watched ||
         std::ssize(found->halfway.stepper) != kernel->stepper_bytes || result.q.size() != n || result.p.size() != n)
         throw MachineError(
             fmt::format("cannot go on from {}: it is damaged. Run without --resume to begin anew", path));

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <filesystem>
 
 #include "cli/commands.hpp"
 #include "cli/drawing.hpp"
@@ -15,8 +14,8 @@
 #include "cli/overrides.hpp"
 #include "cli/roundoff_growth.hpp"
 #include "generator/source.hpp"
-#include "runtime/cache.hpp"
 #include "runtime/error.hpp"
+#include "runtime/partial_file.hpp"
 
 namespace lobatto {
 
@@ -97,29 +96,27 @@ void roundoff(const RoundoffCommand& options) {
     apply(options.overrides, scene);
     scene.method.arithmetic = StepArithmetic::clean;
     scene.method.tolerance = 0;
-    const std::string name = scene.method.name(), path = scene.path, scene_name = scene.name;
+    const std::string name = scene.method.name(), path = scene.path;
     const std::string step = fmt::format("{:.6g}", step_of(scene, options.overrides).to_double());
+    const std::string folder = output_folder(options.output, scene.name + "_roundoff"),
+                      table = folder + "/roundoff.csv";
+    keep_scene(path, table);
     const Interruption interruption;
     const RoundoffResult result = roundoff_growth(std::move(scene), options.steps, options.trajectories,
                                                   !options.no_reference, Interruption::flag());
-    fmt::print("{}: {}, h = {}, {} trajectories.\n{}\n\n", path, name, step, options.trajectories,
-               options.no_reference
-                   ? "The energy against H(0), relative to |H(0)| or the kinetic energy, if that is larger: the "
-                     "method's own error is in it."
-                   : "What rounding changes, against the same steps in long double: H relative to |H(0)| or the "
-                     "kinetic energy, if that is larger, q to its largest.");
-    if (!result.plain.rows.empty()) print(result);
+    fmt::print(
+        "{}: {}, h = {}, {} trajectories.\n{}\n\n", path, name, step, options.trajectories,
+        options.no_reference
+            ? "The energy against H(0), relative to |H(0)|, or to half of the largest kinetic energy if that is "
+              "larger: the method's own error is in it."
+            : "What rounding changes, against the same steps in long double: H relative to |H(0)|, or to half of "
+              "the largest kinetic energy if that is larger, q to its largest.");
     if (!result.plain.rows.empty()) {
-        const std::string folder = output_path(options.output, scene_name + "_roundoff");
-        std::error_code error;
-        std::filesystem::create_directories(folder, error);
-        if (error) throw MachineError(fmt::format("cannot create the folder {}: {}", folder, error.message()));
-        write_file(folder + "/roundoff.csv", csv_of(result));
+        print(result);
+        write_whole(table, "the table", csv_of(result));
         const std::string script = options.no_picture ? "" : script_of(result);
-        if (!script.empty())
-            draw(folder, "roundoff", script, 900, 640,
-                 "Install it (apt install gnuplot-nox) or leave the picture out with --no-picture.");
-        fmt::print("\n{}/roundoff.csv{} has all of it.\n", folder, script.empty() ? "" : " and roundoff.svg beside it");
+        if (!script.empty()) draw(folder, "roundoff", script, 900, 640, "leave the picture out with --no-picture");
+        fmt::print("\n{}{} has all of it.\n", table, script.empty() ? "" : " and roundoff.svg beside it");
     }
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted {}\n",
@@ -128,6 +125,11 @@ void roundoff(const RoundoffCommand& options) {
                                                            result.steps, result.trajectories));
         throw CLI::RuntimeError(interrupted_exit);
     }
+    if (result.lost)
+        throw ComputationError(fmt::format(
+            "{}: energies are off by as much as the motion has, so this is no measure of rounding: the step is "
+            "beyond the stability of the method, or has gone past a singularity. Try a smaller --step",
+            path));
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ namespace {
 
 using Quad = __float128;
 
+constexpr double lost = 0.5;                   // of the energy
 constexpr std::int64_t steps_at_once = 10000;  // between two looks at the interruption
 
 std::vector<std::int64_t> checkpoints(std::int64_t steps) {
@@ -118,6 +119,7 @@ struct Difference {
 // All checkpoints of one trajectory.
 struct Course {
     std::vector<Difference> plain, clean;
+    double energy_scale = 0;  // |H(0)|, or half of the largest kinetic energy met where that is larger
     double plain_seconds = 0, clean_seconds = 0;
     std::int64_t plain_iterations = 0, clean_iterations = 0;
 };
@@ -148,15 +150,13 @@ Course follow(const Kernels& kernels, StartIn<double> in_double, double step, in
     if (kernels.extended)
         reference.emplace("long double", *kernels.extended, extended_of(parameters), step, extended_of(q),
                           extended_of(p));
-    // Energies are relative to H(0), or to the kinetic energy where that is larger.
-    Quad H0 = 0, V0 = 0, H = 0, H_exact = 0;
+    Quad H0 = 0, H = 0, H_exact = 0, V = 0;
     exact.energy(0, q, p, H0);
-    exact.energy(0, q, std::vector<Quad>(p.size(), Quad(0)), V0);
-    const auto size = [](Quad value) { return value < 0 ? -value : value; };
-    const Quad larger = std::max(size(H0), size(H0 - V0)), scale = larger > 0 ? larger : Quad(1);
     H_exact = H0;
-    double largest = reference ? 0 : std::numeric_limits<double>::quiet_NaN();
+    const std::vector<Quad> at_rest(p.size(), Quad(0));
+    double largest = 0;
     Course course;
+    course.energy_scale = std::fabs(static_cast<double>(H0));
     for (const std::int64_t look : looks) {
         while (plain.taken < look && *interrupted == 0) {
             const std::int64_t more = std::min(look - plain.taken, steps_at_once);
@@ -174,8 +174,10 @@ Course follow(const Kernels& kernels, StartIn<double> in_double, double step, in
             runner.state(exact, q, p);
             exact.energy(runner.time(), q, p, H);
             Difference difference;
-            difference.energy = static_cast<double>((H - H_exact) / scale);
-            difference.position = 0 * largest;
+            difference.energy = static_cast<double>(H - H_exact);
+            exact.energy(runner.time(), q, at_rest, V);
+            course.energy_scale = std::max(course.energy_scale, std::fabs(static_cast<double>(H - V)) / 2);
+            if (!reference) difference.position = std::numeric_limits<double>::quiet_NaN();
             for (std::size_t k = 0; k < q_exact.size(); ++k)
                 difference.position =
                     std::max(difference.position, std::fabs(static_cast<double>(q[k] - q_exact[k])) / largest);
@@ -214,8 +216,9 @@ RoundoffGrowth growth_of(const std::vector<Course>& courses, std::vector<Differe
         RoundoffRow row{looks[i], 0, 0, 0};
         for (const Course& course : courses) {
             const Difference& difference = (course.*differences)[i];
-            row.energy_mean += difference.energy / trajectories;
-            row.energy_rms += difference.energy * difference.energy / trajectories;
+            const double energy = course.energy_scale > 0 ? difference.energy / course.energy_scale : difference.energy;
+            row.energy_mean += energy / trajectories;
+            row.energy_rms += energy * energy / trajectories;
             row.position_rms += difference.position * difference.position / trajectories;
         }
         row.energy_rms = std::sqrt(row.energy_rms);
@@ -292,6 +295,8 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
     result.steps = common > 0 ? looks[common - 1] : 0;
     result.plain = growth_of(courses, &Course::plain, &Course::plain_seconds, &Course::plain_iterations, looks, common);
     result.clean = growth_of(courses, &Course::clean, &Course::clean_seconds, &Course::clean_iterations, looks, common);
+    for (const RoundoffGrowth& growth : {result.plain, result.clean})
+        for (const RoundoffRow& row : growth.rows) result.lost = result.lost || !(row.energy_rms < lost);
     return result;
 }
 

@@ -11,6 +11,7 @@
 #include "cli/energy_watch.hpp"
 #include "cli/interruption.hpp"
 #include "cli/kernel_of.hpp"
+#include "cli/linear_departure.hpp"
 #include "cli/method_option.hpp"
 #include "cli/motion.hpp"
 #include "cli/output_path.hpp"
@@ -87,8 +88,8 @@ std::string defect_text(const LoadedStepper<double>& stepper, const TrajectoryRe
 }
 
 // The stepper is prepared.
-void print_table(const Derivation& derivation, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
-                 const TrajectoryResult& result, const Watch& watch) {
+void print_table(const Derivation& derivation, const Scene& scene, const LoadedStepper<double>& stepper,
+                 const TrajectoryRequest& request, const TrajectoryResult& result, const Watch& watch) {
     const std::string of_all = result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
     print_row("steps",
               fmt::format("{}{}, h = {:.6g}, to t = {:.6g}", result.steps_done, of_all, request.step, result.time));
@@ -97,7 +98,7 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
     print_row("time per step", duration(result.seconds / static_cast<double>(result.steps_done)));
     print_row("iterations", iterations_text(kernel, result));
     const bool conserves = derivation.system.autonomous && !has_forces(derivation);
-    if (kernel.has_energy != 0) {
+    if (scene.outputs.energy) {
         const double H0 = std::fabs(result.energy_start);
         const bool relative = conserves && H0 > 0;
         print_row(conserves ? "energy error" : "energy change",
@@ -111,7 +112,7 @@ void print_table(const Derivation& derivation, const LoadedStepper<double>& step
                   request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
                                         : defect_text(stepper, request));
     if (const auto error = watch.position_error()) {
-        const std::string& unit = derivation.scene.coordinates.front().unit;
+        const std::string& unit = scene.coordinates.front().unit;
         print_row("position error",
                   fmt::format("{:.2g}{} at most, against the exact {}solution", *error, unit.empty() ? "" : " " + unit,
                               watch.is_elliptic() ? "elliptic " : ""));
@@ -139,7 +140,8 @@ void run(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
-    const Derivation derivation = derive(scene, options.general);
+    Derivation derivation = derive(scene, options.general);
+    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const KernelSource source = emit(derivation);
     const double derivation_seconds = seconds_since(start);
     apply(options.overrides, scene);  // after the derivation: one kernel serves all values
@@ -149,6 +151,9 @@ void run(const RunOptions& options) {
     LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(scene, steps.count, stepper);
     const std::string path = output_path(options.output, scene.name + ".csv");
+    const std::size_t event_kinds = scene.outputs.events.size();
+    keep_scene(scene.path, path);
+    if (event_kinds > 0) keep_scene(scene.path, event_path(options, scene));
     if (!options.quiet) {
         fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, source.digest, derivation_seconds,
                    compiled.from_cache ? "found compiled in the cache"
@@ -157,7 +162,6 @@ void run(const RunOptions& options) {
 
     const TrajectoryHeader header = header_of(scene, source, request);
     const std::string run = identity_of(request, header, compiled.object);
-    const std::size_t event_kinds = scene.outputs.events.size();
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
     Watch watch(scene, derivation.structure, stepper, velocity);
@@ -182,10 +186,11 @@ void run(const RunOptions& options) {
                                                     from->halfway.result.steps_done)
                                       : "nothing was left: from the start");
     }
-    TrajectoryFile file(path, header, from ? from->sizes[0] : 0);
+    TrajectoryFile file(path, header, from ? from->files[0] : Written());
     std::optional<TrajectoryFile> event_file;
     if (event_kinds > 0) {
-        event_file.emplace(event_path(options, scene), event_header_of(scene, header), from ? from->sizes[1] : 0);
+        event_file.emplace(event_path(options, scene), event_header_of(scene, header),
+                           from ? from->files[1] : Written());
         request.events = [&](const EventRecords& records) {
             event_file->write(records);
             for (std::int64_t i = 0; i < records.count; ++i)
@@ -196,11 +201,11 @@ void run(const RunOptions& options) {
     if (keeps_checkpoints) {
         if (!from) remove_checkpoint(path);  // of a run that has just lost its files
         request.checkpoint = [&](const Halfway& halfway) {
-            Checkpoint checkpoint{run, halfway, {file.size()}, counts};
+            Checkpoint checkpoint{run, halfway, {file.written()}, counts};
             file.sync();
             if (event_file) {
                 event_file->sync();
-                checkpoint.sizes.push_back(event_file->size());
+                checkpoint.files.push_back(event_file->written());
             }
             const std::vector<double> by_energy = energy_watch.seen();
             for (const std::vector<double>& seen :
@@ -229,14 +234,15 @@ void run(const RunOptions& options) {
     if (event_file) event_file->finish();
     if (keeps_checkpoints && !result.interrupted) remove_checkpoint(path);
 
+    std::optional<StepJudge::Judgement> judgement;
+    if (result.status == LOBATTO_OK && result.steps_done > 1) {
+        judgement = judge.judge(derivation, kernel, request, result);
+        for (const std::string& warning : StepJudge::warnings(*judgement, scene.run.error))
+            fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+    }
     if (!options.quiet) {
-        print_table(derivation, stepper, request, result, watch);
-        if (result.status == LOBATTO_OK && result.steps_done > 1) {
-            const StepJudge::Judgement judgement = judge.judge(derivation, kernel, request, result);
-            print_row("estimated error", judgement.text());
-            for (const std::string& warning : StepJudge::warnings(judgement, scene.run.error))
-                fmt::print(stderr, "lobatto: warning: {}.\n", warning);
-        }
+        print_table(derivation, scene, stepper, request, result, watch);
+        if (judgement) print_row("estimated error", judgement->text());
         print_events(scene.outputs.events, counts, event_file ? event_path(options, scene) : "");
         print_row("trajectory", fmt::format("{}, {} {}", path, counts[0], counts[0] == 1 ? "state" : "states"));
         if (!steps.reaches_end)
@@ -246,7 +252,10 @@ void run(const RunOptions& options) {
         throw ComputationError(
             fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
     }
-    const std::string departure = result.interrupted ? "" : energy_watch.departure(derivation, kernel, request);
+    std::string departure;
+    if (!result.interrupted) departure = energy_watch.departure(derivation, kernel, request);
+    if (!result.interrupted && departure.empty())
+        departure = linear_departure(derivation, scene, kernel, request, result);
     if (!departure.empty())
         throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, path));
     if (scene.outputs.energy && !std::isfinite(result.energy_error_largest)) {
@@ -285,7 +294,7 @@ void add_run(CLI::App& program) {
     command->add_flag(
         "--resume", options->resume,
         "go on where the same run was interrupted or killed; its files get the bytes they would have had");
-    command->add_flag("--quiet", options->quiet, "Print nothing but errors");
+    command->add_flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     command->footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
     command->callback([options] { run(*options); });
 }

@@ -5,10 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 
 #include "cli/commands.hpp"
 #include "cli/drawing.hpp"
 #include "cli/method_option.hpp"
+#include "cli/output_path.hpp"
 #include "cli/stability_chart.hpp"
 #include "cli/stability_text.hpp"
 #include "generator/source.hpp"
@@ -25,7 +27,8 @@ std::vector<Method> all_methods() {
 }
 
 struct StabilityCommand {
-    std::string scene, chart;
+    std::optional<std::string> scene;
+    std::string chart;
     MethodOption method;
     Overrides overrides;
     bool json = false;
@@ -34,18 +37,21 @@ struct StabilityCommand {
 namespace fs = std::filesystem;
 
 // Before anything is computed.
-fs::path chart_path(const std::string& given) {
+fs::path chart_path(const std::string& given, const std::string& scene) {
     const fs::path path = given;
     if (path.extension() != ".svg" || path.stem().empty())
         throw InputError(fmt::format("--chart {}: the chart is an SVG file; give it a name that ends in .svg", given));
     if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder))
         throw InputError(fmt::format("--chart {}: there is no folder {}; make it first", given, folder.string()));
+    keep_scene(scene, given);
     return path;
 }
 
 void show_members(const StabilityCommand& options) {
     if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
         throw InputError("--chart, --step and --set belong to a scene; name one");
+    if (options.method.tolerance || options.method.arithmetic)
+        throw InputError("--tolerance and --arithmetic belong to a scene; name one");
     std::vector<Method> methods;
     if (options.method.points)
         methods = {{Family::lobatto, *options.method.points}};
@@ -59,13 +65,13 @@ void show_members(const StabilityCommand& options) {
 }
 
 void show_scene(const StabilityCommand& options) {
-    const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart);
-    Scene scene = read_scene(options.scene);
+    const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart, *options.scene);
+    Scene scene = read_scene(*options.scene);
     options.method.apply(scene);
     const StabilityReport report = stability_report(std::move(scene), options.overrides);
     if (!chart.empty())
         draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),
-             stability_chart(report), 900, 640, "Install it (apt install gnuplot-nox).");
+             stability_chart(report), 900, 640, "leave --chart out");
     std::cout << (options.json ? json_of(report) : text_of(report));
 }
 
@@ -82,7 +88,7 @@ void add_stability(CLI::App& program) {
     command->add_option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
     command->add_flag("--json", options->json, "for machines (described in docs/stability.md)");
     command->footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
-    command->callback([options] { options->scene.empty() ? show_members(*options) : show_scene(*options); });
+    command->callback([options] { options->scene ? show_scene(*options) : show_members(*options); });
 }
 
 }  // namespace lobatto

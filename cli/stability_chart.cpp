@@ -30,7 +30,7 @@ double stiffness_of(const StabilityReport& report) {
 
 // One oscillator as fast as the motion ever is; one of h omega = 1, not marked, where it has no frequencies at all.
 std::vector<Mode> stiffest_moment(const StabilityReport& report) {
-    return {{0, stiffness_of(report) > 0 ? stiffness_of(report) : 1, 0}};
+    return {{.z = stiffness_of(report) > 0 ? stiffness_of(report) : 1}};
 }
 
 double root_of(const RealRoot& root) {
@@ -86,8 +86,8 @@ std::string stability_chart(const StabilityReport& report) {
     const auto measure = [&](double x) {
         if (point == nullptr) return;
         const auto rate = measured_rate_at(report, point->q, report.step * x / highest);
-        if (rate && *rate > std::fmax(least_rate, measured_floor(report)))
-            measured += fmt::format("{:.10g},{:.6g}\n", x, *rate);
+        if (rate && rate->value > std::fmax(least_rate, rate->floor))
+            measured += fmt::format("{:.10g},{:.6g}\n", x, rate->value);
     };
     for (int i = 1; i <= 60; ++i) measure(right * i / 60);
     for (std::size_t k = 0; k + 1 < limits.size(); k += 2)

@@ -80,12 +80,16 @@ Json point_of(const StabilityReport& report, const PointReport& point) {
         for (const Mode& mode : *point.modes)
             json["modes"].push_back({{"squared_frequency", mode.squared_frequency},
                                      {"z", mode.z},
-                                     {"stable", mode.z > 0 && mode.rate == 0},
+                                     {"stable", mode.stable()},
+                                     {"at_limit", mode.at_limit},
                                      {"rate", mode.rate}});
     }
     if (!point.obstacle.empty()) json["obstacle"] = point.obstacle;
     json["exact_rate"] = point.exact_rate;
-    if (point.kernel_rate) json["measured_rate"] = *point.kernel_rate;
+    if (point.kernel_rate) {
+        json["measured_rate"] = point.kernel_rate->value;
+        json["measured_floor"] = point.kernel_rate->floor;
+    }
     return json;
 }
 
@@ -115,7 +119,10 @@ std::string json_of(const StabilityReport& report) {
     for (const PointReport& point : report.points) json["points"].push_back(point_of(report, point));
     if (const auto& motion = report.trajectory)
         json["trajectory"] = {{"steps", motion->steps},
+                              {"most_steps", motion->most_steps},
                               {"steps_done", motion->steps_done},
+                              {"states", motion->states},
+                              {"frequencies_at", motion->frequencies_at},
                               {"looked_at", motion->looked_at},
                               {"largest_z", motion->largest_z},
                               {"largest_z_time", motion->largest_z_time},
@@ -126,9 +133,11 @@ std::string json_of(const StabilityReport& report) {
                               {"excess", motion->excess},
                               {"excess_time", motion->excess_time}};
     if (const auto& energy = report.energy) {
-        json["energy"] = {{"order", energy->order},
-                          {"variation", energy->variation},
-                          {"modified_variation", energy->modified_variation}};
+        json["energy"] = {{"order", energy->order}, {"too_long", energy->too_long}};
+        if (!energy->too_long) {
+            json["energy"]["variation"] = energy->variation;
+            json["energy"]["modified_variation"] = energy->modified_variation;
+        }
         if (const auto general = general_modified_energy(report.member.method))
             json["energy"]["term_of_one_coordinate"] = canonical_text(*general);
     }

@@ -11,6 +11,7 @@
 #include "cli/kernel_of.hpp"
 #include "cli/linearisation.hpp"
 #include "cli/motion.hpp"
+#include "generator/limits.hpp"
 #include "generator/modified_energy.hpp"
 #include "runtime/error.hpp"
 #include "runtime/monodromy.hpp"
@@ -25,8 +26,8 @@ constexpr std::int64_t states_looked_at = 200;
 constexpr int most_starts = 24;                   // of the search for equilibria
 constexpr std::size_t most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
 constexpr std::size_t most_coordinates = 1024;
-constexpr double least_z = 1e-290;  // below, nothing moves
-constexpr int fine = 8;             // steps of h/8 stand for the motion itself
+constexpr std::int64_t most_steps = 10'000'000;  // of a run to look at, times coordinates
+constexpr int fine = 8;                          // steps of h/8 stand for the motion itself
 
 std::vector<double> plain(const VectorXd& values) {
     return {values.begin(), values.end()};
@@ -36,16 +37,23 @@ GiNaC::numeric exactly(double x) {
     return GiNaC::numeric(cln::rational(cln::cl_DF(x)));
 }
 
+// To the rounding of a frequency.
+bool is_limit(const Stability& member, double z) {
+    return std::any_of(member.limits.begin(), member.limits.end(), [&](const RealRoot& limit) {
+        const double there = limit.approximation(20).to_double();
+        return std::fabs(z - there) <= 1e-14 * there;
+    });
+}
+
 std::vector<Mode> modes_of(const Stability& member, const VectorXd& squared, double h) {
     std::vector<Mode> modes;
     for (const double value : squared) {
-        double z = h * h * value;
+        const double z = h * h * value;
         if (!std::isfinite(z))
             throw ComputationError(fmt::format(
                 "the squared frequency {:.3g} times the squared step leaves the range of numbers; choose other units",
                 value));
-        if (std::fabs(z) < least_z) z = 0;
-        modes.push_back({value, z, z == 0 ? 0 : rate_of_step(member, exactly(z))});
+        modes.push_back({value, z, rate_of_step(member, exactly(z)), is_limit(member, z)});
     }
     return modes;
 }
@@ -54,13 +62,16 @@ PointReport point_report(const StabilityReport& report, const LinearSystem& syst
     PointReport point;
     point.q = q;
     point.obstacle = system.obstacle();
-    point.exact_rate = report.step * system.rate();
+    double expected = 0;
     if (const auto squared = system.squared_frequencies()) {
         point.modes = modes_of(report.member, *squared, report.step);
         const double lowest = squared->minCoeff();
         point.exact_rate = lowest < 0 ? report.step * std::sqrt(-lowest) : 0;
+        expected = largest_rate(report, *point.modes, 1);
+    } else {
+        point.exact_rate = report.step * system.rate();
     }
-    point.kernel_rate = measured_rate_at(report, q, report.step);
+    point.kernel_rate = measured_rate_at(report, q, report.step, expected);
     return point;
 }
 
@@ -99,6 +110,7 @@ std::vector<State> states_along(const StabilityReport& report, TrajectoryRequest
 TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation& linearisation,
                                    const std::vector<State>& states) {
     TrajectoryReport result;
+    result.states = std::ssize(states);
     LoadedStepper<double> stepper(report.kernel), finer(report.kernel);
     stepper.prepare(report.parameters, report.step);
     finer.prepare(report.parameters, report.step / fine);
@@ -108,11 +120,12 @@ TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation&
         try {
             if (stepper.velocity(state.time, q, p, velocity) == LOBATTO_OK) {
                 const Eigen::Map<const VectorXd> v(velocity.data(), state.q.size());
-                const auto squared = linearisation.at(state.time, state.q, v).squared_frequencies();
-                if (const double z = squared ? report.step * report.step * squared->maxCoeff() : 0;
-                    z > result.largest_z) {
-                    result.largest_z = z;
-                    result.largest_z_time = state.time;
+                if (const auto omega = linearisation.at(state.time, state.q, v).largest_frequency()) {
+                    ++result.frequencies_at;
+                    if (const double angle = report.step * *omega; angle * angle > result.largest_z) {
+                        result.largest_z = angle * angle;
+                        result.largest_z_time = state.time;
+                    }
                 }
             }
         } catch (const DomainError&) {  // at a singularity
@@ -140,8 +153,17 @@ TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation&
 std::optional<EnergyReport> energy_report(const StabilityReport& report, const std::vector<State>& states) {
     const System& system = report.derivation.system;
     const Scene& scene = report.derivation.scene;
-    const auto modified = modified_energy(system, report.member.method);
-    if (!modified || states.empty()) return std::nullopt;
+    if (!has_modified_energy(system, report.member.method) || states.empty()) return std::nullopt;
+    EnergyReport result;
+    result.order = report.member.method.order();
+    const auto modified = [&] {
+        const Limits limits(scene.path, "deriving the modified energy");
+        return modified_energy(system, report.member.method);
+    }();
+    if (!modified) {
+        result.too_long = true;
+        return result;
+    }
     Formulas formulas;
     for (const Parameter& parameter : scene.parameters)
         formulas.set(parameter.symbol, float_of(scene.evaluate(parameter.value, "the parameter " + parameter.name)));
@@ -154,8 +176,6 @@ std::optional<EnergyReport> energy_report(const StabilityReport& report, const s
     set(states.front());
     const std::vector<Id> ids = formulas.convert({modified->energy, modified->term});
     const double power = std::pow(report.step, modified->order);
-    EnergyReport result;
-    result.order = modified->order;
     Extent plain_energy, corrected;
     for (const State& state : states) {
         set(state);
@@ -171,9 +191,14 @@ std::optional<EnergyReport> energy_report(const StabilityReport& report, const s
     return result;
 }
 
-long measured_steps(const StabilityReport& report) {
-    const long n = report.kernel->coordinates;
-    return std::max(1L << 9, (1L << 16) / (n * n));
+constexpr double eigenvalue_floor = 1e-6;  // of double eigenvalues, the root of rounding
+constexpr double left_of_start = 8;        // over the steps: what a measurement may be off by
+
+long measured_steps(const StabilityReport& report, double expected) {
+    const long n = report.kernel->coordinates, enough = std::max(1L << 9, (1L << 16) / (n * n)),
+               most = std::max(enough, (1L << 24) / (n * n));
+    const double wanted = expected > 0 ? 8 * left_of_start / expected : 0;
+    return wanted < static_cast<double>(most) ? std::max(enough, std::lround(wanted) / 16 * 16) : most;
 }
 
 Scene with_tangent(Scene scene) {
@@ -202,25 +227,30 @@ StabilityReport begin(Scene scene, const Overrides& overrides, TrajectoryRequest
 
 }  // namespace
 
-double measured_floor(const StabilityReport& report) {
-    return report.kernel->linear != 0 ? 8.0 / static_cast<double>(measured_steps(report)) : 1e-6;
-}
-
-std::optional<double> measured_rate_at(const StabilityReport& report, const VectorXd& q, double step) {
+std::optional<MeasuredRate> measured_rate_at(const StabilityReport& report, const VectorXd& q, double step,
+                                             double expected) {
     LoadedStepper<double> stepper(report.kernel);
     if (stepper.prepare(report.parameters, step) != LOBATTO_OK) return std::nullopt;
-    if (report.kernel->linear != 0) return measured_rate(stepper, step, measured_steps(report));
+    if (report.kernel->linear != 0) {
+        const long steps = measured_steps(report, expected);
+        const auto rate = measured_rate(stepper, step, steps);
+        if (!rate) return std::nullopt;
+        return MeasuredRate{*rate, left_of_start / static_cast<double>(steps)};
+    }
     if (q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) return std::nullopt;
     const std::vector<double> position = plain(q),
                               momentum = stepper.momentum(0, position, std::vector<double>(position.size()));
     const auto values = step_eigenvalues(stepper, step, 0, position, momentum);
-    return values ? std::optional(std::log(std::abs(values->front()))) : std::nullopt;
+    if (!values) return std::nullopt;
+    return MeasuredRate{std::log(std::abs(values->front())), eigenvalue_floor};
 }
 
 double largest_rate(const StabilityReport& report, const std::vector<Mode>& modes, double factor) {
     double largest = 0;
-    for (const Mode& mode : modes)
-        if (mode.z != 0) largest = std::fmax(largest, rate_of_step(report.member, exactly(factor * factor * mode.z)));
+    for (const Mode& mode : modes) {
+        const double angle = factor * std::sqrt(std::fabs(mode.z));
+        largest = std::fmax(largest, rate_of_step(report.member, exactly(std::copysign(angle * angle, mode.z))));
+    }
     return largest;
 }
 
@@ -229,21 +259,26 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
     StabilityReport report = begin(std::move(scene), overrides, request);
     const System& system = report.derivation.system;
     Linearisation linearisation(report.derivation.scene, system);
-    const VectorXd start = Eigen::Map<const VectorXd>(request.q.data(), system.n), rest = VectorXd::Zero(system.n);
+    const VectorXd start = Eigen::Map<const VectorXd>(request.q.data(), system.n);
     if (system.linear) {
+        const VectorXd rest = VectorXd::Zero(system.n);
         report.points.push_back(point_report(report, linearisation.at(0, start, rest), start));
         return report;
     }
+    const std::int64_t steps = request.steps;
+    request.steps = std::min(steps, most_steps / system.n);
     std::int64_t done = 0;
     const std::vector<State> states = states_along(report, request, done);
     if (system.autonomous && system.n <= static_cast<int>(most_for_eigenvalues)) {
         std::vector<VectorXd> starts{start};
         for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);
-        for (const VectorXd& q : linearisation.equilibria(starts))
-            report.points.push_back(point_report(report, linearisation.at(0, q, rest), q));
+        starts.emplace_back(VectorXd::Zero(system.n));
+        for (const Equilibrium& equilibrium : linearisation.equilibria(starts))
+            report.points.push_back(point_report(report, equilibrium.system, equilibrium.q));
     }
     report.trajectory = trajectory_report(report, linearisation, states);
-    report.trajectory->steps = request.steps;
+    report.trajectory->steps = steps;
+    report.trajectory->most_steps = request.steps;
     report.trajectory->steps_done = done;
     report.energy = energy_report(report, states);
     return report;

@@ -82,38 +82,41 @@ std::string proof_text(const ProofOfStability& proof) {
         signs_text(proof.at_zero), signs_text(proof.at_infinity), changes_of_sign(proof.at_zero));
 }
 
-std::string mode_text(const Stability& member, const Mode& mode, double h) {
-    if (mode.z == 0) return fmt::format("  omega = 0              free: moves on steadily");
+std::string mode_text(const Stability& member, const Mode& mode, bool linear) {
+    if (mode.squared_frequency == 0)
+        return fmt::format("  omega = 0              {}",
+                           linear ? "free: moves on steadily" : "the linear part says nothing here");
     const double x = std::sqrt(std::fabs(mode.z));
-    if (mode.z < 0)
+    if (mode.squared_frequency < 0)
         return fmt::format("  omega^2 = {:<12.6g} runs away itself, by {:.5g} in a time h; the step by {}",
                            mode.squared_frequency, std::exp(x), growth_text(mode.rate));
-    std::string text = fmt::format("  omega = {:<14.6g} h*omega = {:<12.6g} ", x / h, x);
+    std::string text = fmt::format("  omega = {:<14.6g} h*omega = {:<12.6g} ", std::sqrt(mode.squared_frequency), x);
+    if (mode.at_limit) return text + "AT a limit, to rounding: grows in proportion to the number of steps";
     if (mode.rate > 0) return text + fmt::format("UNSTABLE: grows by {} a step", growth_text(mode.rate));
     text += "stable";
     if (member.limits.empty()) return text;
     std::size_t k = 0;
     while (k + 1 < member.limits.size() && member.limits[k].high.to_double() < mode.z) ++k;
     const auto step_at = [&](std::size_t limit) {
-        return std::sqrt(member.limits[limit].approximation(20).to_double()) / (x / h);
+        return std::sqrt(member.limits[limit].approximation(20).to_double() / mode.squared_frequency);
     };
     return text + (k == 0 ? fmt::format(" while h < {:.6g}", step_at(0))
                           : fmt::format(" between h = {:.6g} and {:.6g}", step_at(k - 1), step_at(k)));
 }
 
 // All, or the ends of a long list and what is unstable.
-std::string modes_text(const Stability& member, const std::vector<Mode>& modes, double h) {
+std::string modes_text(const Stability& member, const std::vector<Mode>& modes, bool linear) {
     std::string text;
     std::size_t hidden = 0;
     for (std::size_t k = 0; k < modes.size(); ++k) {
         const bool end = k < 3 || k + 3 >= modes.size();
-        if (modes.size() > most_modes && !end && modes[k].rate == 0) {
+        if (modes.size() > most_modes && !end && modes[k].rate == 0 && !modes[k].at_limit) {
             ++hidden;
             continue;
         }
         if (hidden > 0) text += fmt::format("  ({} stable ones between)\n", hidden);
         hidden = 0;
-        text += mode_text(member, modes[k], h) + "\n";
+        text += mode_text(member, modes[k], linear) + "\n";
     }
     return text;
 }
@@ -129,14 +132,15 @@ std::string position_text(const StabilityReport& report, const Eigen::VectorXd& 
 std::string point_text(const StabilityReport& report, const PointReport& point) {
     std::string text;
     if (point.modes)
-        text += modes_text(report.member, *point.modes, report.step);
+        text += modes_text(report.member, *point.modes, report.derivation.system.linear);
     else
         text += fmt::format("  no independent oscillations: {}; the motion itself grows by {} in a time h\n",
                             point.obstacle, growth_text(std::fabs(point.exact_rate) > 1e-12 ? point.exact_rate : 0));
     if (point.kernel_rate)
         text += fmt::format("  measured on the kernel: growth a step {}\n",
-                            std::fabs(*point.kernel_rate) > measured_floor(report) ? growth_text(*point.kernel_rate)
-                                                                                   : "1, to rounding");
+                            std::fabs(point.kernel_rate->value) > point.kernel_rate->floor
+                                ? growth_text(point.kernel_rate->value)
+                                : fmt::format("1, to within {:.1g}", point.kernel_rate->floor));
     return text;
 }
 
@@ -144,8 +148,9 @@ std::string trajectory_text(const StabilityReport& report) {
     const TrajectoryReport& motion = *report.trajectory;
     std::string text = fmt::format(
         "\nAlong the motion: {}\n",
-        motion.steps_done == motion.steps
-            ? fmt::format("{} steps", motion.steps)
+        motion.steps_done == motion.steps ? fmt::format("{} steps", motion.steps)
+        : motion.steps_done == motion.most_steps
+            ? fmt::format("the first {} of {} steps, as many as this command takes", motion.steps_done, motion.steps)
             : fmt::format("it stops after {} of {} steps; lobatto run says why", motion.steps_done, motion.steps));
     if (motion.largest_z > 0) {
         text += fmt::format("  stiffest at t = {:.6g}: h*omega = {:.6g}", motion.largest_z_time,
@@ -157,11 +162,18 @@ std::string trajectory_text(const StabilityReport& report) {
                               : fmt::format(", BEYOND the first limit, {:.3g} times", share);
         }
         text += "\n";
+    } else if (motion.frequencies_at > 0) {
+        text += "  nothing oscillates: no frequency was met\n";
     }
+    if (motion.frequencies_at < motion.states)
+        text +=
+            fmt::format("  frequencies are known at {} of {} states looked at\n", motion.frequencies_at, motion.states);
     if (motion.looked_at == 0) return text;
     text +=
         motion.parting == 0
-            ? fmt::format("  no eigenvalue of a step is above 1 ({} steps looked at)\n", motion.looked_at)
+            ? fmt::format(
+                  "  no eigenvalue of a step is above 1 ({} steps looked at){}\n", motion.looked_at,
+                  report.derivation.system.autonomous ? "" : "; as forces change with time it may grow all the same")
             : fmt::format("  an eigenvalue above 1, so that neighbouring motions part, in {} of {} steps looked at\n",
                           motion.parting, motion.looked_at);
     if (motion.parting > 0)
@@ -175,6 +187,8 @@ std::string trajectory_text(const StabilityReport& report) {
 
 std::string energy_text(const StabilityReport& report) {
     const EnergyReport& energy = *report.energy;
+    if (energy.too_long)
+        return fmt::format("\nEnergy: the formula of H_{} (D37) is too long to be written down here\n", energy.order);
     std::string text = fmt::format(
         "\nEnergy that the steps keep, by backward error analysis (D37): H + h^{0}*H_{0} + ...\n", energy.order);
     if (report.derivation.system.n == 1)
@@ -242,7 +256,7 @@ std::string text_of(const StabilityReport& report) {
         text += fmt::format("\nThis scene, h = {:.6g}: {}\n", report.step,
                             report.derivation.system.autonomous
                                 ? "no equilibrium was found from its start and along its motion"
-                                : "its forces change with time; it has no equilibria");
+                                : "its forces change with time; no equilibria are sought");
     }
     for (const PointReport& point : report.points) {
         if (!linear)

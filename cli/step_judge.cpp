@@ -9,6 +9,7 @@
 #include <map>
 
 #include "cli/error_estimate.hpp"
+#include "cli/exact_energy.hpp"
 #include "cli/stability_limit.hpp"
 #include "cli/summary.hpp"
 #include "runtime/frequency.hpp"
@@ -21,6 +22,8 @@ constexpr std::size_t most_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
 constexpr double far = 1000;                 // times the error wanted: estimates may be off by nearly as much
+constexpr double coarse = 0x1p-40;           // of what energies are computed from: their rounding does not matter
+constexpr double still = 0x1p-40;            // of the place: what rounding moves it by
 constexpr double quickly = 30;               // times further apart than motions of different frequencies get
 
 // Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
@@ -29,6 +32,30 @@ std::uint64_t scrambled(std::int64_t number) {
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
     z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
     return z ^ (z >> 31);
+}
+
+// Above that of the first state; in 60 digits where in double they are rounding, as of small motions.
+std::vector<double> energies_along(const Derivation& derivation, const LoadedStepper<double>& stepper,
+                                   const States<double>& states, const std::vector<double>& parameters) {
+    std::vector<double> energies = energies_of(stepper, states);
+    if (derivation.system.q.size() > ExactEnergy::most_coordinates) return energies;
+    ExactEnergy exact(derivation, parameters);
+    std::optional<cln::cl_R> first;
+    double largest = 0;
+    for (const double energy : energies) largest = std::fmax(largest, std::fabs(energy));
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        const std::vector<double>& state = states[i];
+        const auto middle = state.begin() + 1 + static_cast<std::ptrdiff_t>(state.size() / 2);
+        const std::vector<double> q(state.begin() + 1, middle);
+        std::vector<double> v;
+        if (stepper.velocity(state[0], q, {middle, state.end()}, v) != LOBATTO_OK) continue;
+        const auto here = exact.at(q, v);
+        if (!here) continue;
+        if (!first) first = here->value;
+        if (i == 0 && largest > coarse * cln::double_approx(here->size)) return energies;
+        energies[i] = cln::double_approx(here->value - *first);
+    }
+    return energies;
 }
 
 }  // namespace
@@ -62,8 +89,9 @@ void StepJudge::look(const Records& records) {
             most_[k - 1] = std::max(most_[k - 1], row[k]);
         }
         const std::int64_t number = seen_++;
-        if (number % rows_a_step_ == 0 && (some_.size() < most_states || scrambled(number) < some_.rbegin()->first))
-            keep(number, {row, row + columns});
+        if (number % rows_a_step_ != 0) continue;
+        hardest_.look({row, row + columns}, records.energy != nullptr ? records.energy[i] : std::nan(""));
+        if (some_.size() < most_states || scrambled(number) < some_.rbegin()->first) keep(number, {row, row + columns});
     }
 }
 
@@ -71,6 +99,9 @@ std::vector<double> StepJudge::seen() const {
     std::vector<double> all{static_cast<double>(seen_)};
     all.insert(all.end(), least_.begin(), least_.end());
     all.insert(all.end(), most_.begin(), most_.end());
+    const std::vector<double> by_hardest = hardest_.seen();
+    all.push_back(static_cast<double>(by_hardest.size()));
+    all.insert(all.end(), by_hardest.begin(), by_hardest.end());
     for (const auto& [place, state] : some_) {
         all.push_back(static_cast<double>(state.number));
         all.insert(all.end(), state.row.begin(), state.row.end());
@@ -90,6 +121,8 @@ void StepJudge::go_on_after(const std::vector<double>& seen) {
     seen_ = std::llround(*at++);
     least_ = take(width);
     most_ = take(width);
+    const std::ptrdiff_t by_hardest = std::llround(*at++);
+    hardest_.go_on_after(take(by_hardest), static_cast<std::size_t>(1 + width));
     while (seen.end() - at > 1 + width) {
         const std::int64_t number = std::llround(*at++);
         keep(number, take(1 + width));
@@ -138,10 +171,29 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
     States<double> states;
     for (const auto& [number, row] : in_time) states.push_back(row);
     const ErrorEstimate estimate(derivation.quadrature);
-    const bool energy_tells = kernel->has_energy != 0 && derivation.system.autonomous && !has_forces(derivation) &&
-                              derivation.quadrature.method.family == Family::lobatto;
-    const Evidence evidence = evidence_of(stepper, states, request.parameters, request.step, scale,
-                                          error_power(derivation.quadrature.method), energy_tells);
+    const bool conserves = kernel->has_energy != 0 && derivation.system.autonomous && !has_forces(derivation);
+    const std::vector<double> energies =
+        conserves ? energies_along(derivation, stepper, states, request.parameters) : std::vector<double>();
+    Evidence evidence =
+        evidence_of(stepper, states, request.parameters, request.step, scale, error_power(derivation.quadrature.method),
+                    energies, conserves && derivation.quadrature.method.family == Family::lobatto);
+    // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
+    std::vector<double> moving = scale;
+    bool any_moves = false;
+    for (std::size_t k = 0; k < n; ++k) {
+        const double way = (most_[k] - least_[k]) / 2, place = std::max(std::fabs(most_[k]), std::fabs(least_[k]));
+        if (way > still * place)
+            any_moves = true;
+        else
+            moving[k] = moving[n + k] = std::numeric_limits<double>::infinity();
+    }
+    if (!any_moves) evidence.certain = 0;
+    const SingleSteps single =
+        single_steps(stepper, hardest_.states(), request.every, result.time, request.parameters, request.step, moving);
+    evidence.certain = std::fmax(evidence.certain, single.error);
+    if (single.unresolved)
+        judgement.unresolved = {1 + std::llround((*single.unresolved - request.time) / request.step),
+                                *single.unresolved};
     const double steps = static_cast<double>(result.steps_done), duration = steps * std::fabs(request.step);
     const double random = std::numeric_limits<double>::epsilon() + request.tolerance;
     judgement.error = std::fmin(1, estimate.after(steps, duration, evidence, random));
@@ -167,6 +219,11 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
             "the step is beyond the linear stability limit: h omega = {:.3g} is more than {:.4g}, omega the largest "
             "frequency met. Take a step below {:.2g} times this one, or Gauss, which has no limit",
             judgement.radians, judgement.limit, judgement.limit / judgement.radians));
+    if (judgement.unresolved)
+        texts.push_back(fmt::format(
+            "in step {}, from t = {:.6g} on, the motion is not resolved: half the step would take it elsewhere, or the "
+            "step jumps over a singularity. Take a shorter step, or coordinates without a singularity there",
+            judgement.unresolved->step, judgement.unresolved->time));
     if (wanted_error > 0 && judgement.error > far * wanted_error)
         texts.push_back(fmt::format(
             "the scene asks for an error of {:.2g}, and it is probably near {:.1g}; `lobatto tune` chooses a step",

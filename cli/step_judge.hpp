@@ -4,9 +4,11 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/hardest_steps.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/trajectory.hpp"
 
@@ -14,8 +16,8 @@ namespace lobatto {
 
 class StepJudge {
 public:
-    // Looks at the kept states go by: how far the motion goes, and a few states of all its times, chosen as if at
-    // random: equal distances could go along with the motion's own rhythm.
+    // Looks at the kept states go by: how far the motion goes, where it changes most, and a few states of all its
+    // times, chosen as if at random: equal distances could go along with the motion's own rhythm.
     explicit StepJudge(const Scene& scene);
     void look(const Records& records);
 
@@ -28,8 +30,13 @@ public:
         double error = 0;                             // estimated, relative to the amplitude, at most 1
         Neighbours neighbours = Neighbours::unknown;  // unknown of long runs
         double radians = 0;                           // h times the largest frequency met; 0: not looked for
-        double limit = 0;          // of that, by linear stability; infinite when it lies above, and for Gauss
-        std::string text() const;  // of the error, one line
+        double limit = 0;  // of that, by linear stability; infinite when it lies above, and for Gauss
+        struct Unresolved {
+            std::int64_t step;  // the first is 1
+            double time;        // of its start
+        };
+        std::optional<Unresolved> unresolved;  // the first such step that was found
+        std::string text() const;              // of the error, one line
     };
     Judgement judge(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
@@ -45,6 +52,7 @@ private:
         std::vector<double> row;  // t, q, p
     };
     std::map<std::uint64_t, State> some_;  // by a scrambled number: those with the smallest
+    HardestSteps<double> hardest_;
     std::int64_t seen_ = 0;
     void keep(std::int64_t number, std::vector<double> row);
 };

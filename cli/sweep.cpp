@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "cli/commands.hpp"
+#include "cli/energy_watch.hpp"
 #include "cli/interruption.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/method_option.hpp"
@@ -16,6 +17,7 @@
 #include "cli/progress.hpp"
 #include "cli/summary.hpp"
 #include "cli/sweep_table.hpp"
+#include "cli/sweep_watch.hpp"
 #include "cli/vary.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/ensemble.hpp"
@@ -35,7 +37,9 @@ const char* const reason[] = {"reached the end",
                               "singular Jacobian",
                               "singular mass matrix",
                               "t + h equals t",
-                              "not supported by the kernel"};
+                              "not supported by the kernel",
+                              "energy off: beyond stability, or past a singularity"};
+constexpr int departed = 7;
 
 struct SweepOptions {
     std::string scene;
@@ -51,7 +55,7 @@ struct SweepOptions {
 
 struct Failure {
     std::int64_t index, steps_done;
-    lobatto_status status;
+    int status;
     double time;
 };
 
@@ -119,22 +123,22 @@ std::vector<std::string> comments_of(const Scene& scene, const KernelSource& sou
     }
     if (!parameters.empty()) comments.push_back(fmt::format("parameters: {}", fmt::join(parameters, ", ")));
     for (const Axis& axis : grid.axes()) comments.push_back(fmt::format("vary: {} = {}", axis.name, axis.written));
-    for (int status = 0; status < LOBATTO_UNSUPPORTED; ++status)
-        statuses.push_back(fmt::format("{} {}", status, reason[status]));
+    for (int status = 0; status <= departed; ++status)
+        if (status != LOBATTO_UNSUPPORTED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
     comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
     return comments;
 }
 
 // The states of one trajectory; only the last of them can be one at which it failed.
 void write(SweepTable& table, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
-           const EnsembleTrajectory& trajectory) {
+           const EnsembleTrajectory& trajectory, int status) {
     const Records& kept = trajectory.kept;
     const int numbers = scene.outputs.momenta ? kept.columns : 1 + (kept.columns - 1) / 2;
     for (std::int64_t i = 0; i < kept.count; ++i) {
         const bool last = i + 1 == kept.count;
         table.add(trajectory.index);
         for (std::size_t a = 0; a < grid.axes().size(); ++a) table.add(grid.value(trajectory.index, a));
-        table.add(static_cast<std::int64_t>(last ? trajectory.status : LOBATTO_OK));
+        table.add(static_cast<std::int64_t>(last ? status : LOBATTO_OK));
         table.add(last ? trajectory.steps_done : i * request.every);
         for (int column = 0; column < numbers; ++column) table.add(kept.rows[i * kept.columns + column]);
         if (scene.outputs.energy) table.add(kept.energy[i] - trajectory.energy_start);
@@ -142,7 +146,7 @@ void write(SweepTable& table, const Scene& scene, const Grid& grid, const Ensemb
     }
 }
 
-std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleResult& result,
+std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleResult& result, std::int64_t departures,
                           const std::vector<Failure>& failures) {
     std::vector<std::string> reasons;
     std::int64_t failed = 0;
@@ -151,13 +155,17 @@ std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleRe
         failed += result.count_of[status];
         reasons.push_back(fmt::format("{} {}", result.count_of[status], reason[status]));
     }
+    if (departures > 0) reasons.push_back(fmt::format("{} {}", departures, reason[departed]));
+    failed += departures;
     std::string text = fmt::format("{}: {} of {} failed: {}. The others went on. {}:", scene.path, failed,
                                    counted(result.trajectories, "trajectory", "trajectories"), fmt::join(reasons, ", "),
                                    failed > std::ssize(failures) ? "The first of them" : "They are");
-    for (const Failure& failure : failures)
-        text +=
-            fmt::format("\n  trajectory {}, {}: {} in step {}, after t = {:.6g}", failure.index,
-                        values_of(grid, failure.index), reason[failure.status], failure.steps_done + 1, failure.time);
+    for (const Failure& failure : failures) {
+        text += fmt::format("\n  trajectory {}, {}: {}", failure.index, values_of(grid, failure.index),
+                            reason[failure.status]);
+        if (failure.status != departed)
+            text += fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
+    }
     return text + "\nTry a smaller --step, or leave these values out.";
 }
 
@@ -167,8 +175,8 @@ std::string spread_text(const Spread& spread) {
 }
 
 void print_table(const Derivation& derivation, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
-                 const EnsembleResult& result, int kernel_lanes) {
-    const std::int64_t failed = result.trajectories - result.count_of[LOBATTO_OK];
+                 const EnsembleResult& result, std::int64_t departures, int kernel_lanes) {
+    const std::int64_t failed = result.trajectories - result.count_of[LOBATTO_OK] + departures;
     const std::string of_all = result.interrupted ? fmt::format(" of {}", request.count) : "";
     print_row("trajectories", fmt::format("{}{}{}", result.trajectories, of_all,
                                           failed == 0 ? "" : fmt::format(", {} failed", failed)));
@@ -182,7 +190,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const Grid& g
         print_row("speed", fmt::format("{:.3g} steps per second", steps / result.seconds));
         print_row("time per step", duration(result.processor_seconds / steps) + " of a processor, for one trajectory");
     }
-    if (result.energy_error_index >= 0) {
+    if (scene.outputs.energy && result.energy_error_index >= 0) {
         const bool conserves = derivation.system.autonomous && !has_forces(derivation);
         print_row(conserves ? "energy error" : "energy change",
                   fmt::format("{:.2g} at most, of trajectory {}, {}", result.energy_error_largest,
@@ -229,7 +237,8 @@ void sweep(const SweepOptions& options) {
     const Grid grid(scene, options.vary);
     const Steps steps = steps_of(options, scene);
 
-    const Derivation derivation = derive(as_written);
+    Derivation derivation = derive(as_written);
+    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const KernelSource source = emit(derivation);
     EnsembleRequest request;
     request.count = grid.count();
@@ -248,13 +257,19 @@ void sweep(const SweepOptions& options) {
     const SweepTable::Format format = format_of(options);
     const std::string path =
         output_path(options.output, scene.name + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
+    keep_scene(scene.path, path);
     SweepTable table(path, format, comments_of(scene, source, request, grid), columns_of(scene, grid));
     std::vector<Failure> failures;
+    SweepWatch watch(derivation, kernel, request);
+    std::int64_t departures = 0;
     request.sink = [&](const EnsembleTrajectory& trajectory) {
-        write(table, scene, grid, request, trajectory);
-        if (trajectory.status == LOBATTO_OK || failures.size() == failures_told) return;
+        const bool departs = trajectory.status == LOBATTO_OK && watch.departs(trajectory);
+        departures += departs ? 1 : 0;
+        const int status = departs ? departed : trajectory.status;
+        write(table, scene, grid, request, trajectory, status);
+        if (status == LOBATTO_OK || failures.size() == failures_told) return;
         const double time = trajectory.kept.rows[(trajectory.kept.count - 1) * trajectory.kept.columns];
-        failures.push_back({trajectory.index, trajectory.steps_done, trajectory.status, time});
+        failures.push_back({trajectory.index, trajectory.steps_done, status, time});
     };
     EnsembleResult result;
     {
@@ -268,7 +283,7 @@ void sweep(const SweepOptions& options) {
 
     if (!options.quiet) {
         fmt::print("{}: kernel {}\n", scene.path, source.digest);
-        print_table(derivation, scene, grid, request, result, kernel->lanes);
+        print_table(derivation, scene, grid, request, result, departures, kernel->lanes);
         print_row("table", fmt::format("{}, {}", path, counted(table.rows(), "row", "rows")));
         if (!steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
@@ -280,15 +295,15 @@ void sweep(const SweepOptions& options) {
                            parameter.written, scene.evaluate(parameter.value, parameter.name).to_double());
         }
     }
-    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories;
+    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || departures > 0;
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n",
                    result.trajectories, request.count, path);
-        if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, failures));
+        if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, departures, failures));
         throw CLI::RuntimeError(interrupted_exit);
     }
     if (failed)
-        throw ComputationError(failures_text(scene, grid, result, failures) +
+        throw ComputationError(failures_text(scene, grid, result, departures, failures) +
                                fmt::format(" What was computed is in {}.", path));
 }
 

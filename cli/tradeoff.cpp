@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 #include <optional>
 
 #include "cli/budget_option.hpp"
@@ -11,11 +10,11 @@
 #include "cli/interruption.hpp"
 #include "cli/output_path.hpp"
 #include "cli/overrides.hpp"
+#include "cli/tradeoff/exploration.hpp"
 #include "cli/tradeoff/page.hpp"
 #include "cli/tradeoff/pictures.hpp"
 #include "cli/tradeoff/report.hpp"
 #include "cli/tradeoff/say.hpp"
-#include "cli/tradeoff/search.hpp"
 #include "runtime/error.hpp"
 #include "runtime/partial_file.hpp"
 
@@ -30,18 +29,8 @@ struct TradeoffOptions {
     Overrides overrides;
 };
 
-void make_folder(const std::string& folder) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error)
-        throw MachineError(
-            fmt::format("cannot create the folder {}: {}. Choose another place with -o", folder, error.message()));
-}
-
 void write(const std::string& path, const std::string& text) {
-    PartialFile file(path, "the result");
-    file.write(text);
-    file.finish();
+    write_whole(path, "the result", text);
 }
 
 void tradeoff(const TradeoffOptions& options) {
@@ -50,8 +39,7 @@ void tradeoff(const TradeoffOptions& options) {
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);
-    const std::string folder = output_path(options.output, scene.name + ".tradeoff");
-    make_folder(folder);
+    const std::string folder = output_folder(options.output, scene.name + ".tradeoff");
 
     const Interruption interruption;
     Say say;

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 
 #include "cli/commands.hpp"
 #include "cli/exact_start.hpp"
@@ -116,7 +117,9 @@ Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& 
     }
     Row row = at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
                       "the step is not its own inverse with -h");
-    if (!(result.rounding < 1e-6)) {
+    if (result.rests && row.holds) {
+        row.bound = "at rest";
+    } else if (!(result.rounding < 1e-6)) {
         row.holds = false;
         row.meaning = "rounding swamps even one step; the step is too long for this motion";
     }
@@ -150,6 +153,10 @@ void momenta(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& 
 void energy(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start) {
     const EnergyDrift drift = energy_drift(kernel, start.parameters, start.q, start.p, start.step, long_run);
     const std::string claim = fmt::format("energy drift in {} steps", drift.steps);
+    if (!std::isfinite(drift.drift)) {
+        rows.push_back({claim, "energy too large", "not judged", true, ""});
+        return;
+    }
     if (!drift.bounded || drift.chaotic) {
         rows.push_back({claim, drift.bounded ? "motion chaotic" : "motion unbounded", "not judged", true, ""});
         return;
@@ -233,10 +240,14 @@ void verify(const VerifyOptions& options) {
     const Convergence convergence = measure_order(exact_kernel, quadruple_start, start.step);
     rows.push_back(order(convergence, exact_kernel));
     momenta(rows, kernel, start, scene);
-    rows.push_back(at_most("H in double against quadruple",
-                           energy_defect(kernel, exact_kernel, start.parameters, start.step, states), 1e-10,
-                           "terms of the energy cancel and take its digits with them; write the potential without "
-                           "differences of nearly equal terms"));
+    const std::string energy_claim = "H in double against quadruple";
+    const double defect = energy_defect(kernel, exact_kernel, start.parameters, start.step, states);
+    if (std::isnan(defect))
+        rows.push_back({energy_claim, "energy too large", "not judged", true, ""});
+    else
+        rows.push_back(at_most(energy_claim, defect, 1e-10,
+                               "terms of the energy cancel and take its digits with them; write the potential without "
+                               "differences of nearly equal terms"));
     if (forced || !derivation.system.autonomous)
         rows.push_back(not_promised("bounded energy error", forced ? "forces" : "time"));
     else

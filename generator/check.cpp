@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "generator/check_point.hpp"
+#include "generator/expansion.hpp"
 
 namespace lobatto {
 
@@ -26,29 +27,6 @@ bool vanish(const Expressions& expressions) {
 
 Check exactly(const std::string& claim, bool holds, const std::string& meaning) {
     return {claim, holds, true, holds ? 0.0 : 1.0, 0, meaning};
-}
-
-// An upper bound of the terms that expanding would make.
-double terms_when_expanded(const ex& expression) {
-    if (GiNaC::is_a<GiNaC::add>(expression)) {
-        double sum = 0;
-        for (const ex& term : expression) sum += terms_when_expanded(term);
-        return sum;
-    }
-    if (GiNaC::is_a<GiNaC::mul>(expression)) {
-        double product = 1;
-        for (const ex& factor : expression) product *= terms_when_expanded(factor);
-        return product;
-    }
-    if (GiNaC::is_a<GiNaC::function>(expression)) return terms_when_expanded(expression.op(0));
-    if (GiNaC::is_a<GiNaC::power>(expression) && expression.op(1).info(GiNaC::info_flags::posint)) {
-        const double terms = terms_when_expanded(expression.op(0));
-        const int exponent = GiNaC::ex_to<numeric>(expression.op(1)).to_int();
-        double combinations = 1;  // (terms + exponent - 1 over exponent)
-        for (int i = 1; i <= exponent && combinations < 1e9 && terms > 1; ++i) combinations *= (terms + i - 1) / i;
-        return combinations;
-    }
-    return 1;
 }
 
 constexpr double expansion_limit = 2000;  // terms in all: a few milliseconds
@@ -85,11 +63,13 @@ Check differences(const Derivation& derivation, const std::string& claim, const 
         Numbers start;
         for (const auto& unknown : unknowns) start.push_back(formulas.get(unknown));
         const Numbers direction = seeded_direction(start, noise);
-        const Numbers quotient = central_difference(start, direction, [&](const Numbers& x) {
-            for (std::size_t j = 0; j < unknowns.size(); ++j) formulas.set(unknowns[j], x[j]);
-            return formulas.evaluate(roots);
-        });
-        check.measured = std::max(check.measured, relative_difference(times(values, direction), quotient));
+        const auto difference = [&](const cln::cl_R& e) {
+            return central_difference(start, direction, e, [&](const Numbers& x) {
+                for (std::size_t j = 0; j < unknowns.size(); ++j) formulas.set(unknowns[j], x[j]);
+                return formulas.evaluate(roots);
+            });
+        };
+        check.measured = std::max(check.measured, difference_defect(times(values, direction), difference));
     });
     check.holds = check.measured <= check.bound;
     return check;

@@ -57,6 +57,12 @@ private:
                  const Numbers& other) {
         measured_->push_back({{claim, false, false, 0, bound, meaning}, relative_difference(one, other)});
     }
+    template <class Difference>
+    void compare_with_differences(const std::string& claim, const std::string& meaning, const Numbers& derivatives,
+                                  const Difference& difference) {
+        measured_->push_back(
+            {{claim, false, false, 0, difference_bound, meaning}, difference_defect(derivatives, difference)});
+    }
 
     Numbers values_of(const GiNaC::matrix& matrix) {
         std::vector<GiNaC::ex> entries;
@@ -87,18 +93,23 @@ private:
         const Numbers force = formulas_.evaluate(force_), outer = formulas_.evaluate(outer_force_);
         for (std::size_t k = 0; k < n_; ++k) slope.push_back(force[k] - outer[k]);
         Noise noise(5);
-        Numbers products, quotients;
+        std::vector<Numbers> directions;
+        Numbers products;
         for (int direction = 0; direction < 3; ++direction) {
-            const Numbers d = joined(seeded_direction(v_, noise), seeded_direction(q_, noise));
-            products.push_back(times(slope, d)[0]);
-            quotients.push_back(central_difference(here, d, [&](const Numbers& x) {
-                set(z, x);
-                return formulas_.evaluate(lagrangian_);
-            })[0]);
+            directions.push_back(joined(seeded_direction(v_, noise), seeded_direction(q_, noise)));
+            products.push_back(times(slope, directions.back())[0]);
         }
+        compare_with_differences("momentum and force are slopes of L", "dL/dq' or dL/dq is wrong", products,
+                                 [&](const cln::cl_R& e) {
+                                     Numbers quotients;
+                                     for (const Numbers& d : directions)
+                                         quotients.push_back(central_difference(here, d, e, [&](const Numbers& x) {
+                                             set(z, x);
+                                             return formulas_.evaluate(lagrangian_);
+                                         })[0]);
+                                     return quotients;
+                                 });
         set(z, here);
-        compare("momentum and force are slopes of L", difference_bound, "dL/dq' or dL/dq is wrong", products,
-                quotients);
     }
 
     // The derivative of the node's vector g(z) along a direction: what an entry misses or has too much shows.
@@ -131,13 +142,14 @@ private:
             cln::cl_R& sum = product[static_cast<std::size_t>(place.first)];
             sum = sum + second[next++] * d[static_cast<std::size_t>(place.second)];
         }
-        const Numbers quotient = central_difference(here, d, [&](const Numbers& x) {
-            set(z, x);
-            return formulas_.evaluate(roots);
-        });
+        compare_with_differences("second derivatives against differences", "a second derivative of L is wrong", product,
+                                 [&](const cln::cl_R& e) {
+                                     return central_difference(here, d, e, [&](const Numbers& x) {
+                                         set(z, x);
+                                         return formulas_.evaluate(roots);
+                                     });
+                                 });
         set(z, here);
-        compare("second derivatives against differences", difference_bound, "a second derivative of L is wrong",
-                product, quotient);
     }
 
     // A path through the start, velocities near the start's.
@@ -193,24 +205,35 @@ private:
         const Path X = path(q_, v_);
         const Path with_work = slopes(X), work = slopes(X, true);
         Noise noise(8);
-        Numbers products, quotients;
+        std::vector<Numbers> directions;
+        Numbers flat, slope, products;
+        for (std::size_t j = 0; j < X.size(); ++j)
+            for (std::size_t k = 0; k < n_; ++k) {
+                flat.push_back(X[j][k]);
+                slope.push_back(with_work[j][k] - work[j][k]);
+            }
         for (int direction = 0; direction < 3; ++direction) {
-            Numbers flat, d, slope;
-            for (std::size_t j = 0; j < X.size(); ++j)
-                for (std::size_t k = 0; k < n_; ++k) {
-                    flat.push_back(X[j][k]);
-                    d.push_back(noise.next() * h_ * (cln::zerop(v_[k]) ? cln::cl_R(1) : cln::abs(v_[k])));
-                    slope.push_back(with_work[j][k] - work[j][k]);
-                }
+            Numbers d;
+            for (std::size_t i = 0; i < flat.size(); ++i) {
+                const cln::cl_R& speed = v_[i % n_];
+                d.push_back(noise.next() * h_ * (cln::zerop(speed) ? cln::cl_R(1) : cln::abs(speed)));
+            }
             products.push_back(times(slope, d)[0]);
-            quotients.push_back(central_difference(flat, d, [&](const Numbers& x) {
-                Path moved = X;
-                for (std::size_t e = 0; e < x.size(); ++e) moved[e / n_][e % n_] = x[e];
-                return Numbers{action(moved)};
-            })[0]);
+            directions.push_back(d);
         }
-        compare("residual is the slope of the action", difference_bound,
-                "the equations of the step are not those of the discrete action", products, quotients);
+        const auto moved_action = [&](const Numbers& x) {
+            Path moved = X;
+            for (std::size_t i = 0; i < x.size(); ++i) moved[i / n_][i % n_] = x[i];
+            return Numbers{action(moved)};
+        };
+        compare_with_differences("residual is the slope of the action",
+                                 "the equations of the step are not those of the discrete action", products,
+                                 [&](const cln::cl_R& e) {
+                                     Numbers quotients;
+                                     for (const Numbers& d : directions)
+                                         quotients.push_back(central_difference(flat, d, e, moved_action)[0]);
+                                     return quotients;
+                                 });
     }
 
     // P of the cyclic coordinates as the start has it.
@@ -327,12 +350,13 @@ private:
             for (std::size_t e = 0; e < controls * active; ++e) moved[e / active][e % active] = x[e];
             return std::pair{moved, Numbers(x.end() - static_cast<std::ptrdiff_t>(cyclic), x.end())};
         };
-        const Numbers quotient = central_difference(flat, d, [&](const Numbers& x) {
-            const auto [moved, multipliers] = parts_of(x);
-            return residual(moved, multipliers);
-        });
-        compare("Jacobian of the step against differences", difference_bound, "an entry of the Jacobian is wrong",
-                jacobian_times(X, kappa, parts_of(d), at_node), quotient);
+        compare_with_differences("Jacobian of the step against differences", "an entry of the Jacobian is wrong",
+                                 jacobian_times(X, kappa, parts_of(d), at_node), [&](const cln::cl_R& e) {
+                                     return central_difference(flat, d, e, [&](const Numbers& x) {
+                                         const auto [moved, multipliers] = parts_of(x);
+                                         return residual(moved, multipliers);
+                                     });
+                                 });
     }
 
     // (D30) sum_i h b_i T_i^T H_i T_i d with T_i d = (D d/h, B d, kappa pi).

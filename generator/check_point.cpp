@@ -29,7 +29,11 @@ Formulas point_near_start(const Derivation& derivation, int attempt) {
         }
         for (const auto& stage : d.Y)
             if (derivation.quadrature.method.family == Family::gauss) formulas.set(stage[k], start.position(k));
-        const cln::cl_R p = formulas({derivation.system.momentum[k]})[0];  // in its own unit
+        // In its own unit; of a start at rest, one that moves the position by at most its own size.
+        cln::cl_R p = formulas({derivation.system.momentum[k]})[0];
+        const cln::cl_R speed = cln::abs(q / h);
+        const bool rests = scene.evaluate(scene.initial_rate[k], "the initial velocity").is_zero();
+        if (rests && !cln::zerop(speed) && speed < 1) p = p * speed;
         formulas.set(d.p0[k], start.near(p));
         formulas.set(d.p1[k], start.near(p));
     }

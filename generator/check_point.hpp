@@ -4,8 +4,10 @@
 
 #include <cln/cln.h>
 
+#include <cmath>
 #include <vector>
 
+#include "generator/check.hpp"
 #include "generator/pipeline.hpp"
 #include "generator/sample.hpp"
 
@@ -49,10 +51,9 @@ Numbers solve(Numbers A, Numbers y);
 
 // Seeded, each component in the unit of its own value, or of the largest where that is zero.
 Numbers seeded_direction(const Numbers& start, Noise& noise);
-// (F(x + e d) - F(x - e d)) / 2e at x = start, with e = 1e-20.
+// (F(x + e d) - F(x - e d)) / 2e at x = start.
 template <class Function>
-Numbers central_difference(const Numbers& start, const Numbers& direction, const Function& F) {
-    const cln::cl_R e = cln::cl_float(cln::expt(cln::cl_RA(10), -20), cln::float_format(number_digits));
+Numbers central_difference(const Numbers& start, const Numbers& direction, const cln::cl_R& e, const Function& F) {
     const auto moved = [&](const cln::cl_R& step) {
         Numbers x = start;
         for (std::size_t i = 0; i < x.size(); ++i) x[i] = x[i] + step * direction[i];
@@ -62,6 +63,23 @@ Numbers central_difference(const Numbers& start, const Numbers& direction, const
     const Numbers before = moved(-e);
     for (std::size_t i = 0; i < after.size(); ++i) after[i] = (after[i] - before[i]) / (2 * e);
     return after;
+}
+
+// The relative difference of derivatives and their central differences, difference(e): with e = 1e-20, or with the e
+// that suits them better where positions are so large that truncation, or so small that rounding is in the way.
+template <class Difference>
+double difference_defect(const Numbers& derivatives, const Difference& difference) {
+    double least = HUGE_VAL;
+    for (const int digits : {20, 26, 32, 14, 8, 2}) {
+        try {
+            const cln::cl_R e = cln::cl_float(cln::expt(cln::cl_RA(10), -digits), cln::float_format(number_digits));
+            least = std::fmin(least, relative_difference(derivatives, difference(e)));
+        } catch (const DomainError&) {
+            if (least == HUGE_VAL) throw;
+        }
+        if (least <= difference_bound) break;
+    }
+    return least;
 }
 
 }  // namespace lobatto

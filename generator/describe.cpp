@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "generator/expansion.hpp"
 #include "generator/notation.hpp"
 #include "generator/pipeline.hpp"
 #include "generator/propagation.hpp"
@@ -508,7 +509,7 @@ private:
     void propagation_of_one() {
         const Propagation phi = propagation(d_.quadrature);
         const Discretisation& disc = d_.discretisation();
-        const ex h = disc.h, m = d_.system.mass(0, 0), stiffness = d_.system.hessian(0, 0).expand();
+        const ex h = disc.h, m = d_.system.mass(0, 0), stiffness = expanded(d_.system.hessian(0, 0));
         const ex force = -d_.system.gradient[0].subs(d_.system.q[0] == 0);
         rename(phi.z, "z");
         std::map<std::string, GiNaC::symbol> symbols;

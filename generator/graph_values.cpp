@@ -32,9 +32,17 @@ std::optional<Op> function_op(const std::string& name) {
     return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
 }
 
-}  // namespace
+const cln::cl_F largest = cln::cl_float(cln::expt_pos(cln::cl_I(10), 5000), format);  // __float128 ends at 1e4932
 
-cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
+// Powers of exact numbers stay exact up to this size.
+constexpr double most_bits = 100000;
+
+double bits_of(const cln::cl_RA& x) {
+    return static_cast<double>(
+        std::max(cln::integer_length(cln::numerator(x)), cln::integer_length(cln::denominator(x))));
+}
+
+cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
     // Far out CLN throws, or even answers tanh(1e161) = 0; there these functions are 0, 1, -1 or too large.
     const bool exponential = op == Op::exp || op == Op::sinh || op == Op::cosh || op == Op::tanh;
     if (exponential && cln::abs(x[0]) > 1000000) {
@@ -42,6 +50,8 @@ cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         if (op == Op::exp && cln::minusp(x[0])) return 0;
         throw DomainError("a value beyond all numbers of the kernel");
     }
+    const bool angle = op == Op::sin || op == Op::pair_sine || op == Op::cos || op == Op::pair_cosine || op == Op::tan;
+    if (angle && cln::abs(real(x[0])) > largest) throw DomainError("a value beyond all numbers of the kernel");
     switch (op) {
         case Op::add: {
             cln::cl_R sum = 0;
@@ -55,6 +65,8 @@ cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         }
         case Op::power:
             if (exponent < 0 && cln::zerop(x[0])) throw DomainError("division by zero");
+            if (is_rational(x[0]) && bits_of(cln::the<cln::cl_RA>(x[0])) * std::abs(exponent) > most_bits)
+                return cln::the<cln::cl_R>(cln::expt(real(x[0]), exponent));
             return cln::the<cln::cl_R>(cln::expt(x[0], exponent));
         case Op::sqrt: {
             if (cln::minusp(x[0])) throw DomainError("square root of a negative number");
@@ -90,15 +102,27 @@ cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         case Op::atan:
             return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
         case Op::raise:
-            if (const cln::cl_I whole = cln::round1(x[1]); whole == x[1] && cln::abs(whole) <= 4096)
-                return apply(Op::power, cln::cl_I_to_int(whole), {x[0]});  // real for a negative base too
+            if (cln::abs(x[1]) <= 4096 && cln::round1(x[1]) == x[1])
+                return apply(Op::power, cln::cl_I_to_int(cln::round1(x[1])), {x[0]});  // real for a negative base too
             if (!cln::plusp(x[0])) throw DomainError("real power of a number that is not positive");
-            return cln::exp(real(x[1]) * cln::ln(real(x[0])));
+            return apply(Op::exp, 0, {real(x[1]) * cln::ln(real(x[0]))});  // far out it is 0 or too large, too
         case Op::constant:
         case Op::input:
             break;
     }
     throw std::logic_error("apply: not an operation");
+}
+
+}  // namespace
+
+cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& operands) {
+    try {
+        return value_of(op, exponent, operands);
+    } catch (const cln::floating_point_overflow_exception&) {
+        throw DomainError("a value beyond all numbers of the kernel");
+    } catch (const cln::floating_point_underflow_exception&) {
+        return 0;
+    }
 }
 
 std::vector<cln::cl_R> Graph::evaluate(const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots) const {

@@ -44,8 +44,9 @@ double resident_megabytes() {
 
 }  // namespace
 
-Limits::Limits(const std::string& scene)
+Limits::Limits(const std::string& scene, const std::string& task)
     : scene_(printable(scene)),
+      task_(task),
       seconds_(positive("LOBATTO_DERIVATION_SECONDS", most_seconds)),
       megabytes_(positive("LOBATTO_DERIVATION_MEGABYTES",
                           static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * page_megabytes() / 2)),
@@ -72,9 +73,9 @@ void Limits::watch() {
             reached = fmt::format("needs more than {:.6g} MB of memory (LOBATTO_DERIVATION_MEGABYTES)", megabytes_);
         if (reached.empty()) continue;
         const std::string message = fmt::format(
-            "lobatto: {}: deriving the integrator {}. Its cost grows with the size of the Lagrangian, faster than in "
+            "lobatto: {}: {} {}. Its cost grows with the size of the Lagrangian, faster than in "
             "proportion: write products out less, leave terms away, or raise the environment variable\n",
-            scene_, reached);
+            scene_, task_, reached);
         [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, message.data(), message.size());
         ::_exit(exit_code);  // without destructors: the other thread still computes
     }

@@ -16,8 +16,8 @@ namespace lobatto {
 // 0.
 class Limits {
 public:
-    // `scene`: the file, for the message.
-    explicit Limits(const std::string& scene);
+    // For the message: the scene's file, and what is being done.
+    explicit Limits(const std::string& scene, const std::string& task = "deriving the integrator");
     ~Limits();
     Limits(const Limits&) = delete;
     Limits& operator=(const Limits&) = delete;
@@ -25,7 +25,7 @@ public:
 private:
     void watch();
 
-    std::string scene_;
+    std::string scene_, task_;
     double seconds_, megabytes_;
     std::mutex mutex_;
     std::condition_variable ended_;

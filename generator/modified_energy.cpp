@@ -2,6 +2,7 @@
 // The energy that the steps of a separable system keep better than H: its leading term, by backward error analysis.
 #include "generator/modified_energy.hpp"
 
+#include <algorithm>
 #include <string>
 
 namespace lobatto {
@@ -37,15 +38,33 @@ Constants constants_of(const Method& method) {
 constexpr int highest_degree = 4;  // of the path: beyond, the formula fills pages
 constexpr int most_unknowns = 12;  // coordinates times degree
 
+constexpr std::size_t most_nodes = 3000000;  // of formulas
+
+// Adds the nodes of a formula, a part that occurs twice counted twice, as far as `most_nodes`.
+void count(const ex& f, std::size_t& nodes) {
+    ++nodes;
+    for (std::size_t i = 0; i < f.nops() && nodes <= most_nodes; ++i) count(f.op(i), nodes);
+}
+
+bool is_too_long(const std::vector<ex>& formulas) {
+    std::size_t nodes = 0;
+    for (const ex& f : formulas) count(f, nodes);
+    return nodes > most_nodes;
+}
+
 }  // namespace
+
+bool has_modified_energy(const System& system, const Method& method) {
+    const int r = constants_of(method).r;
+    return system.separable && system.autonomous && r <= highest_degree && system.n * r <= most_unknowns &&
+           std::all_of(system.outer_force.begin(), system.outer_force.end(),
+                       [](const ex& force) { return force.is_zero(); });
+}
 
 std::optional<ModifiedEnergy> modified_energy(const System& system, const Method& method) {
     const Constants constants = constants_of(method);
+    if (!has_modified_energy(system, method)) return std::nullopt;
     const int n = system.n, r = constants.r;
-    if (!system.separable || !system.autonomous || r > highest_degree || n * r > most_unknowns) return std::nullopt;
-    for (const ex& force : system.outer_force)
-        if (!force.is_zero()) return std::nullopt;
-
     ModifiedEnergy result;
     result.order = 2 * r;
     const auto size = static_cast<std::size_t>(n);
@@ -73,6 +92,7 @@ std::optional<ModifiedEnergy> modified_energy(const System& system, const Method
     while (static_cast<int>(q.size()) <= r + 1) {
         std::vector<ex> next;
         for (const ex& component : q.back()) next.push_back(along_motion(component));
+        if (is_too_long(next)) return std::nullopt;
         q.push_back(next);
     }
     // D^{2r} V(P), in symbols for the derivatives of P.
@@ -87,6 +107,7 @@ std::optional<ModifiedEnergy> modified_energy(const System& system, const Method
         for (int k = 0; k < r; ++k)
             for (std::size_t j = 0; j < size; ++j)
                 next += rate.diff(P[static_cast<std::size_t>(k)][j]) * P[static_cast<std::size_t>(k) + 1][j];
+        if (is_too_long({next})) return std::nullopt;
         rate = next;
     }
     GiNaC::exmap values;

@@ -21,7 +21,9 @@ struct ModifiedEnergy {
     std::vector<GiNaC::symbol> p;
 };
 
-// Nothing for other systems, and where the formula would be too long to write down.
+// Whether the system is of this kind, and not beyond what can be written down whatever its potential.
+bool has_modified_energy(const System& system, const Method& method);
+// Nothing for other systems, and where the formula grows too long.
 std::optional<ModifiedEnergy> modified_energy(const System& system, const Method& method);
 
 // The same for one coordinate and any V, in p, m and the derivatives V_1, V_2, ... of V at q; nothing when too long.

@@ -274,9 +274,12 @@ Operand Arithmetic::raise(const Operand& base, const Operand& exponent) const {
     if (base.expression.is_zero() && !exponent.value) throw Refusal("0 to a power that is not a number");
     if (is_a<numeric>(base.expression) && ex_to<numeric>(base.expression).is_negative() && !exponent.value)
         throw Refusal("a negative number to a power that is not a number; it is real for whole powers only");
-    return compute(
-        "^", {&base, &exponent}, bound, [&] { return GiNaC::pow(base.expression, exponent.expression); },
-        [&] { return real_power(real_value(*base.value), real_value(*exponent.value)); });
+    const auto power = [&] {  // GiNaC leaves 0^(2^(1/3)) as it is, and fails to derive it
+        const bool is_zero = base.expression.is_zero() && !is_a<numeric>(exponent.expression);
+        return is_zero ? ex(0) : GiNaC::pow(base.expression, exponent.expression);
+    };
+    return compute("^", {&base, &exponent}, bound, power,
+                   [&] { return real_power(real_value(*base.value), real_value(*exponent.value)); });
 }
 
 Operand Arithmetic::call(const Function& function, const Operand& argument) const {

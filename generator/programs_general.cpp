@@ -92,26 +92,21 @@ private:
         return g().add(sum);
     }
 
-    // The degree of each term, 0 to 4; -1 when it has none: v . d(term)/dv = degree * term at two sample points.
+    // The degree of each term, 0 to 4; -1 when it has none: v . d(term)/dv = degree * term at sample points.
     std::vector<int> degrees_of(const std::vector<ex>& terms, const std::vector<ex>& radial) {
         std::vector<int> degrees(terms.size(), -2);
-        for (int attempt = 0, done = 0; done < 2; ++attempt) {
-            try {
-                Formulas formulas;
-                NearStart(d_.scene, attempt).set_all(formulas);
-                const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(terms)),
-                                         products = formulas.evaluate_sized(formulas.convert(radial));
-                for (std::size_t i = 0; i < terms.size(); ++i) {
-                    int here = -1;
-                    for (int degree = 0; degree <= 4; ++degree)
-                        if (products[i].equals({values[i].value * degree, values[i].size * degree})) here = degree;
-                    degrees[i] = degrees[i] == -2 || degrees[i] == here ? here : -1;
-                }
-                ++done;
-            } catch (const DomainError&) {
-                if (attempt == sample_attempts) throw;
+        at_sample_points(d_.scene, [&](NearStart& point) {
+            Formulas formulas;
+            point.set_all(formulas);
+            const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(terms)),
+                                     products = formulas.evaluate_sized(formulas.convert(radial));
+            for (std::size_t i = 0; i < terms.size(); ++i) {
+                int here = -1;
+                for (int degree = 0; degree <= 4; ++degree)
+                    if (products[i].equals({values[i].value * degree, values[i].size * degree})) here = degree;
+                degrees[i] = degrees[i] == -2 || degrees[i] == here ? here : -1;
             }
-        }
+        });
         return degrees;
     }
 };

@@ -3,6 +3,7 @@
 //
 // Of the program element_3_node the inputs are x0, x1, ..., a0, a1, ... of one row and the outputs add to W and S, or
 // to g and H.
+#include "generator/expansion.hpp"
 #include "generator/looped.hpp"
 
 #include <fmt/format.h>
@@ -62,7 +63,7 @@ private:
         ex radial = 0;
         for (const auto& velocity : velocities) radial += velocity * term.diff(velocity);
         for (int degree = 0; degree <= 4; ++degree)
-            if ((radial - degree * term).expand().is_zero()) return (degree - 1) * term;
+            if (expanded(radial - degree * term).is_zero()) return (degree - 1) * term;
         return radial - term;
     }
 
@@ -142,7 +143,7 @@ private:
         for (std::size_t j = 0; j < gradient.size(); ++j) {
             // Action and reaction: the same value, added and taken away.
             std::size_t i = 0;
-            while (i < j && !(gradient[i] + gradient[j]).expand().is_zero()) ++i;
+            while (i < j && !expanded(gradient[i] + gradient[j]).is_zero()) ++i;
             slopes.push_back(i < j ? slopes[i] : convert(gradient[j]));
             if (!gradient[j].is_zero())
                 slope_only.outputs.push_back({fmt::format("{}[i{}] {}=", slope(), j, i < j ? '-' : '+'), slopes[j]});
@@ -199,7 +200,7 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element
         if (element.target >= 0 && static_cast<std::size_t>(element.target) != i) continue;
         const ex slope = element.target >= 0 ? element.term : element.term.diff(element.x[i]);
         for (std::size_t j = 0; j < element.x.size(); ++j)
-            if (!slope.diff(element.x[j]).expand().is_zero()) pairs.emplace_back(i, j);
+            if (!expanded(slope.diff(element.x[j])).is_zero()) pairs.emplace_back(i, j);
     }
     return pairs;
 }

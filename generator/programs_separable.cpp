@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "generator/expansion.hpp"
 #include "generator/program_builder.hpp"
 #include "generator/propagation.hpp"
 
@@ -142,7 +143,7 @@ private:
     // (D20): the paper's Phi for one coordinate, the shift for a constant force.
     void propagation_of_one() {
         const Propagation exact = propagation(d_.quadrature);
-        const Id k = convert(d_.system.hessian(0, 0).expand());
+        const Id k = convert(expanded(d_.system.hessian(0, 0)));
         const Id m = mass_[0][0];
         const Id force = g().negate(convert(d_.system.gradient[0].subs(d_.system.q[0] == 0)));
         // The polynomials as locals of prepare(): each is an input to what follows.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Formulas as numbers: 60 digits, at seeded points near a scene's start.
+// Formulas as numbers: 60 digits, at seeded points near a scene's start and away from it.
 #include "generator/sample.hpp"
 
 #include <stdexcept>
@@ -172,6 +172,31 @@ void NearStart::set_all(Formulas& formulas) {
         formulas.set(scene_.coordinates[k].velocity, velocity(k));
     }
     formulas.set(scene_.time, near(cln::cl_float(0, format)));
+}
+
+cln::cl_R Elsewhere::parameter(std::size_t index) {
+    return way_ == Way::motion ? NearStart::parameter(index) : 1 + noise() / 2;
+}
+
+cln::cl_R Elsewhere::position(std::size_t coordinate) {
+    return way_ == Way::parameters ? NearStart::position(coordinate) : motion();
+}
+
+cln::cl_R Elsewhere::velocity(std::size_t coordinate) {
+    return way_ == Way::parameters ? NearStart::velocity(coordinate) : motion();
+}
+
+cln::cl_R Elsewhere::motion() {
+    switch (way_) {
+        case Way::small:
+            return noise() / 1000;
+        case Way::large:
+            return noise() * 1000000;
+        case Way::motion:
+            return noise();
+        default:
+            return 1 + noise() / 2;
+    }
 }
 
 }  // namespace lobatto

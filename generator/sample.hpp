@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Formulas as numbers: 60 digits, at seeded points near a scene's start.
+// Formulas as numbers: 60 digits, at seeded points near a scene's start and away from it.
 #pragma once
 
 #include <cln/cln.h>
@@ -62,13 +62,17 @@ cln::cl_R float_of(const GiNaC::numeric& value);  // at 60 digits
 class NearStart {
 public:
     NearStart(const Scene& scene, int attempt);
+    virtual ~NearStart() = default;
 
-    cln::cl_R parameter(std::size_t index);
-    cln::cl_R position(std::size_t coordinate);
-    cln::cl_R velocity(std::size_t coordinate);  // near 0 where the scene gives momenta
-    cln::cl_R near(const cln::cl_R& value);      // near 1 for 0
+    virtual cln::cl_R parameter(std::size_t index);
+    virtual cln::cl_R position(std::size_t coordinate);
+    virtual cln::cl_R velocity(std::size_t coordinate);  // near 0 where the scene gives momenta
+    cln::cl_R near(const cln::cl_R& value);              // within a quarter of its size, or of 1 for 0
     // Sets the scene's symbols: parameters, positions, velocities, time.
     void set_all(Formulas& formulas);
+
+protected:
+    cln::cl_R noise() { return noise_.next(); }
 
 private:
     const Scene& scene_;
@@ -77,6 +81,54 @@ private:
     cln::cl_R spread_;
 };
 
-constexpr int sample_attempts = 40;
+// Points where some of the numbers are not the scene's, which any run may replace: a term that is lost in rounding at
+// the start of the scene may be all that matters elsewhere.
+class Elsewhere final : public NearStart {
+public:
+    enum class Way {
+        all,
+        small,
+        large,
+        parameters,
+        motion
+    };  // what is elsewhere; small, large: all, by size of motion
+    static constexpr Way ways[] = {Way::all, Way::small, Way::large, Way::parameters, Way::motion};
+
+    Elsewhere(const Scene& scene, Way way, int attempt) : NearStart(scene, attempt), way_(way) {}
+    cln::cl_R parameter(std::size_t index) override;
+    cln::cl_R position(std::size_t coordinate) override;
+    cln::cl_R velocity(std::size_t coordinate) override;
+
+private:
+    cln::cl_R motion();
+    Way way_;
+};
+
+constexpr int sample_attempts = 40, attempts_elsewhere = 3;
+
+// look(point) at two points near the start, and at one elsewhere of each way, where all formulas have values. What
+// `look` throws as DomainError asks for another point; thrown on when there is none near the start.
+template <class Look>
+void at_sample_points(const Scene& scene, const Look& look) {
+    for (int attempt = 0, done = 0; done < 2; ++attempt) {
+        try {
+            NearStart point(scene, attempt);
+            look(point);
+            ++done;
+        } catch (const DomainError&) {
+            if (attempt == sample_attempts) throw;
+        }
+    }
+    for (const Elsewhere::Way way : Elsewhere::ways) {
+        for (int attempt = 0; attempt < attempts_elsewhere; ++attempt) {
+            try {
+                Elsewhere point(scene, way, attempt);
+                look(point);
+                break;
+            } catch (const DomainError&) {
+            }
+        }
+    }
+}
 
 }  // namespace lobatto

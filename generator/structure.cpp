@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include "generator/expansion.hpp"
 #include "generator/notation.hpp"
 #include "generator/routhian.hpp"
 #include "generator/sample.hpp"
@@ -26,11 +27,11 @@ bool has_any(const ex& expression, const std::vector<GiNaC::symbol>& symbols) {
 std::optional<ClosedSolution> closed_solution(const System& system) {
     if (system.n != 1 || !system.separable || !system.autonomous) return std::nullopt;
     const ex q = system.q[0];
-    const ex acceleration = (system.gradient[0] / system.mass(0, 0)).expand();  // -q''
+    const ex acceleration = expanded(system.gradient[0] / system.mass(0, 0));  // -q''
     for (const auto& [kind, shape] :
          {std::pair<ClosedSolution::Kind, ex>{ClosedSolution::Kind::harmonic, q},
           std::pair<ClosedSolution::Kind, ex>{ClosedSolution::Kind::pendulum, GiNaC::sin(q)}}) {
-        const ex omega_squared = (acceleration / shape).expand();
+        const ex omega_squared = expanded(acceleration / shape);
         if (!omega_squared.is_zero() && !has_any(omega_squared, system.q)) return ClosedSolution{kind, omega_squared};
     }
     return std::nullopt;

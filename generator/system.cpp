@@ -119,31 +119,26 @@ public:
 private:
     std::vector<Kind> sampled(const std::vector<ex>& expressions) const {
         std::vector<Kind> kinds(expressions.size());
-        for (int attempt = 0, done = 0; done < 2; ++attempt) {
-            try {
-                look(expressions, attempt, kinds);
-                ++done;
-            } catch (const DomainError& error) {
-                if (attempt == sample_attempts)
-                    refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
-                                               "from the singularity, or mend the formula",
-                                               error.what()));
-            }
+        try {
+            at_sample_points(scene_, [&](NearStart& point) { look(expressions, point, kinds); });
+        } catch (const DomainError& error) {
+            refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
+                                       "from the singularity, or mend the formula",
+                                       error.what()));
         }
         return kinds;
     }
 
-    void look(const std::vector<ex>& expressions, int attempt, std::vector<Kind>& kinds) const {
+    void look(const std::vector<ex>& expressions, NearStart& point, std::vector<Kind>& kinds) const {
         Formulas formulas;
-        NearStart near(scene_, attempt);
-        near.set_all(formulas);
+        point.set_all(formulas);
         const std::vector<Id> roots = formulas.convert(expressions);
         const std::vector<Sized> here = formulas.evaluate_sized(roots);
         const auto moved = [&](const Symbols& symbols, bool Kind::*flag) {
             std::vector<cln::cl_R> before;
             for (std::size_t k = 0; k < symbols.size(); ++k) {
                 before.push_back(formulas.get(symbols[k]));
-                formulas.set(symbols[k], near.near(before.back()));
+                formulas.set(symbols[k], point.near(before.back()));
             }
             const std::vector<Sized> there = formulas.evaluate_sized(roots);
             for (std::size_t i = 0; i < kinds.size(); ++i)
@@ -366,7 +361,14 @@ System build_system(const Scene& scene) {
 
     // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
     if (system.separable) {
-        const std::vector<ex> at_zero = all_at(system.momentum, system.v, 0);
+        std::vector<ex> at_zero;
+        try {
+            at_zero = all_at(system.momentum, system.v, 0);
+            all_at({system.lagrangian}, system.v, 0);
+        } catch (const GiNaC::pole_error&) {  // however small, a term that is infinite at rest
+            reason("the Lagrangian has no value at rest");
+            at_zero.clear();
+        }
         const std::vector<Dependence::Kind> rest = dependence.of(at_zero);
         for (std::size_t k = 0; k < rest.size(); ++k)
             if (!rest[k].zero && system.separable)

@@ -167,8 +167,11 @@ std::string cache_folder() {
     fs::path part;
     for (const fs::path& name : folder) {
         part /= name;
-        if (::mkdir(part.c_str(), 0700) != 0 && errno != EEXIST && errno != EISDIR && !fs::is_directory(part)) {
-            fail("create the folder", folder, errno);
+        if (::mkdir(part.c_str(), 0700) != 0) {
+            const int error = errno;
+            std::error_code ignored;
+            if (error != EEXIST && error != EISDIR && !fs::is_directory(part, ignored))
+                fail("create the folder", folder, error);
         }
         if (part != folder) check_parent(folder, part);
     }

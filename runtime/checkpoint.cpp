@@ -60,6 +60,18 @@ TrajectoryResult unpacked(const Json& numbers) {
     return result;
 }
 
+Json packed(const std::vector<Written>& files) {
+    Json list = Json::array();
+    for (const Written& file : files) list.push_back({file.size, file.checksum});
+    return list;
+}
+
+std::vector<Written> files_of(const Json& list) {
+    std::vector<Written> files;
+    for (const Json& file : list) files.push_back({file.at(0).get<std::int64_t>(), file.at(1).get<std::uint64_t>()});
+    return files;
+}
+
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
     throw MachineError(fmt::format("cannot go on from {}: {}. Run without --resume to begin anew", path, reason));
 }
@@ -87,15 +99,11 @@ std::optional<std::string> own_file(const std::string& path) {
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
     const std::string& memory = checkpoint.halfway.stepper;
     const Json whole = {checkpoint.run, packed(checkpoint.halfway.result),
-                        Json::binary(std::vector<std::uint8_t>(memory.begin(), memory.end())), checkpoint.sizes,
+                        Json::binary(std::vector<std::uint8_t>(memory.begin(), memory.end())), packed(checkpoint.files),
                         checkpoint.watched};
     std::string bytes;
     Json::to_cbor(whole, bytes);
-    PartialFile file(path, "the checkpoint");
-    file.write(sha256(bytes) + '\n');
-    file.write(bytes);
-    file.sync();
-    file.finish();
+    write_whole(path, "the checkpoint", sha256(bytes) + '\n' + bytes);
 }
 
 std::optional<Checkpoint> read_checkpoint(const std::string& path) {
@@ -108,7 +116,7 @@ std::optional<Checkpoint> read_checkpoint(const std::string& path) {
         const auto& memory = whole.at(2).get_binary();
         return Checkpoint{whole.at(0).get<std::string>(),
                           {unpacked(whole.at(1)), std::string(memory.begin(), memory.end())},
-                          whole.at(3).get<std::vector<std::int64_t>>(),
+                          files_of(whole.at(3)),
                           whole.at(4).get<std::vector<double>>()};
     } catch (const Json::exception&) {
         fail(path, "it was written by another version of Lobatto");

@@ -427,7 +427,7 @@ public:
             q_[k].add(state[k]);
             p_[k].add(state[n_ + k]);
         }
-        energy_error_.add(trajectory.energy_error_final);
+        if (!std::isnan(trajectory.energy_error_final)) energy_error_.add(trajectory.energy_error_final);
     }
     void finish(EnsembleResult& result) const {
         for (std::size_t k = 0; k < n_; ++k) {

@@ -86,14 +86,19 @@ struct Events {
                 const bool rises = before[e] < real(0) && after[e] >= real(0);
                 const bool falls = before[e] > real(0) && after[e] <= real(0);
                 const int direction = (rises == (stepper.step_size > real(0))) ? 1 : -1;  // with growing time
-                if ((rises || falls) && K::event_direction[e] * direction >= 0) {
-                    real root = theta;
-                    if (after[e] != real(0)) {
-                        real start[K::events];
-                        values(stepper, theta_before, start);
-                        const bool has_changed = start[e] == real(0) || (start[e] > real(0)) == (after[e] > real(0));
-                        root = has_changed ? theta_before : locate(stepper, e, theta_before, start[e], theta, after[e]);
-                    }
+                real root = theta;
+                bool is_root = (rises || falls) && K::event_direction[e] * direction >= 0;
+                if (is_root && after[e] != real(0)) {
+                    real start[K::events], there[K::events];
+                    values(stepper, theta_before, start);
+                    const bool has_changed = start[e] == real(0) || (start[e] > real(0)) == (after[e] > real(0));
+                    root = has_changed ? theta_before : locate(stepper, e, theta_before, start[e], theta, after[e]);
+                    values(stepper, root, there);
+                    // At a pole the sign changes through infinity.
+                    const bool grows = fabs(there[e]) > fabs(start[e]) && fabs(there[e]) > fabs(after[e]);
+                    is_root = has_changed || (is_finite(after[e]) && !grows);
+                }
+                if (is_root) {
                     int place = count++;
                     for (; place > 0 && thetas[place - 1] > root; --place) {
                         thetas[place] = thetas[place - 1];

@@ -9,9 +9,10 @@
 // with pi the shifted Legendre polynomial of degree r - 1 for Lobatto's nodes, where the conserved momenta are so only
 // in the mean, and nothing for Gauss's. z = (v, q, P), R(z) = L - P . v_c with the cyclic velocities v_c eliminated, F
 // the forces, g = (R_v, R_q + F, R_P = -v_c), and H its derivative:
-//     sum_i h b_i [ (D_ij / h) g_v(i) + B_ij g_q(i) ] + delta_j0 p0 = 0,  j = 0 ... m - 1;    sum_i h b_i pi_i g_P(i) =
-//     0 q1 = X_m,   p1 = p0 + h sum_i b_i g_q(i)   (the sum over all j, because sum_j l_j = 1), P1 = P,     cyclic
-//     positions + h sum_i b_i v_c(i)
+//     sum_i h b_i [ (D_ij / h) g_v(i) + B_ij g_q(i) ] + delta_j0 p0 = 0,  j = 0 ... m - 1,
+//     sum_i h b_i pi_i g_P(i) = 0,
+//     q1 = X_m,  p1 = p0 + h sum_i b_i g_q(i)  (the sum over all j, because sum_j l_j = 1),
+//     P1 = P,  cyclic positions + h sum_i b_i v_c(i).
 // The unknowns are the displacements Y_j = X_j - X_0, j = 1 ... m, and kappa.
 //
 // A kernel of this form provides: active, cyclic and their tables; nodes (r), controls (m + 1), c, b, control, B, D,

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -49,20 +50,32 @@ std::string text_of(const TrajectoryHeader& header) {
     return text + '\n';
 }
 
-TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header, std::int64_t kept)
-    : file_(path, "the trajectory", kept),
+TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header, const Written& kept)
+    : file_(path, "the trajectory", kept.size),
       energy_(header.energy),
       columns_(header.columns.size() - (header.energy ? 1 : 0)),
       text_(text_of(header)) {
-    if (kept == 0) {
+    if (kept.size == 0) {
         flush();
     } else {
-        if (file_.read(0, text_.size()) != text_ || file_.read(kept - 1, 1) != "\n")
+        add_to_checksum(kept.size);
+        if (file_.read(0, text_.size()) != text_ || checksum_.written() != kept)
             throw MachineError(
                 fmt::format("cannot go on with the trajectory in {}: it is not what the run had written. Run without "
                             "--resume to begin anew",
                             path));
         text_.clear();
+    }
+}
+
+// What stands in the file.
+void TrajectoryFile::add_to_checksum(std::int64_t size) {
+    constexpr std::int64_t block = 1 << 20;
+    std::string bytes;
+    for (std::int64_t at = 0; at < size; at += std::ssize(bytes)) {
+        bytes = file_.read(at, static_cast<std::size_t>(std::min(block, size - at)));
+        if (bytes.empty()) return;
+        checksum_.add(bytes);
     }
 }
 
@@ -98,6 +111,7 @@ void TrajectoryFile::append(const double* row, std::size_t count) {
 
 void TrajectoryFile::flush() {
     file_.write(text_);
+    checksum_.add(text_);
     text_.clear();
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/checksum.hpp"
 #include "runtime/partial_file.hpp"
 #include "runtime/trajectory.hpp"
 
@@ -30,23 +31,25 @@ std::string text_of(const TrajectoryHeader& header);
 // Rows go into a PartialFile as whole lines, block by block, so that a killed run leaves readable rows.
 class TrajectoryFile {
 public:
-    // `kept`: the bytes of an earlier file with this header after which it goes on; 0 for a new one. All functions
-    // throw MachineError, which names the path, when the machine refuses.
-    TrajectoryFile(const std::string& path, const TrajectoryHeader& header, std::int64_t kept = 0);
+    // `kept`: what there is of an earlier file with this header, after which it goes on; nothing for a new one. All
+    // functions throw MachineError, which names the path, when the machine refuses or the file was altered.
+    TrajectoryFile(const std::string& path, const TrajectoryHeader& header, const Written& kept = {});
 
     // Rows may be longer than the file's: the momenta, which come last, are not kept then.
     void write(const Records& records);
     void write(const EventRecords& records);
     void finish() { file_.finish(); }
     void sync() { file_.sync(); }
-    std::int64_t size() const { return file_.size(); }
+    Written written() const { return checksum_.written(); }
     bool is_regular() const { return file_.is_regular(); }
 
 private:
+    void add_to_checksum(std::int64_t size);
     void append(const double* row, std::size_t count);
     void flush();
 
     PartialFile file_;
+    Checksum checksum_;  // of all that is in it
     bool energy_ = true;
     std::size_t columns_ = 0;  // of a row, without H
     std::string text_;

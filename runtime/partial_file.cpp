@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -46,8 +47,35 @@ private:
 
 }  // namespace
 
-PartialFile::PartialFile(const std::string& path, const std::string& what, std::int64_t kept)
-    : path_(path), what_(what) {
+void fail_to_write(const std::string& what, const std::string& path, int error, const std::string& otherwise) {
+    std::string only = otherwise;
+    only[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(only[0])));
+    const std::string advice =
+        error == ENOSPC || error == EDQUOT ? ". Free some space, or " + otherwise
+        : error == EFBIG  ? ". Files may not be larger than `ulimit -f` says; raise it, or " + otherwise
+        : error == EPIPE  ? ". Its reader has gone"
+        : error == ENOENT ? ". Create its folder first, or " + otherwise
+        : error == EACCES || error == EROFS || error == EPERM || error == ENOTDIR || error == EISDIR ? ". " + only
+                                                                                                     : "";
+    throw MachineError(fmt::format("cannot write {} to {}: {}{}", what, path, std::strerror(error), advice));
+}
+
+void write_whole(const std::string& path, const std::string& what, std::string_view content,
+                 const std::string& otherwise) {
+    PartialFile file(path, what, 0, otherwise);
+    try {
+        file.write(content);
+        if (file.is_regular()) file.sync();
+        file.finish();
+    } catch (const MachineError&) {
+        file.discard();
+        throw;
+    }
+}
+
+PartialFile::PartialFile(const std::string& path, const std::string& what, std::int64_t kept,
+                         const std::string& otherwise)
+    : path_(path), what_(what), otherwise_(otherwise) {
     struct stat status {};
     if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
         partial_ = path_;
@@ -68,15 +96,7 @@ PartialFile::~PartialFile() {
 }
 
 void PartialFile::fail(const std::string& path, int error) const {
-    const char* advice = error == ENOSPC || error == EDQUOT ? ". Free some space, or choose another place with -o"
-                         : error == EFBIG  ? ". Files may not be larger than `ulimit -f` says; raise it, or choose "
-                                             "another place with -o"
-                         : error == EPIPE  ? ". Its reader has gone"
-                         : error == ENOENT ? ". Create its folder first, or choose another place with -o"
-                         : error == EACCES || error == EROFS || error == EPERM || error == ENOTDIR || error == EISDIR
-                             ? ". Choose another place with -o"
-                             : "";
-    throw MachineError(fmt::format("cannot write {} to {}: {}{}", what_, path, std::strerror(error), advice));
+    fail_to_write(what_, path, error, otherwise_);
 }
 
 // The partial file, ours alone: opened and locked.
@@ -88,9 +108,8 @@ int PartialFile::open_locked() const {
             const int error = errno;
             close(descriptor);
             if (error != EWOULDBLOCK) fail(partial_, error);
-            throw MachineError(fmt::format(
-                "cannot write {} to {}: another run is writing it. Wait for it, or choose another place with -o", what_,
-                partial_));
+            throw MachineError(fmt::format("cannot write {} to {}: another run is writing it. Wait for it, or {}",
+                                           what_, partial_, otherwise_));
         }
         struct stat ours {
         }, named{};
@@ -166,6 +185,10 @@ void PartialFile::finish() {
     if (partial_ != path_ && std::rename(partial_.c_str(), path_.c_str()) != 0) fail(path_, errno);
     const int descriptor = std::exchange(descriptor_, -1);
     if (close(descriptor) != 0) fail(path_, errno);
+}
+
+void PartialFile::discard() {
+    if (is_regular()) unlink(partial_.c_str());
 }
 
 }  // namespace lobatto

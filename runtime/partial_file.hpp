@@ -8,16 +8,27 @@
 
 namespace lobatto {
 
+inline const char* const elsewhere = "choose another place with -o";
+
+// MachineError: "cannot write `what` to PATH: No space left on device. Free some space, or `otherwise`".
+[[noreturn]] void fail_to_write(const std::string& what, const std::string& path, int error,
+                                const std::string& otherwise = elsewhere);
+
+// A whole file at once: on the disk under its name, or not at all and nothing beside it. Throws as PartialFile.
+void write_whole(const std::string& path, const std::string& what, std::string_view content,
+                 const std::string& otherwise = elsewhere);
+
 // Until `finish` what is written stands in NAME.partial beside it, so that a killed run leaves a readable NAME.partial
 // and an earlier NAME untouched. Two runs cannot write the same file at once. A destination that exists and is no
 // regular file (a pipe, a device) is written to directly.
 class PartialFile {
 public:
-    // `what` it holds, for errors: "the trajectory". `kept`: how many bytes of NAME.partial, or else of NAME, stay, to
-    // go on after them. All functions throw MachineError, which names the path, when the machine refuses; what stands
-    // in the file then ends where a `write` ended.
-    PartialFile(const std::string& path, const std::string& what, std::int64_t kept = 0);
-    ~PartialFile();  // without `finish`: NAME.partial stays
+    // `what` it holds and what one can do `otherwise`, for errors: "the trajectory". `kept`: how many bytes of
+    // NAME.partial, or else of NAME, stay, to go on after them. All functions throw MachineError, which names the path,
+    // when the machine refuses; what stands in the file then ends where a `write` ended.
+    PartialFile(const std::string& path, const std::string& what, std::int64_t kept = 0,
+                const std::string& otherwise = elsewhere);
+    ~PartialFile();  // without `finish` or `discard`: NAME.partial stays
     PartialFile(const PartialFile&) = delete;
     PartialFile& operator=(const PartialFile&) = delete;
 
@@ -28,6 +39,7 @@ public:
     void sync();                                  // to the disk
     void write_at_begin(std::string_view bytes);  // over what is there; regular files only
     void finish();
+    void discard();  // NAME.partial goes
 
 private:
     [[noreturn]] void fail(const std::string& path, int error) const;
@@ -36,7 +48,7 @@ private:
 
     std::string path_;     // the destination
     std::string partial_;  // what is being written; the same as path_ for a pipe or device
-    std::string what_;
+    std::string what_, otherwise_;
     int descriptor_ = -1;
     std::int64_t size_ = 0;
 };

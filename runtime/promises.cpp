@@ -3,6 +3,7 @@
 #include "runtime/promises.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -126,6 +127,10 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
         return result;
     }
     const std::vector<real> end = joined(position, momentum);
+    const auto most_of = [n](const std::vector<real>& positions) {
+        return *std::max_element(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(n));
+    };
+    result.rests = most_of(range) < real(1e-8) * most_of(largest);
     // Rounding in component j, anywhere on the way, comes back to component i through these.
     for (const std::size_t block : {std::size_t(0), n}) {
         real moved = 0, missed = 0, growth = 0;
@@ -174,12 +179,30 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
         sizes[i] = std::max(size(before[i]), size(after[i]));
         shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * size(before[i]));
     }
+    // The unit of momenta in which the blocks dq1/dp and dp1/dq are of one size.
+    real to_q = 0, to_p = 0;
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = n; j < rows; ++j) {
+            to_q = std::max(to_q, size(T[i * rows + j]));
+            to_p = std::max(to_p, size(T[j * rows + i]));
+        }
+    const real unit = to_q > 0 && to_p > 0
+                          ? static_cast<real>(std::sqrt(static_cast<double>(to_p) / static_cast<double>(to_q)))
+                          : real(0);
+    const auto most = [&](const std::vector<real>& values, std::size_t block) {
+        return *std::max_element(values.begin() + static_cast<std::ptrdiff_t>(block),
+                                 values.begin() + static_cast<std::ptrdiff_t>(block + n));
+    };
+    const std::array<real, 2> ordinary = {unit > 0 ? most(sizes, n) / unit : real(0), most(sizes, 0) * unit};
     for (const std::size_t block : {std::size_t(0), n}) {
-        const auto most = [&](const std::vector<real>& values) {  // for a component that rests, or nearly, at zero
-            const real largest = *std::max_element(values.begin() + block, values.begin() + block + n);
-            return largest > 0 ? largest : real(1);
-        };
-        const real most_size = most(sizes), most_shift = std::min(most(shifts), real(1e-6) * most_size);
+        // A block that rests, to rounding, has the size that the other one gives it.
+        const real other = ordinary[block / n];
+        if (most(sizes, block) < real(1e-20) * other)
+            for (std::size_t i = block; i < block + n; ++i) sizes[i] = other, shifts[i] = real(1e-14) * other;
+        // For a component that rests, or nearly, at zero.
+        const real most_size = most(sizes, block) > 0 ? most(sizes, block) : real(1),
+                   most_shift =
+                       std::min(most(shifts, block) > 0 ? most(shifts, block) : real(1), real(1e-6) * most_size);
         for (std::size_t i = block; i < block + n; ++i) {
             if (!(sizes[i] > 0)) sizes[i] = most_size;
             shifts[i] = std::max(shifts[i], real(1e-4) * most_shift);
@@ -224,6 +247,7 @@ double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std
         exact.prepare({parameters.begin(), parameters.end()}, step) != LOBATTO_OK)
         throw ComputationError("the energy cannot be compared: a kernel refuses the scene's values");
     real difference = 0, largest = 0;
+    bool is_compared = false;
     for (const auto& [position, momentum] : states) {
         const std::vector<real> q(position.begin(), position.end()), p(momentum.begin(), momentum.end());
         real H = 0;
@@ -234,9 +258,12 @@ double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std
             throw ComputationError("the energy cannot be compared: a kernel refuses a state");
         real kinetic = 0;
         for (std::size_t k = 0; k < q.size(); ++k) kinetic += p[k] * velocity[k] / 2;
+        if (size(kinetic) + size(H - kinetic) > real(std::numeric_limits<double>::max()) / 4) continue;
+        is_compared = true;
         difference = std::max(difference, size(real(H_double) - H));
         largest = std::max(largest, size(kinetic) + size(H - kinetic));
     }
+    if (!is_compared) return std::nan("");
     return difference > 0 ? static_cast<double>(difference / largest) : 0.0;
 }
 

@@ -18,6 +18,7 @@ struct Return {
     std::int64_t steps = 0;  // one way; fewer than asked for when a step failed
     double distance = 0;     // of positions relative to the farthest that one moves, or of momenta likewise
     double rounding = 0;     // both infinite when a step fails on the way
+    bool rests = false;      // no position moves by more than 1e-8 of the largest: rounding is no part of a way
 };
 template <class real>
 Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters, const std::vector<real>& q,
@@ -30,7 +31,8 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
 double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step);
 
 // |H in double - H in quadruple| at states (q, p), largest, relative to the largest |kinetic| + |potential energy|
-// among them: whether the formula of H loses its digits by cancellation.
+// among them: whether the formula of H loses its digits by cancellation. States whose energy is too large for a double
+// are left out; not a number when there are no others.
 double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std::vector<double>& parameters,
                      double step, const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states);
 

@@ -365,6 +365,20 @@ TEST_CASE("a folder that cannot be made is named with the reason") {
             "LOBATTO_CACHE_DIR");
 }
 
+TEST_CASE("a folder that cannot be made for want of permission is named with that reason") {
+    TemporaryFolder folder;
+    const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
+    fs::permissions(folder.string(),
+                    fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read | fs::perms::others_exec);
+    const pid_t pid = start_process([&] {
+        if (::geteuid() == 0 && ::setuid(65534) != 0) return false;  // root may write everywhere
+        return message_of<MachineError>([] { compile(answer); })
+            .starts_with("cannot create the folder " + (folder / "cache").string() + ": Permission denied;");
+    });
+    CHECK(exit_code_of(pid) == 0);
+    fs::permissions(folder.string(), fs::perms::owner_all);
+}
+
 TEST_CASE("a folder without permission to write is named with the reason, but what is in it is used") {
     TemporaryFolder folder;
     fs::permissions(folder.string(), fs::perms::all | fs::perms::sticky_bit);  // for another user, too

@@ -224,6 +224,7 @@ TEST_CASE("what has no finite real value is refused where it stands") {
     check_error("tan(pi/2)", 1, "the Lagrangian has no finite real value here: tan of 1.5708 is not finite");
     check_error("(q - q)^0", 8, "the Lagrangian has no finite real value here: 0 to the power 0 is not defined");
     check_error("0^q", 2, "0 to a power that is not a number");
+    check_error("0^(-(2^(1/3)))", 2, "division by zero in the Lagrangian");
     check_error("(-2)^q", 5, "a negative number to a power that is not a number; it is real for whole powers only");
     check_error("(-q^0)^q", 7, "a negative number to a power that is not a number; it is real for whole powers only");
     check_error("sin(exp(exp(20)))", 5, "the Lagrangian has no finite real value here: a number beyond 2^4096 occurs");

@@ -25,6 +25,16 @@ struct Swing : HandwrittenPendulum {
     }
 };
 
+// Events that change their sign through infinity: 1/q = 0, and q'/q = 0, which has roots as well.
+struct Poles : HandwrittenPendulum {
+    static constexpr int events = 2;
+    static constexpr int event_direction[2] = {0, 0};
+    static void event(const Coefficients&, const real* q, const real* velocity, real* value) {
+        value[0] = 1 / q[0];
+        value[1] = velocity[0] / q[0];
+    }
+};
+
 struct Row {
     int event;
     double t, q, p;
@@ -82,6 +92,16 @@ TEST_CASE("events of the pendulum are found once each, in order, at their times"
     CHECK(rising == static_cast<int>((40 / quarter + 1) / 4));
     CHECK(turning == static_cast<int>(40 / quarter / 4));
     CHECK(crossing == 4 * turning + static_cast<int>((40 / quarter - 4 * turning) + 0.6));
+}
+
+TEST_CASE("a change of sign at a pole is no event") {
+    int turning = 0;
+    for (const Row& row : events_of<Poles>(0.1, 2, 0, 400, 400, 400)) {
+        CHECK(row.event == 1);
+        CHECK(std::fabs(row.p) < 1e-12);
+        ++turning;
+    }
+    CHECK(turning == static_cast<int>(40 / std::comp_ellint_1(std::sin(1.0)) / 2));
 }
 
 TEST_CASE("events do not depend on how steps are grouped, nor on the room for them") {

@@ -3,11 +3,13 @@
 #include "runtime/output.hpp"
 
 #include <doctest/doctest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -178,6 +180,40 @@ TEST_CASE("a folder that may only be read is named") {
     ::chmod(folder.path.c_str(), 0755);
     CHECK(status == 0);
     CHECK(std::filesystem::is_empty(folder.path));
+}
+
+TEST_CASE("a file that is written at once is there as a whole, or not at all with the advice of its writer") {
+    const Folder folder;
+    write_whole(folder / "a.csv", "the table", "1,2\n");
+    CHECK(content(folder / "a.csv") == "1,2\n");
+    std::filesystem::create_hard_link(folder / "a.csv", folder / "before");
+    write_whole(folder / "a.csv", "the table", "3,4\n");
+    CHECK(content(folder / "a.csv") == "3,4\n");
+    CHECK(content(folder / "before") == "1,2\n");  // was not touched, but replaced
+
+    const auto error = [](const std::string& path, const std::string& text) {
+        try {
+            write_whole(path, "the table", text, "leave it out");
+        } catch (const MachineError& failure) {
+            return std::string(failure.what());
+        }
+        return std::string("no error");
+    };
+    CHECK(error("/dev/full", "1") ==
+          "cannot write the table to /dev/full: No space left on device. Free some space, or leave it out");
+    CHECK(error(folder.path, "1") == "cannot write the table to " + folder.path + ": Is a directory. Leave it out");
+    rlimit before{};
+    ::getrlimit(RLIMIT_FSIZE, &before);
+    const rlimit small{1000, before.rlim_max};
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    ::setrlimit(RLIMIT_FSIZE, &small);
+    const std::string large = error(folder / "a.csv", std::string(2000, '1'));
+    ::setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    CHECK(large == "cannot write the table to " + folder / "a.csv.partial" +
+                       ": File too large. Files may not be larger than `ulimit -f` says; raise it, or leave it out");
+    CHECK(content(folder / "a.csv") == "3,4\n");
+    CHECK_FALSE(std::filesystem::exists(folder / "a.csv.partial"));
 }
 
 TEST_CASE("a file without momenta and energy keeps the beginning of each row") {

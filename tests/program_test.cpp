@@ -7,6 +7,10 @@
 #include <cstdio>
 #include <string>
 
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
 namespace {
 
 struct Answer {
@@ -72,7 +76,15 @@ TEST_CASE("an option that does not exist is refused with exit code 2 and the way
 }
 
 TEST_CASE("a full disk behind the standard output is exit code 4") {
-    const Answer full = shell(program + " > /dev/full");
-    CHECK(full.code == 4);
-    CHECK(full.text == "lobatto: cannot write to standard output: No space left on device. Is the disk full?\n");
+    for (const char* arguments : {"", " --help", " run --help", " --version"}) {
+        CAPTURE(arguments);
+        const Answer full = shell(program + arguments + " > /dev/full");
+        CHECK(full.code == 4);
+        CHECK(full.text == "lobatto: cannot write to standard output: No space left on device. Is the disk full?\n");
+    }
+    // When some of it was written at once, too.
+    const test::TemporaryFolder folder;
+    const Answer much = shell(program + " paper --no-figures -o '" + folder.string() + "' > /dev/full");
+    CHECK(much.code == 4);
+    CHECK(much.text == "lobatto: cannot write to file: No space left on device\n");
 }

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "runtime/checkpoint.hpp"
+#include "runtime/checksum.hpp"
 #include "runtime/error.hpp"
 #include "runtime/output.hpp"
 #include "tests/support.hpp"
@@ -136,10 +137,10 @@ void check_kills(int kills, unsigned seed) {
             CHECK(whole.bytes.compare(0, partial.size(), partial) == 0);
             read_trajectory(torn + ".partial");
             if (const auto checkpoint = read_checkpoint(torn + ".checkpoint")) {
-                CHECK(checkpoint->sizes[0] <= std::ssize(partial));
-                CHECK(checkpoint->sizes[0] >= kept);  // nothing that was once safe is lost
-                resumed += checkpoint->sizes[0] > kept;
-                kept = checkpoint->sizes[0];
+                CHECK(checkpoint->files[0].size <= std::ssize(partial));
+                CHECK(checkpoint->files[0].size >= kept);  // nothing that was once safe is lost
+                resumed += checkpoint->files[0].size > kept;
+                kept = checkpoint->files[0].size;
             }
         }
         ++ends;
@@ -257,13 +258,52 @@ TEST_CASE("another run's checkpoint, a damaged one, a missing or altered file ar
     const std::string text = read_file(stopped.out);
     write_text(stopped.out, text.substr(0, text.size() / 2));
     CHECK(contains(stopped.resume().err, "it is shorter than the run had written it. Run without --resume"));
-    std::string altered = text;
-    altered[30] = '?';
-    write_text(stopped.out, altered);
-    CHECK(contains(stopped.resume().err, "it is not what the run had written"));
     write_text(stopped.out, text);
-    std::filesystem::remove(stopped.out + ".partial");
+    // One byte, anywhere, in the trajectory or in the events.
+    const std::string event_file = stopped.folder / "run.events.csv", event_text = read_file(event_file);
+    const auto refuse_altered = [&](const std::string& file, const std::string& whole, std::size_t at) {
+        CAPTURE(file);
+        CAPTURE(at);
+        std::string altered = whole;
+        altered[at] = altered[at] == '1' ? '2' : '1';
+        write_text(file, altered);
+        for (const std::string& each : {stopped.out, event_file}) std::filesystem::remove(each + ".partial");
+        const Finished refused = stopped.resume();
+        CHECK(refused.exit_code == 4);
+        CHECK(refused.err == "lobatto: cannot go on with the trajectory in " + file +
+                                 ": it is not what the run had written. Run without --resume to begin anew\n");
+        write_text(file, whole);
+    };
+    const auto kept = static_cast<std::size_t>(read_checkpoint(checkpoint)->files[0].size);
+    for (const std::size_t at : {std::size_t{30}, kept / 3, kept / 2, kept - 2}) refuse_altered(stopped.out, text, at);
+    refuse_altered(event_file, event_text, event_text.size() / 2);
+    for (const std::string& each : {stopped.out, event_file}) std::filesystem::remove(each + ".partial");
     CHECK(stopped.resume().exit_code == 0);
+}
+
+TEST_CASE("a checksum is that of the bytes, however they come, and of no others") {
+    const auto checksum_of = [](const std::string& text, std::size_t part) {
+        Checksum checksum;
+        for (std::size_t at = 0; at < text.size(); at += part) checksum.add(text.substr(at, part));
+        return checksum.written();
+    };
+    std::string text;
+    for (int i = 0; i < 300; ++i) text += std::to_string(i);
+    const Written whole = checksum_of(text, text.size());
+    CHECK(whole.size == std::ssize(text));
+    for (const std::size_t part : {1, 3, 8, 13}) CHECK(checksum_of(text, part) == whole);
+    std::string altered = text;
+    for (char& byte : altered) {
+        const char before = byte;
+        for (int bit = 0; bit < 8; ++bit) {
+            byte = static_cast<char>(before ^ 1 << bit);
+            CHECK(checksum_of(altered, altered.size()) != whole);
+        }
+        byte = before;
+    }
+    for (const char* more : {"0", "\n"}) CHECK(checksum_of(text + more, 64) != whole);
+    CHECK(checksum_of(text + '\0', 64).checksum != whole.checksum);
+    CHECK(checksum_of(text.substr(1), 64) != whole);
 }
 
 TEST_CASE("a run that begins anew takes the checkpoint of the one before away") {

@@ -229,19 +229,43 @@ TEST_CASE("steps that visit the same phases again and again gain no energy stead
     CHECK(std::fabs(result.clean.rows.back().energy_mean) < 1e-14);  // 1.1e-15 measured
 }
 
+TEST_CASE(
+    "the table of roundoff appears as a whole, and a folder that refuses it is named before anything is measured") {
+    const TemporaryFolder folder;
+    const auto measure = [](const std::string& where) {
+        return run({LOBATTO_PROGRAM, "roundoff", LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "--steps", "100",
+                    "--trajectories", "2", "--no-reference", "--no-picture", "-o", where});
+    };
+    write_text(folder / "roundoff.csv", "of before\n");
+    std::filesystem::create_hard_link(folder / "roundoff.csv", folder / "before");
+    const Finished done = measure(folder.string());
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+    CHECK(read_file(folder / "roundoff.csv").starts_with("steps,plain mean of H"));
+    CHECK(read_file(folder / "before") == "of before\n");
+
+    const Finished refused = measure(folder / "before");
+    CHECK(refused.exit_code == 4);
+    CHECK(refused.out == "");
+    CHECK(refused.err == "lobatto: cannot create the folder " + (folder / "before").string() +
+                             ": Not a directory. Choose another place with -o\n");
+}
+
 TEST_CASE("a measurement that is interrupted tells what it has") {
     const Scene scene = kepler_scene("points = 6");
     volatile int interrupted = 1;  // before it begins
     const RoundoffResult nothing = roundoff_growth(scene, 1000, 4, false, &interrupted);
     CHECK(nothing.interrupted);
     CHECK(nothing.plain.rows.empty());
-    interrupted = 0;
-    std::thread signal([&interrupted] {
-        std::this_thread::sleep_for(std::chrono::milliseconds(500));
-        interrupted = 1;
-    });
-    const RoundoffResult some = roundoff_growth(scene, 1000000000, 4, false, &interrupted);
-    signal.join();
+    RoundoffResult some;
+    for (int wait = 500; some.clean.rows.empty() && wait < 100000; wait *= 4) {  // until it has begun
+        interrupted = 0;
+        std::thread signal([&interrupted, wait] {
+            std::this_thread::sleep_for(std::chrono::milliseconds(wait));
+            interrupted = 1;
+        });
+        some = roundoff_growth(scene, 1000000000, 4, false, &interrupted);
+        signal.join();
+    }
     CHECK(some.interrupted);
     CHECK(some.trajectories > 0);
     REQUIRE(!some.clean.rows.empty());
@@ -297,4 +321,23 @@ TEST_CASE("clean steps from rest, driven, and past coordinates that hardly move 
         std::vector<double>(7, 0.0),
         0.3};
     CHECK(difference<double>(symmetric, "points = 6", Precision::double_, 1000, 0.3) < 1e5);
+}
+
+TEST_CASE(
+    "round-off is measured in units of the motion's energy, also where H(0) is nothing, and what is none is told") {
+    Scene scene =
+        read_scene(Source("scene.toml",
+                          "title = \"P\"\nlagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = "
+                          "\"pi/2\", velocity = 0 }\n[method]\npoints = 6\narithmetic = \"clean\"\n[run]\nstep "
+                          "= 0.1\nuntil = 10\n"));
+    volatile int interrupted = 0;
+    const RoundoffResult small = roundoff_growth(scene, 1000, 4, true, &interrupted);
+    CHECK_FALSE(small.lost);
+    CHECK(small.clean.rows.back().energy_rms < 1e-14);
+    CHECK(small.plain.rows.back().energy_rms < 1e-13);
+    scene =
+        read_scene(Source("scene.toml",
+                          "title = \"O\"\nlagrangian = \"q'^2/2 - q^2/2\"\n[coordinates]\nq = { position = 1, velocity "
+                          "= 0 }\n[method]\npoints = 2\narithmetic = \"clean\"\n[run]\nstep = 2.05\nuntil = 10\n"));
+    CHECK(roundoff_growth(scene, 100, 4, false, &interrupted).lost);
 }

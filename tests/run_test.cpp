@@ -308,7 +308,14 @@ TEST_CASE("a reader that goes away does not cost the trajectory") {
         {"sh", "-c",
          "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
     CHECK(head.out == "t,q,p_q,H\n");
-    CHECK(head.err == "lobatto: cannot write the trajectory to /dev/stdout: Broken pipe. Its reader has gone\n");
+    const std::string gone = "lobatto: cannot write the trajectory to /dev/stdout: Broken pipe. Its reader has gone\n";
+    CHECK(head.err == gone);
+    // Nor is the error lost when there is more to say on the same pipe.
+    const test::Finished talkative =
+        test::run({"sh", "-c",
+                   "{ '" LOBATTO_PROGRAM "' run '" + pendulum +
+                       "' --until 1e5 -o /dev/stdout; echo $? >&2; } | head -1 > /dev/null"});
+    CHECK(talkative.err == gone + "4\n");
 }
 
 TEST_CASE("a run keeps only what the scene asks for") {

@@ -118,6 +118,56 @@ TEST_CASE("options are text too: they reach no shell, and a file's name no compi
     CHECK_FALSE(std::filesystem::exists(folder / "pwned"));
 }
 
+TEST_CASE("the name of a chart is no command and no option of the program that draws it") {
+    const TemporaryFolder folder;
+    write_text(folder / "scene.toml", Pieces().text());
+    for (const std::string name :
+         {"`touch pwned`.svg", "$(touch pwned).svg", "\"; system(\"touch pwned\"); #.svg", "'; !touch pwned; '.svg",
+          "a\n!touch pwned\n.svg", "\".svg", "-e.svg", "-.svg", "--version.svg", "%d.svg", "@touch.svg"}) {
+        CAPTURE(name);
+        const Finished done = run({"sh", "-c", "cd \"$0\" && exec \"$@\"", folder.string(), LOBATTO_PROGRAM,
+                                   "stability", "scene.toml", "--chart=" + name});
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+        CHECK(read_file(folder / name).ends_with("</svg>\n\n"));
+        std::filesystem::remove(folder / name);
+        // Nothing else is left.
+        CHECK(std::distance(std::filesystem::directory_iterator(folder.string()), {}) == 1);
+    }
+}
+
+TEST_CASE("the title in the pictures of tradeoff is no command") {
+    Pieces pieces;
+    pieces.title = "\"`touch pwned` it's $(touch pwned)\"";
+    const Finished done = attack("tradeoff", pieces, {"--budget", "2s", "-o", "drawings"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+}
+
+TEST_CASE("a result does not take the place of its scene") {
+    const TemporaryFolder folder;
+    const std::string text = Pieces().text();
+    const auto refuse = [&](const std::string& scene, std::vector<std::string> arguments, const std::string& result) {
+        CAPTURE(result);
+        write_text(folder / scene, text);
+        arguments.insert(arguments.begin(), {"sh", "-c", "cd \"$0\" && exec \"$@\"", folder.string(), LOBATTO_PROGRAM});
+        const Finished refused = run(arguments);
+        CHECK(refused.exit_code == 2);
+        CHECK(refused.err == result + ": the result would overwrite the scene " + scene + "; give it another name\n");
+        CHECK(read_file(folder / scene) == text);
+        CHECK_FALSE(std::filesystem::exists(folder / (scene + ".partial")));
+    };
+    write_text(folder / "s.toml", text);
+    std::filesystem::create_symlink("s.toml", folder / "link.csv");
+    refuse("s.toml", {"run", "s.toml", "-o", "./s.toml"}, "./s.toml");
+    refuse("s.toml", {"run", "s.toml", "-o", "link.csv"}, "link.csv");
+    refuse("s.toml", {"run", "s.toml", "-o", "s.toml", "--resume"}, "s.toml");
+    refuse("a.csv.partial", {"run", "a.csv.partial", "-o", "a.csv"}, "a.csv");
+    refuse("a.events.csv", {"run", "a.events.csv", "-o", "a.csv"}, "a.events.csv");
+    refuse("s.toml", {"sweep", "s.toml", "--vary", "x=1,2", "-o", "s.toml"}, "s.toml");
+    refuse("s.svg", {"stability", "s.svg", "--chart", "s.svg"}, "s.svg");
+    refuse("s.hpp", {"emit", "s.hpp", "-o", "."}, "./s.hpp");
+    refuse("roundoff.csv", {"roundoff", "roundoff.csv", "-o", "."}, "./roundoff.csv");
+}
+
 TEST_CASE("a derivation that takes too long or too much memory ends with an error that says what to do") {
     const TemporaryFolder folder;
     std::string product = "(q + r + 1)";

@@ -141,11 +141,11 @@ TEST_CASE("velocities that couple, time, singular places and no equilibrium are 
         stability({scene_in(folder, "(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + y^2)/2", two)}).out,
         "no independent oscillations: its velocities couple the coordinates; the motion itself grows by 1 in a "
         "time h\n"
-        "  measured on the kernel: growth a step 1, to rounding\n"));
+        "  measured on the kernel: growth a step 1, to within 0.0005\n"));
     CHECK(contains(
         stability({scene_in(folder, "q'^2/2 + cos(q)*sin(t)", "q = { position = 1, velocity = 0 }", "time = \"t\"\n")})
             .out,
-        "its forces change with time; it has no equilibria\n"));
+        "its forces change with time; no equilibria are sought\n"));
     CHECK(contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", two)}).out,
                    "no equilibrium was found from its start and along its motion\n"));
     // Friction: both decay by exp(-h/10).
@@ -163,6 +163,60 @@ TEST_CASE("velocities that couple, time, singular places and no equilibrium are 
     const test::Finished saddle = stability({scene_in(folder, "q'^2/2 + q^2/2", "q = { position = 1, velocity = 0 }")});
     CHECK(contains(saddle.out, "runs away itself, by 1.1052 in a time h; the step by 1.1052\n"));
     CHECK(contains(saddle.out, "measured on the kernel: growth a step 1.1052\n"));
+}
+
+TEST_CASE("what the linear part, the limit or a measurement cannot tell is said") {
+    const test::TemporaryFolder folder;
+    const std::string q = "q = { position = 1, velocity = 0 }";
+    const test::Finished quartic = stability({scene_in(folder, "q'^2/2 - q^4/4", q)});
+    CHECK(contains(quartic.out, "omega = 0              the linear part says nothing here\n"));
+    // On the limit itself states grow in proportion to the number of steps.
+    const std::string oscillator = scene_in(folder, "q'^2/2 - q^2/2", q);
+    CHECK(contains(stability({oscillator, "--points", "2", "--step", "2"}).out,
+                   "AT a limit, to rounding: grows in proportion to the number of steps\n"));
+    CHECK(report_of({oscillator, "--points", "2", "--step", "2"})["points"][0]["modes"][0]["stable"] == false);
+    // A slow growth is measured for as long as it takes.
+    const auto slow = report_of({oscillator, "--points", "5", "--step", "3.14146"})["points"][0];
+    const double rate = slow["modes"][0]["rate"];
+    CHECK(rate > 1e-4);
+    CHECK(rate < 2e-3);
+    CHECK(slow["measured_rate"].get<double>() == doctest::Approx(rate).epsilon(0.05));
+    CHECK(slow["measured_floor"].get<double>() < rate);
+    // However slow, it is no free motion.
+    CHECK(contains(stability({scene_in(folder, "q'^2/2 - 1e-300*q^2/2", q)}).out, "omega = 1e-150 "));
+    // Eigenvalues of steps bound no motion whose forces change with time.
+    const test::Finished parametric =
+        stability({scene_in(folder, "q'^2/2 - (1 + 0.5*cos(2*t))*q^2/2", q, "time = \"t\"\n")});
+    CHECK(contains(parametric.out, "steps looked at); as forces change with time it may grow all the same\n"));
+}
+
+TEST_CASE("frequencies are met along a motion whose velocities couple the coordinates, and their absence is said") {
+    const test::TemporaryFolder folder;
+    // In a turning frame: two springs of frequency 10, seen at 9 and 11.
+    const auto turning =
+        report_of({scene_in(folder, "((x' - y)^2 + (y' + x)^2)/2 - 50*(x^2 + y^2) - 1e-6*x^4",
+                            "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }")});
+    CHECK(turning["trajectory"]["largest_z"].get<double>() == doctest::Approx(1.1 * 1.1).epsilon(1e-4));
+    CHECK(turning["trajectory"]["frequencies_at"] == turning["trajectory"]["states"]);
+    const test::Finished falling =
+        stability({scene_in(folder, "q'^2/2 + q^2/2 + q^4/4", "q = { position = 0.0001, velocity = 0 }")});
+    CHECK(contains(falling.out, "  nothing oscillates: no frequency was met\n"));
+}
+
+TEST_CASE("the work has bounds: a run of too many steps is cut, a formula too long is left out") {
+    const test::TemporaryFolder folder;
+    const auto cut = report_of(
+        {scene_in(folder, "q'^2/2 + cos(q)", "q = { position = 1, velocity = 0 }"), "--step", "1e-9", "--points", "2"});
+    CHECK(cut["trajectory"]["steps"] == 10'000'000'000);
+    CHECK(cut["trajectory"]["steps_done"] == 10'000'000);
+    const test::Finished lengthy =
+        stability({scene_in(folder,
+                            "(x'^2 + y'^2 + z'^2)/2 + 1/sqrt(x^2 + y^2 + z^2)"
+                            " + exp(-sqrt(x^2 + y^2 + z^2))*sin(x*y)/sqrt(x^2 + y^2 + z^2)",
+                            "x = { position = 1, velocity = 0 }\ny = { position = 0.2, velocity = 1 }\n"
+                            "z = { position = 0.1, velocity = 0.3 }"),
+                   "--points", "5"});
+    CHECK(contains(lengthy.out, "Energy: the formula of H_8 (D37) is too long to be written down here\n"));
 }
 
 TEST_CASE("the chart is an SVG file, the same bytes on every run, with theory and measurement") {
@@ -194,6 +248,9 @@ TEST_CASE("mistakes on the command line are refused before anything is computed"
           "--chart x.png: the chart is an SVG file; give it a name that ends in .svg\n");
     CHECK(refusal({oscillator, "--chart", "no/such/x.svg"}) ==
           "--chart no/such/x.svg: there is no folder no/such; make it first\n");
+    CHECK(contains(refusal({""}), "cannot read the scene"));
+    for (const auto& option : {std::vector<std::string>{"--tolerance", "1e-9"}, {"--arithmetic", "clean"}})
+        CHECK(refusal(option) == "--tolerance and --arithmetic belong to a scene; name one\n");
     CHECK(refusal({"--step", "0.1"}) == "--chart, --step and --set belong to a scene; name one\n");
     CHECK(contains(refusal({"missing.toml"}), "missing.toml"));
     CHECK(contains(refusal({oscillator, "--step", "-1"}), "the step must be positive"));

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "cli/linearisation.hpp"
 #include "generator/real.hpp"
@@ -267,18 +268,41 @@ TEST_CASE("Newton's method finds the equilibria near a motion, each once, and no
     for (const double q : {0.3, -2.9, 1.5, 2.8, 6.0, 9.6}) starts.push_back(Eigen::VectorXd::Constant(1, q));
     const auto found = linearisation.equilibria(starts);
     REQUIRE(found.size() == 2);
-    CHECK(found[0](0) == 0);
-    CHECK(std::fabs(std::fabs(found[1](0)) - std::acos(-1.0)) < 1e-14);
-    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(1);
-    CHECK((*linearisation.at(0, found[0], rest).squared_frequencies())(0) == doctest::Approx(2.25));
-    CHECK((*linearisation.at(0, found[1], rest).squared_frequencies())(0) == doctest::Approx(-2.25));
-    CHECK(linearisation.at(0, found[1], rest).rate() == doctest::Approx(1.5));
+    CHECK(found[0].q(0) == 0);
+    CHECK(std::fabs(found[1].q(0)) == std::acos(-1.0));
+    CHECK((*found[0].system.squared_frequencies())(0) == 2.25);
+    CHECK((*found[1].system.squared_frequencies())(0) == -2.25);
+    CHECK(found[1].system.rate() == 1.5);
 
     const Scene kepler = test::scene_of("(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)",
                                         "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }", 4);
     const System attraction = build_system(kepler);
     Linearisation orbit(kepler, attraction);
     CHECK(orbit.equilibria({Eigen::Vector2d(1, 0), Eigen::Vector2d(0.3, -2)}).empty());
+}
+
+TEST_CASE("of what hangs also the equilibria are found in which it stands, though the motion comes near none") {
+    // A double pendulum, the lower one twice as long. With a spring at its pivot the lower angle alone is one.
+    const auto found_of = [](const std::string& spring) {
+        const Scene scene =
+            test::scene_of("x'^2 + 2*y'^2 + 2*x'*y'*cos(x - y) + 2*cos(x) + 2*cos(y)" + spring,
+                           "x = { position = 0.1, velocity = 0 }\ny = { position = 0.1, velocity = 0 }", 4);
+        const System system = build_system(scene);
+        return Linearisation(scene, system).equilibria({Eigen::Vector2d(0.1, 0.1)});
+    };
+    const auto pendulums = found_of("");
+    REQUIRE(pendulums.size() == 4);
+    std::set<std::pair<bool, bool>> stand;
+    for (const Equilibrium& equilibrium : pendulums) {
+        for (const double angle : equilibrium.q) CHECK(std::fabs(std::sin(angle)) < 1e-15);
+        stand.emplace(std::cos(equilibrium.q(0)) < 0, std::cos(equilibrium.q(1)) < 0);
+    }
+    CHECK(stand.size() == 4);
+    const auto sprung = found_of(" - 50*x^2");
+    REQUIRE(sprung.size() == 2);
+    CHECK(sprung[0].q == Eigen::Vector2d(0, 0));
+    CHECK(sprung[1].q(0) == 0);
+    CHECK(std::fabs(sprung[1].q(1)) == std::acos(-1.0));
 }
 
 TEST_CASE("frequencies are found only where the coordinates fall into independent oscillators") {
@@ -296,6 +320,87 @@ TEST_CASE("frequencies are found only where the coordinates fall into independen
     CHECK((*springs)(1) == doctest::Approx(2 + std::sqrt(1.5)));
     CHECK(!system_of("(x'^2 + y'^2)/2 + 3*(x*y' - y*x')/2 - (x^2 + y^2)/2").squared_frequencies());
     // A magnetic field holds what would fall: exponents i (3 -+ sqrt(9 - 8))/2.
-    CHECK(std::fabs(system_of("(x'^2 + y'^2)/2 + 3*(x*y' - y*x')/2 + (2*x^2 + 2*y^2)/2").rate()) < 1e-7);
+    CHECK(std::fabs(system_of("(x'^2 + y'^2)/2 + 3*(x*y' - y*x')/2 + (2*x^2 + 2*y^2)/2").rate()) < 1e-40);
     CHECK(system_of("(x'^2 + y'^2)/2 + (x*y' - y*x')/2 + (2*x^2 + 2*y^2)/2").rate() > 1);
+    CHECK(*system_of("(x'^2 + y'^2)/2 + 3*(x*y' - y*x')/2 + (2*x^2 + 2*y^2)/2").largest_frequency() ==
+          doctest::Approx(2));
+    CHECK(*system_of("(x'^2 + y'^2)/2 + (x*y' - y*x')/10 + (2*x^2 + 3*y^2)/2").largest_frequency() == 0);
+    // Each block by its own sign.
+    const auto signs = system_of("(x'^2 - y'^2)/2 - (x^2 - 3*y^2)/2").squared_frequencies();
+    REQUIRE(signs);
+    CHECK((*signs)(1) == 3);
+    CHECK(system_of("(x'^2 - y'^2)/2 + x*y").obstacle() == "its masses have both signs");
+}
+
+TEST_CASE("a stiff coordinate hides no slow one, whether coupled or not") {
+    const auto system_of = [](const std::string& lagrangian, const std::string& more = "") {
+        const Scene scene = test::scene_of(
+            lagrangian, "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }" + more, 4);
+        const System system = build_system(scene);
+        Linearisation linearisation(scene, system);
+        return linearisation.at(0, Eigen::Vector2d(0, 0), Eigen::Vector2d(0, 0));
+    };
+    const auto lowest = [&](const std::string& lagrangian) {
+        return (*system_of(lagrangian).squared_frequencies())(0);
+    };
+    CHECK(lowest("(x'^2 + y'^2)/2 + x^2/2 - 1e16*y^2/2") == -1);
+    CHECK(lowest("(x'^2 + y'^2)/2 - x^2/2 - 1e16*y^2/2") == 1);
+    CHECK(lowest("(x'^2 + y'^2)/2 - x^2/2 - 1e12*(x - y)^2/2") == doctest::Approx(0.5 - 0.125e-12).epsilon(1e-15));
+    CHECK(lowest("(x'^2 + y'^2)/2 - x^2/2 - 1e30*(x - y)^2/2") == 0.5);
+    CHECK(lowest("(x'^2 + y'^2)/2 - 1e30*(x - y)^2/2") == 0);
+    const LinearSystem driven = system_of("(x'^2 + y'^2)/2 - x^2/2 - 1e24*y^2/2", "\n[forces]\nx = \"0.1*x'\"");
+    CHECK(driven.obstacle() == "its forces depend on the velocities");
+    CHECK(driven.rate() == doctest::Approx(0.05).epsilon(1e-14));
+    // A hundred coordinates and more: in double precision.
+    const Scene chain = test::scene_of("sum(i=1..120, x[i]'^2)/2 - sum(i=1..119, (x[i+1] - x[i])^2)/2",
+                                       "x = { count = 120, position = 0, velocity = 1 }", 2);
+    const System system = build_system(chain);
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(120);
+    const auto squared = Linearisation(chain, system).at(0, zero, zero).squared_frequencies();
+    REQUIRE(squared);
+    CHECK((*squared)(0) == 0);
+    CHECK((*squared)(1) == doctest::Approx(std::pow(2 * std::sin(std::acos(-1.0) / 240), 2)).epsilon(1e-10));
+}
+
+TEST_CASE("an equilibrium is where every force vanishes beside its own terms, however far or near it lies") {
+    const auto found_from = [](const std::string& lagrangian, const std::vector<Eigen::VectorXd>& starts) {
+        const Scene scene =
+            starts.front().size() == 1
+                ? test::scene_of(lagrangian, "x = { position = 1, velocity = 0 }", 4)
+                : test::scene_of(lagrangian, "x = { position = 1, velocity = 0 }\ny = { position = 1, velocity = 0 }",
+                                 4);
+        const System system = build_system(scene);
+        return Linearisation(scene, system).equilibria(starts);
+    };
+    const auto one = [](double x) { return Eigen::VectorXd(Eigen::VectorXd::Constant(1, x)); };
+    // A stiff length beside a weak torque, from where a motion ran away to.
+    const auto polar = found_from(
+        "(x'^2 + x^2*y'^2)/2 - 450*(x - 1)^2 + x*cos(y)",
+        {Eigen::Vector2d(1, 0.5), Eigen::Vector2d(1, 3), Eigen::Vector2d(1.8, 2432.3), Eigen::Vector2d(1e6, 1e9)});
+    REQUIRE(polar.size() == 2);
+    for (const Equilibrium& equilibrium : polar) {
+        CHECK(std::fabs(std::sin(equilibrium.q(1))) < 1e-12);
+        CHECK(equilibrium.q(0) == doctest::Approx(1 + std::cos(equilibrium.q(1)) / 900));
+    }
+    const auto small = found_from("x'^2/2 + x^2/2 - 1e14*x^4/4", {one(1.2e-7), one(2e-8)});
+    REQUIRE(small.size() == 2);
+    CHECK(small[0].q(0) == doctest::Approx(1e-7));
+    CHECK(small[1].q(0) == 0);
+    const auto far = found_from("(x'^2 + y'^2)/2 + cos(x)", {Eigen::Vector2d(3, 1e9), Eigen::Vector2d(0.5, 1e9)});
+    REQUIRE(far.size() == 2);
+    CHECK(far[0].q(0) == std::acos(-1.0));
+    CHECK(far[1].q(0) == 0);
+    // Multiple zeros of the force: their stiffness is zero, and each counts once.
+    const auto flat = found_from("x'^2/2 - (x^2 - 1)^3", {one(0.5), one(0.7), one(1.3), one(-2), one(0.1)});
+    REQUIRE(flat.size() == 2);
+    CHECK(flat[0].q(0) == doctest::Approx(1).epsilon(1e-15));
+    CHECK((*flat[0].system.squared_frequencies())(0) == 0);
+    CHECK(flat[1].q(0) == 0);
+    CHECK((*flat[1].system.squared_frequencies())(0) == 6);
+    for (const std::string power : {"x^4", "x^10", "x^4 - x^6"}) {
+        const auto quartic = found_from("x'^2/2 - (" + power + ")", {one(0.5), one(0.1)});
+        REQUIRE(quartic.size() == 1);
+        CHECK(quartic[0].q(0) == 0);
+        CHECK((*quartic[0].system.squared_frequencies())(0) == 0);
+    }
 }

@@ -362,6 +362,40 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     CHECK(std::isnan(column(starts, "x")[2]));
 }
 
+TEST_CASE("trajectories that leave their Lagrangian are told from those that stay, also where no energy is asked for") {
+    const Place place;
+    const std::string scene = place.file("kepler.toml");
+    for (const char* energy : {"true", "false"}) {
+        CAPTURE(energy);
+        test::write_text(scene, fmt::format("title = \"K\"\nlagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n"
+                                            "[coordinates]\nx = {{ position = 1, velocity = 0 }}\n"
+                                            "y = {{ position = 0, velocity = 1 }}\n"
+                                            "[run]\nstep = 0.01\nuntil = 3\n[output]\nenergy = {}\n",
+                                            energy));
+        const test::Finished done = place.sweep({scene, "--vary", "y'=1,0,0.8"});  // straight into the centre
+        CHECK(done.exit_code == 3);
+        CHECK(contains(done.out, "  trajectories            3, 1 failed\n"));
+        CHECK(
+            contains(done.err, ": 1 of 3 trajectories failed: 1 energy off: beyond stability, or past a singularity."));
+        CHECK(contains(done.err, "\n  trajectory 1, y' = 0: energy off: beyond stability, or past a singularity\n"));
+        const TrajectoryTable table = read_trajectory(place.file());
+        CHECK(column(table, "status") == std::vector<double>{0, 7, 0});
+    }
+    // At rest, and nearly so: no kinetic energy, and nothing wrong.
+    test::write_text(scene,
+                     "title = \"P\"\nlagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity "
+                     "= 0 }\n[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished resting = place.sweep({scene, "--vary", "q=0,1e-20,1e-160,2*pi,1"});
+    CHECK(resting.exit_code == 0);
+    CHECK(resting.err.empty());
+    test::write_text(scene,
+                     "title = \"S\"\nlagrangian = \"m*x'^2/2 - k*(x - l)^2/2\"\n[coordinates]\nx = { position = 1, "
+                     "velocity = 0 }\n[parameters]\nm = 1\nk = 1\nl = 1\n[run]\nstep = 0.05\nuntil = 200\n");
+    const test::Finished sprung = place.sweep({scene, "--vary", "x=0.5,1,1.5", "--vary", "l=0.1,1,1000"});
+    CHECK(sprung.exit_code == 0);
+    CHECK(sprung.err.empty());
+}
+
 TEST_CASE("the step and the end are the same for all, and it is said when a varied parameter stands in them") {
     const Place place;
     const std::string note = "\nThe step and the end time are those of omega = 2 for all trajectories.\n";

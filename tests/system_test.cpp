@@ -142,3 +142,32 @@ TEST_CASE("a time that changes nothing is left out, also where formulas mention 
     CHECK_FALSE(system_of("q^4 + t*q", "").autonomous);
     CHECK_FALSE(system_of("q^4", "[forces]\nq = \"cos(t)\"\n").autonomous);
 }
+
+TEST_CASE("what is lost in rounding at the start of a scene is kept: runs from elsewhere have the same kernel") {
+    const auto from = [](const std::string& position) { return "q = { position = " + position + ", velocity = 0 }\n"; };
+    CHECK_FALSE(build_system(scene_of("q'^2/2 - q^2/2 - eps*q^4/4", one, "eps = 1e-50\n")).linear);
+    CHECK_FALSE(build_system(scene_of("q'^2/2 - q^2/2 - 1e-50*q^4/4", one)).linear);
+    CHECK_FALSE(build_system(scene_of("q'^2/2 + eps*q'^4 - q^2/2", one, "eps = 1e-60\n")).separable);
+    for (const char* position : {"1e-60", "1e60", "1e-300", "1e150"}) {
+        CAPTURE(position);
+        const System system = build_system(scene_of("q'^2/2 + cos(q)", from(position)));
+        CHECK_FALSE(system.linear);
+        CHECK(system.hessian.entries().size() == 1);
+    }
+    CHECK_FALSE(build_system(scene_of("q'^2/2 - q^2/2 - exp(-q)", from("200"))).linear);
+    const Scene pumped = read_scene(
+        Source("scene.toml", "time = \"t\"\nlagrangian = \"q'^2/2 - q^2/2*(1 + eps*cos(2*t))\"\n[coordinates]\n" + one +
+                                 "[parameters]\neps = 1e-50\n[run]\nstep = 0.1\nuntil = 1\n"));
+    CHECK_FALSE(build_system(pumped).autonomous);
+    const System pole = build_system(scene_of("q'^2/2 - q^2/2 + 1e-90/q'", "q = { position = 1, velocity = 1 }\n"));
+    CHECK_FALSE(pole.separable);
+    CHECK(build_system(scene_of("q'^2/2 - q^2/2*(sin(w)^2 + cos(w)^2)", one, "w = 1e-50\n")).linear);
+}
+
+TEST_CASE("powers of sums of any height are taken apart without writing them out") {
+    for (const char* potential : {"((q + 1)^20 + 1)^20", "((q + 1)^30 + 1)^40", "(((q^64 + q)^64 + q)^64 + q)^64"}) {
+        CAPTURE(potential);
+        const Structure structure = structure_of(scene_of(std::string("q'^2/2 - ") + potential, one));
+        CHECK_FALSE(structure.closed_solution);
+    }
+}

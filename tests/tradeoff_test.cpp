@@ -161,12 +161,13 @@ TEST_CASE(
     CHECK(estimate.of_oscillation(10, 0) == 0);
     // The larger of two laws; further where neighbours part faster than in proportion to time.
     const double jump = estimate.jump(0.5), by_jump = 100 * estimate.phase(0.5);
-    CHECK(estimate.after(100, 50, {jump, 0, 2, 0, 0}) == doctest::Approx(by_jump).epsilon(1e-6));
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0}) == doctest::Approx(0.25 * 1e-2 * 2 * 50).epsilon(1e-12));
-    CHECK(estimate.after(100, 50, {jump, 0, 2, 1e-2, 0}) == doctest::Approx(1).epsilon(1e-12));
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 99}) == estimate.after(100, 50, {jump, 1e-2, 2, 0, 0}));
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 300}) ==
-          doctest::Approx(3 * estimate.after(100, 50, {jump, 1e-2, 2, 0, 0})).epsilon(1e-12));
+    CHECK(estimate.after(100, 50, {jump, 0, 2, 0, 0, 0}) == doctest::Approx(by_jump).epsilon(1e-6));
+    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 0}) == doctest::Approx(0.25 * 1e-2 * 2 * 50).epsilon(1e-12));
+    CHECK(estimate.after(100, 50, {jump, 0, 2, 1e-2, 0, 0}) == doctest::Approx(1).epsilon(1e-12));
+    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0.3, 0}) == 0.3);
+    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 99}) == estimate.after(100, 50, {jump, 1e-2, 2, 0, 0}));
+    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 300}) ==
+          doctest::Approx(3 * estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 0})).epsilon(1e-12));
 }
 
 TEST_CASE("explicit extrapolation follows the pendulum to 1e-15, and its frequency at rest is that of small swings") {

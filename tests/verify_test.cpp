@@ -65,6 +65,29 @@ TEST_CASE("what forces and time take away is not promised, the rest is checked, 
     CHECK(!contains(result.out, "energy drift"));
 }
 
+TEST_CASE("correct code passes at rest, far from zero and near it, and where energies are too large for numbers") {
+    const TemporaryFolder folder;
+    struct Motion {
+        const char *lagrangian, *position, *step;
+        const char* says;
+    };
+    for (const Motion& motion : std::vector<Motion>{{"q'^2/2 + cos(q)", "\"pi\"", "0.1", "at rest  ok"},
+                                                    {"q'^2/2 + cos(q)", "1e6", "0.1", "ok"},
+                                                    {"q'^2/2 + cos(q)", "1e-30", "0.1", "ok"},
+                                                    {"q'^2/2 - q^2/2", "1e300", "0.1", "energy too large  not judged"},
+                                                    {"q'^2/2 - q^2/2", "1", "31", "ok"}}) {
+        const std::string start = std::string("q = { position = ") + motion.position + ", velocity = 0 }";
+        write_text(folder / "scene.toml", scene_text(motion.lagrangian, start, motion.step));
+        const Finished result = verify({(folder / "scene.toml").string()});
+        CAPTURE(motion.position);
+        CAPTURE(motion.step);
+        INFO(result.out << result.err);
+        CHECK(result.exit_code == 0);
+        CHECK(!contains(result.out, "FAILED"));
+        CHECK(contains(result.out, motion.says));
+    }
+}
+
 TEST_CASE("a check that fails ends with exit code 3, the check's name and what it means") {
     const TemporaryFolder folder;
     // A step fifty times the period of the motion's fastest oscillation: a long way beyond stability.

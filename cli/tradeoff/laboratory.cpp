@@ -20,6 +20,7 @@ namespace {
 constexpr int few_coordinates = 10, some_coordinates = 20;
 constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
 constexpr double reference_share = 0.4;        // of the seconds
+constexpr double longest_radians = 4;          // h omega of the coarsest steps tried; Lobatto's limits are near pi
 const std::string measurements_version = "3";  // of what is measured: older notebooks are begun anew
 
 // A run to the end of which nothing but error and time was asked.
@@ -95,6 +96,10 @@ Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequ
 double Laboratory::figure(const Measurement& measurement) const {
     if (!is_chaotic()) return measurement.error;
     return std::isfinite(measurement.energy_error) ? measurement.energy_error : 1 / measurement.reaches;
+}
+
+double Laboratory::fewest_steps() const {
+    return std::max(1.0, until() * reference_.frequency / longest_radians);
 }
 
 double Laboratory::elapsed() const {

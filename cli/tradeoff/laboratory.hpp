@@ -45,6 +45,9 @@ public:
     double figure(const Measurement& measurement) const;
 
     double until() const { return reference_.until; }
+    // The numbers of steps that are tried, and the least of them.
+    StepLadder ladder(double ratio) const { return {reference_.samples, ratio}; }
+    double fewest_steps() const;
     double elapsed() const;
     double left() const { return request_.seconds - elapsed(); }
     // Throws Interrupted when the flag is raised.

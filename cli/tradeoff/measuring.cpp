@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "cli/hardest_steps.hpp"
 #include "runtime/diagnostics.hpp"
 #include "runtime/extrapolation.hpp"
 
@@ -238,19 +239,27 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
     for (int i = 1; i < estimate_states; ++i)
         places.insert(static_cast<std::int64_t>(std::fmod(i * golden, 1.0) * static_cast<double>(run.meetings + 1)));
     States<real> states;
-    for (const std::int64_t meeting : places) {
+    const auto row_at = [&](std::int64_t meeting) {
         state_at(meeting);
-        states.emplace_back();
-        states.back().push_back(run.h * static_cast<real>(meeting * run.every));
+        std::vector<real> row{run.h * static_cast<real>(meeting * run.every)};
         for (const auto* part : {&q, &p})
-            for (const Wide value : *part) states.back().push_back(static_cast<real>(value));
-    }
+            for (const Wide value : *part) row.push_back(static_cast<real>(value));
+        return row;
+    };
+    for (const std::int64_t meeting : places) states.push_back(row_at(meeting));
     const std::pair kind(candidate.member.family, candidate.member.points);
     if (estimates_.count(kind) == 0) estimates_.emplace(kind, quadrature_of(candidate.member.method()));
     const ErrorEstimate& estimate = estimates_.at(kind);
     const bool energy_tells = conserves_ && candidate.member.family == Family::lobatto;
-    const Evidence evidence = evidence_of(run.stepper, states, run.start.parameters, run.h, reference_.scale,
-                                          error_power(candidate.member.method()), energy_tells);
+    Evidence evidence = evidence_of(
+        run.stepper, states, run.start.parameters, run.h, reference_.scale, error_power(candidate.member.method()),
+        conserves_ ? energies_of(run.stepper, states) : std::vector<double>(), energy_tells);
+    HardestSteps<real> hardest;
+    for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) hardest.look(row_at(meeting), std::nanf(""));
+    evidence.certain = std::fmax(
+        evidence.certain, single_steps(run.stepper, hardest.states(), run.every, static_cast<real>(reference_.until),
+                                       run.start.parameters, run.h, reference_.scale)
+                              .error);
     result.jump = evidence.jump;
     result.growth = evidence.growth;
     result.estimate = std::fmin(1, estimate.after(static_cast<double>(candidate.steps), reference_.until, evidence,

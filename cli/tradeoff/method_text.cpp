@@ -116,9 +116,7 @@ void write_method(const Choice& choice, const Scene& scene, double error, bool u
             fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "
                         "unusually; copy the lines above",
                         scene.path));
-    PartialFile file(scene.path, "the scene");
-    file.write(text);
-    file.finish();
+    write_whole(scene.path, "the scene", text, "copy the lines above into it");
 }
 
 }  // namespace lobatto

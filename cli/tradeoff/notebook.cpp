@@ -35,11 +35,7 @@ Notebook::Notebook(const std::string& path, const std::string& subject) : path_(
         }
     }
     found_ = measurements_.size();
-    if (kept.size() != size) {  // never half of it, whenever this process ends
-        PartialFile fresh(path, "the measurements");
-        fresh.write(kept);
-        fresh.finish();
-    }
+    if (kept.size() != size) write_whole(path, "the measurements", kept);  // never half of it
     file_.open(path, std::ios::app);
     if (!file_) throw MachineError(fmt::format("cannot write {}; choose another folder with -o", path));
 }

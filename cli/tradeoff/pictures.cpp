@@ -8,13 +8,12 @@
 #include <map>
 
 #include "cli/drawing.hpp"
-#include "cli/tradeoff/search.hpp"
+#include "cli/tradeoff/exploration.hpp"
 
 namespace lobatto {
 
 namespace {
 
-const char* const advice = "The pictures need gnuplot: apt-get install gnuplot-nox.";
 const char* const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};  // Okabe and Ito
 constexpr int most_curves = 12;                                                                    // of members
 constexpr double targets[] = {1e-3, 1e-6, 1e-9, 1e-12};                                            // of courses
@@ -65,7 +64,7 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
         const bool gauss = member->family == Family::gauss;
         add(members.at(*member),
             fmt::format("with linespoints lc rgb \"{}\" lw 1.5 dt {} pt {} ps 0.6", colours[number % 6], gauss ? 2 : 1,
-                        4 + number % 6),
+                        4 + (number + number / 6) % 6),  // no colour has the same points twice
             name_of(*member));
         ++number;
     }
@@ -77,9 +76,9 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
     draw(folder, "work_precision",
          fmt::format("{}set logscale xy\nset xrange [*:*] reverse\nset format \"10^{{%T}}\"\n"
                      "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
-                     "set title \"{}\" noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds a unit of time\"\n{}\n",
-                     data, laboratory.scene().title, figure_name(laboratory), curves),
-         960, 560, advice);
+                     "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds a unit of time\"\n{}\n",
+                     data, gnuplot_text(laboratory.scene().title), figure_name(laboratory), curves),
+         960, 560);
 }
 
 // For some decades the cheapest way.
@@ -116,7 +115,7 @@ void draw_course(const std::string& folder, const std::string& name, const std::
                      "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
                      "set xlabel \"time\"\nset ylabel \"{}\"\n{}\n",
                      data, label, curves),
-         960, 400, advice);
+         960, 400);
 }
 
 }  // namespace

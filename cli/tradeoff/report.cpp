@@ -7,8 +7,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "cli/tradeoff/exploration.hpp"
 #include "cli/tradeoff/measurement_json.hpp"
-#include "cli/tradeoff/search.hpp"
 #include "runtime/output.hpp"
 
 namespace lobatto {

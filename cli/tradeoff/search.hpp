@@ -9,19 +9,17 @@
 
 namespace lobatto {
 
-// No other is both faster and more accurate; from coarse to fine.
-std::vector<Measurement> pareto_front(const Laboratory& laboratory);
-
 // One member's coarsest steps that meet a goal.
 struct Crossing {
     std::optional<Measurement> measurement;  // nothing: it does not reach the goal
     double least_error = 0;                  // what it does reach
+    double seconds = 0;  // infinite without; else the less of its time and of the same steps' with a looser iteration
 };
 // Runs to stagnation, with a handful of steps: from the error of one the next is told by the order.
 Crossing cross(Laboratory& laboratory, const Member& member, double goal);
 
-// The fastest way to the goal with this member: around the crossing, with iterations that stop earlier or steps that
-// are shorter but need fewer sweeps.
+// The fastest way to the goal with this member: with longer steps, where the error does not grow evenly with them; with
+// iterations that stop earlier; with steps that are shorter but need fewer sweeps.
 Measurement polish(Laboratory& laboratory, const Measurement& crossing, double goal);
 
 // The fastest of the whole family for an error at most `goal`, as far as the time goes.
@@ -35,9 +33,5 @@ struct Search {
 Search search(Laboratory& laboratory, double goal);
 // The kernels to begin with.
 std::vector<Member> first_guess(double goal, std::size_t count);
-
-// The family from coarse to fine, for the trade of speed for accuracy; returns when time is up or all has been seen.
-void explore(Laboratory& laboratory);
-std::vector<Member> first_of_tour();  // the kernels it begins with
 
 }  // namespace lobatto

@@ -41,10 +41,12 @@ public:
         names_.resize(static_cast<std::size_t>(n));
         const bool driven = whole(0, 5) == 0, damped = whole(0, 5) == 0;
         std::string lagrangian, coordinates, forces;
+        // What a kernel models must not depend on the numbers of its scene: they may be of any size.
+        const double size = whole(0, 2) == 0 ? magnitude() : 1, k = whole(0, 2) == 0 ? magnitude() : 1.3;
         for (const std::string& name : names_) {
             lagrangian += kinetic(kind, name);
-            coordinates += fmt::format("{} = {{ position = {:.4f}, velocity = {:.4f} }}\n", name, uniform(-0.8, 0.8),
-                                       uniform(-0.5, 0.5));
+            coordinates += fmt::format("{} = {{ position = {:.4g}, velocity = {:.4g} }}\n", name,
+                                       size * uniform(-0.8, 0.8), std::min(size, 1.0) * uniform(-0.5, 0.5));
             if (damped) forces += fmt::format("{} = \"-{:.3f}*{}'\"\n", name, uniform(0, 0.3), name);
         }
         if (n > 1 && whole(0, 1) == 0)
@@ -60,14 +62,16 @@ public:
         return fmt::format(
             "{}lagrangian = \"{}\"\n[coordinates]\n{}{}{}[method]\n{}\n[run]\nstep = {:.3f}\nuntil = 1\n[output]\n"
             "tangent = false\n",
-            driven ? "time = \"t\"\n" : "", lagrangian, coordinates, has_k ? "[parameters]\nk = 1.3\n" : "",
-            forces.empty() ? "" : "[forces]\n" + forces, method, uniform(0.02, 0.1));
+            driven ? "time = \"t\"\n" : "", lagrangian, coordinates,
+            has_k ? fmt::format("[parameters]\nk = {:.4g}\n", k) : "", forces.empty() ? "" : "[forces]\n" + forces,
+            method, uniform(0.02, 0.1));
     }
 
     int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
     double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
 
 private:
+    double magnitude() { return std::pow(10, uniform(-80, 10)); }
     std::string kinetic(int kind, const std::string& name) {
         const std::string sign = name == "a" ? "" : " + ";
         switch (kind) {
@@ -368,10 +372,12 @@ Outcome compare_compiled(const Scene& scene, const Derivation& derivation, Autho
     LoadedStepper<double> stepper(kernel);
     Mechanics mechanics(derivation);
     const std::size_t n = mechanics.n();
-    std::vector<double> parameters, q, v;
-    for (const Parameter& p : scene.parameters) parameters.push_back(scene.evaluate(p.value, p.name).to_double());
-    for (const GiNaC::ex& x : scene.initial_position) q.push_back(scene.evaluate(x, "position").to_double());
-    for (const GiNaC::ex& x : scene.initial_rate) v.push_back(scene.evaluate(x, "velocity").to_double());
+    const std::vector<double> parameters(scene.parameters.size(), 1.3);  // not the scene's
+    std::vector<double> q, v;
+    for (std::size_t k = 0; k < n; ++k) {
+        q.push_back(author.uniform(-0.8, 0.8));
+        v.push_back(author.uniform(-0.5, 0.5));
+    }
     const double h = scene.evaluate(scene.run.step, "step").to_double();
     if (stepper.prepare(parameters, h) != LOBATTO_OK) return {"", true};
 

@@ -5,7 +5,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     try {
-        lobatto::read_scene(lobatto::formula_scene(data, size));
+        lobatto::read_scene(lobatto::formula_scene(lobatto::FormulaScene::all, data, size));
     } catch (const lobatto::InputError&) {
     }
     return 0;
