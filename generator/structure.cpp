@@ -223,7 +223,7 @@ private:
 
     void general() {
         result_.unrolled = false;
-        const std::vector<int> cyclic = result_.general ? std::vector<int>{} : find_cyclic(system_);
+        const std::vector<int> cyclic = result_.general ? std::vector<int>{} : find_cyclic(scene_, system_);
         result_.routhian = reduce(system_, cyclic);
         const int active = static_cast<int>(result_.routhian.active.size());
         if (result_.general) {
@@ -235,10 +235,11 @@ private:
         }
         linearity();
         find("cyclic coordinates", !cyclic.empty(),
-             cyclic.empty() ? "every coordinate itself occurs, or its velocity more than squared"
-                            : names(cyclic) +
-                                  ": L holds only the velocity, so the momentum is constant and the motion "
-                                  "follows from it without equations");
+             cyclic.empty()
+                 ? "every coordinate itself occurs, or its velocity more than squared, or its mass has no sign"
+                 : names(cyclic) +
+                       ": L holds only the velocity, so the momentum is constant and the motion "
+                       "follows from it without equations");
         Couplings couplings(static_cast<std::size_t>(active));
         for (const auto& [place, value] : result_.routhian.second.entries())
             if (place.first < 2 * active && place.second < 2 * active)

@@ -179,6 +179,17 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
         sizes[i] = std::max(size(before[i]), size(after[i]));
         shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * size(before[i]));
     }
+    // A component that only rounding moves from 0, as the radial momentum of a circular orbit, has the size that a part
+    // of another would give it.
+    const std::vector<real> own = sizes;
+    for (std::size_t i = 0; i < rows; ++i) {
+        real given = 0;
+        for (std::size_t j = 0; j < rows; ++j) given = std::max(given, size(T[i * rows + j]) * own[j]);
+        if (own[i] < real(1e-20) * given) {
+            sizes[i] = given;
+            shifts[i] = std::max(shifts[i], real(1e-14) * given);
+        }
+    }
     // The unit of momenta in which the blocks dq1/dp and dp1/dq are of one size.
     real to_q = 0, to_p = 0;
     for (std::size_t i = 0; i < n; ++i)

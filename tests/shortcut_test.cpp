@@ -173,6 +173,23 @@ TEST_CASE("cyclic coordinates leave the solve, their momenta stay to the last bi
     }
 }
 
+TEST_CASE("a cyclic coordinate stays in the solve where its mass may vanish though the whole mass matrix does not") {
+    const auto cyclic_of = [](const std::string& lagrangian) {
+        const Derivation derivation = derive(scene("lagrangian = \"" + lagrangian +
+                                                   "\"\n[coordinates]\nx = { position = 1, velocity = 0.3 }\n"
+                                                   "y = { position = 0.5, velocity = 1 }\n" +
+                                                   run));
+        CHECK(finding(derivation, "cyclic coordinates").holds == !derivation.structure.routhian.cyclic.empty());
+        return derivation.structure.routhian.cyclic;
+    };
+    CHECK(cyclic_of("x'*y' + x'*y^2 - y^3").empty());                    // 0
+    CHECK(cyclic_of("x'*y' + (1 - y^2)*x'^2/2 - y^3").empty());          // of both signs
+    CHECK(cyclic_of("y'^2/2 + x'^2/2 + y*x'^2 + y*x'*y'").empty());      // near the start it has one
+    CHECK(cyclic_of("y'^2/2 - exp(y)*x'^2/2 - y^3") == std::vector{0});  // negative
+    CHECK(cyclic_of("y'^2/2 + (1 + y^2)*x'^2/2 - y^3") == std::vector{0});
+    CHECK(cyclic_of("y'^2/2 + (1 + y^2)*x'^2/2 - 1e-70/x'").empty());  // no value at rest, however small
+}
+
 TEST_CASE("a coordinate that nothing holds moves uniformly beside a nonlinear one") {
     const Scene free = scene(
         "lagrangian = \"a'^2/2 + b'^2 + cos(a)\"\n[coordinates]\na = { position = 1, velocity = 0 }\n"

@@ -86,6 +86,13 @@ TEST_CASE("correct code passes at rest, far from zero and near it, and where ene
         CHECK(!contains(result.out, "FAILED"));
         CHECK(contains(result.out, motion.says));
     }
+    // Rounding alone moves the radius of a circular orbit.
+    write_text(folder / "circle.toml",
+               scene_text("(r'^2 + r^2*a'^2)/2 + 1/r",
+                          "r = { position = 1, velocity = 0 }\na = { position = 0, velocity = 1 }", "0.1"));
+    const Finished circle = verify({(folder / "circle.toml").string()});
+    INFO(circle.out << circle.err);
+    CHECK(circle.exit_code == 0);
 }
 
 TEST_CASE("a check that fails ends with exit code 3, the check's name and what it means") {
