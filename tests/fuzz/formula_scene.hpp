@@ -19,8 +19,10 @@ enum class FormulaScene {
     chain,       // the potential between neighbours of a chain: loops over tables
     forced,      // a force
     in_formula,  // a definition, used twice
+    whole,       // the whole Lagrangian of two coordinates: masses of any sign, or none
 };
-constexpr int formula_scenes = 6;
+constexpr int formula_scenes = 6;  // chosen by length; `whole` by a mark that begins no formula
+constexpr char whole_mark = '=';
 
 inline Source formula_scene(FormulaScene kind, const std::uint8_t* data, std::size_t size) {
     std::string formula(reinterpret_cast<const char*>(data), size);
@@ -62,6 +64,10 @@ inline Source formula_scene(FormulaScene kind, const std::uint8_t* data, std::si
                 "scene.toml",
                 "lagrangian = \"m[1]*q'^2/2 + m[2]*s'^2*r^2 + 0*k - r/(1 + s^2)\"\n[definitions]\nr = '''\n2 + \n" +
                     formula + "[coordinates]\nq" + start + "s" + start + parameters + "[method]\npoints = 3\n" + run);
+        case FormulaScene::whole:
+            return Source("scene.toml", "lagrangian = '''\n0*k*m[1]*m[2]*r + \n" + formula + "[definitions]\n" +
+                                            quarter + "[coordinates]\nq" + start + "s" + start + parameters +
+                                            "[method]\npoints = 3\n" + run);
     }
     return Source("scene.toml", "");
 }
