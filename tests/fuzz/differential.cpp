@@ -40,16 +40,19 @@ public:
         names_.assign({"a", "b", "c"});
         names_.resize(static_cast<std::size_t>(n));
         const bool driven = whole(0, 5) == 0, damped = whole(0, 5) == 0;
+        const bool is_bare = n > 1 && whole(0, 9) == 0;  // a has no mass of its own
         std::string lagrangian, coordinates, forces;
         // What a kernel models must not depend on the numbers of its scene: they may be of any size.
         const double size = whole(0, 2) == 0 ? magnitude() : 1, k = whole(0, 2) == 0 ? magnitude() : 1.3;
         for (const std::string& name : names_) {
-            lagrangian += kinetic(kind, name);
+            if (!is_bare || name != "a") lagrangian += kinetic(kind, name);
             coordinates += fmt::format("{} = {{ position = {:.4g}, velocity = {:.4g} }}\n", name,
                                        size * uniform(-0.8, 0.8), std::min(size, 1.0) * uniform(-0.5, 0.5));
             if (damped) forces += fmt::format("{} = \"-{:.3f}*{}'\"\n", name, uniform(0, 0.3), name);
         }
-        if (n > 1 && whole(0, 1) == 0)
+        if (is_bare)
+            lagrangian += fmt::format(" + {:.3f}*a'*(b' + {})", uniform(0.5, 1.5), formula(2));
+        else if (n > 1 && whole(0, 1) == 0)
             lagrangian +=
                 fmt::format(" + {:.3f}*a'*b'{}", uniform(-0.4, 0.4), kind >= 3 ? "*cos(" + formula(1) + ")" : "");
         for (const std::string& name : names_)
@@ -73,7 +76,7 @@ public:
 private:
     double magnitude() { return std::pow(10, uniform(-80, 10)); }
     std::string kinetic(int kind, const std::string& name) {
-        const std::string sign = name == "a" ? "" : " + ";
+        const std::string sign = name == "a" ? "" : whole(0, 5) == 0 ? " - " : " + ";
         switch (kind) {
             case 3:
                 return fmt::format("{}(2 + sin({}))*{}'^2/2", sign, formula(1), name);
