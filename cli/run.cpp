@@ -235,10 +235,13 @@ void run(const RunOptions& options) {
     if (keeps_checkpoints && !result.interrupted) remove_checkpoint(path);
 
     std::optional<StepJudge::Judgement> judgement;
+    std::string departure;
     if (result.status == LOBATTO_OK && result.steps_done > 1) {
         judgement = judge.judge(derivation, kernel, request, result);
+        if (judgement->is_lost() && !derivation.system.linear && !EnergyWatch::can_watch(derivation))
+            departure = StepJudge::loss(*judgement, request, result);
         for (const std::string& warning : StepJudge::warnings(*judgement, scene.run.error))
-            fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+            if (departure.empty()) fmt::print(stderr, "lobatto: warning: {}.\n", warning);
     }
     if (!options.quiet) {
         print_table(derivation, scene, stepper, request, result, watch);
@@ -252,8 +255,7 @@ void run(const RunOptions& options) {
         throw ComputationError(
             fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
     }
-    std::string departure;
-    if (!result.interrupted) departure = energy_watch.departure(derivation, kernel, request);
+    if (!result.interrupted && departure.empty()) departure = energy_watch.departure(derivation, kernel, request);
     if (!result.interrupted && departure.empty())
         departure = linear_departure(derivation, scene, kernel, request, result);
     if (!departure.empty())

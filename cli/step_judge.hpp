@@ -37,9 +37,15 @@ public:
         };
         std::optional<Unresolved> unresolved;  // the first such step that was found
         std::string text() const;              // of the error, one line
+        // Beyond the limit, and the error as large as the motion: where no energy is kept that would tell, the run is
+        // lost.
+        bool is_lost() const { return radians > limit && error >= 1; }
     };
     Judgement judge(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
+    // What to tell of a run that is lost, as of any stop.
+    static std::string loss(const Judgement& judgement, const TrajectoryRequest& request,
+                            const TrajectoryResult& result);
     // One warning a string.
     static std::vector<std::string> warnings(const Judgement& judgement, double wanted_error);
 
