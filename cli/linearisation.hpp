@@ -50,9 +50,13 @@ public:
     // DomainError where a formula has no real value.
     LinearSystem at(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
 
-    // Where the system can rest: Newton's method from each of these positions, then from each equilibrium found with one
-    // angle turned by half a turn. Equilibria with the same frequencies count once.
+    // Where the system can rest: Newton's method from each of these positions, then from each equilibrium found with
+    // one angle turned by half a turn. Equilibria with the same frequencies count once.
     std::vector<Equilibrium> equilibria(const std::vector<Eigen::VectorXd>& starts);
+
+    // The dimension of the space of directions along which nothing pulls, wherever the system is: along them it moves
+    // on steadily, as the centre of mass of what nothing holds. Looks near q; 0 where the mass matrix is not constant.
+    int free_directions(const Eigen::VectorXd& q);
 
 private:
     using Position = std::vector<cln::cl_R>;

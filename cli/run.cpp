@@ -238,7 +238,8 @@ void run(const RunOptions& options) {
     std::string departure;
     if (result.status == LOBATTO_OK && result.steps_done > 1) {
         judgement = judge.judge(derivation, kernel, request, result);
-        if (judgement->is_lost() && !derivation.system.linear && !EnergyWatch::can_watch(derivation))
+        if (!result.interrupted && judgement->is_lost() && !derivation.system.linear &&
+            !EnergyWatch::can_watch(derivation))
             departure = StepJudge::loss(*judgement, request, result);
         for (const std::string& warning : StepJudge::warnings(*judgement, scene.run.error))
             if (departure.empty()) fmt::print(stderr, "lobatto: warning: {}.\n", warning);

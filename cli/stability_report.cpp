@@ -58,13 +58,15 @@ std::vector<Mode> modes_of(const Stability& member, const VectorXd& squared, dou
     return modes;
 }
 
-PointReport point_report(const StabilityReport& report, const LinearSystem& system, const VectorXd& q) {
+// `free`: directions along which nothing pulls.
+PointReport point_report(const StabilityReport& report, const LinearSystem& system, const VectorXd& q, int free) {
     PointReport point;
     point.q = q;
     point.obstacle = system.obstacle();
     double expected = 0;
     if (const auto squared = system.squared_frequencies()) {
         point.modes = modes_of(report.member, *squared, report.step);
+        for (Mode& mode : *point.modes) mode.free = mode.squared_frequency == 0 && free-- > 0;
         const double lowest = squared->minCoeff();
         point.exact_rate = lowest < 0 ? report.step * std::sqrt(-lowest) : 0;
         expected = largest_rate(report, *point.modes, 1);
@@ -262,7 +264,7 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
     const VectorXd start = Eigen::Map<const VectorXd>(request.q.data(), system.n);
     if (system.linear) {
         const VectorXd rest = VectorXd::Zero(system.n);
-        report.points.push_back(point_report(report, linearisation.at(0, start, rest), start));
+        report.points.push_back(point_report(report, linearisation.at(0, start, rest), start, system.n));
         return report;
     }
     const std::int64_t steps = request.steps;
@@ -274,7 +276,8 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
         for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);
         starts.emplace_back(VectorXd::Zero(system.n));
         for (const Equilibrium& equilibrium : linearisation.equilibria(starts))
-            report.points.push_back(point_report(report, equilibrium.system, equilibrium.q));
+            report.points.push_back(
+                point_report(report, equilibrium.system, equilibrium.q, linearisation.free_directions(equilibrium.q)));
     }
     report.trajectory = trajectory_report(report, linearisation, states);
     report.trajectory->steps = steps;

@@ -19,6 +19,7 @@ struct Mode {
     double z = 0;                  // h^2 times it
     double rate = 0;               // ln of the growth in a step, from the member's exact trace
     bool at_limit = false;         // |trace| = 2 to rounding: states grow in proportion to the number of steps
+    bool free = false;             // squared_frequency is 0, and nothing pulls anywhere along the motion
     bool stable() const { return squared_frequency > 0 && rate == 0 && !at_limit; }
 };
 

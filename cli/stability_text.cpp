@@ -82,10 +82,10 @@ std::string proof_text(const ProofOfStability& proof) {
         signs_text(proof.at_zero), signs_text(proof.at_infinity), changes_of_sign(proof.at_zero));
 }
 
-std::string mode_text(const Stability& member, const Mode& mode, bool linear) {
+std::string mode_text(const Stability& member, const Mode& mode) {
     if (mode.squared_frequency == 0)
         return fmt::format("  omega = 0              {}",
-                           linear ? "free: moves on steadily" : "the linear part says nothing here");
+                           mode.free ? "free: moves on steadily" : "the linear part says nothing here");
     const double x = std::sqrt(std::fabs(mode.z));
     if (mode.squared_frequency < 0)
         return fmt::format("  omega^2 = {:<12.6g} runs away itself, by {:.5g} in a time h; the step by {}",
@@ -105,7 +105,7 @@ std::string mode_text(const Stability& member, const Mode& mode, bool linear) {
 }
 
 // All, or the ends of a long list and what is unstable.
-std::string modes_text(const Stability& member, const std::vector<Mode>& modes, bool linear) {
+std::string modes_text(const Stability& member, const std::vector<Mode>& modes) {
     std::string text;
     std::size_t hidden = 0;
     for (std::size_t k = 0; k < modes.size(); ++k) {
@@ -116,7 +116,7 @@ std::string modes_text(const Stability& member, const std::vector<Mode>& modes, 
         }
         if (hidden > 0) text += fmt::format("  ({} stable ones between)\n", hidden);
         hidden = 0;
-        text += mode_text(member, modes[k], linear) + "\n";
+        text += mode_text(member, modes[k]) + "\n";
     }
     return text;
 }
@@ -132,7 +132,7 @@ std::string position_text(const StabilityReport& report, const Eigen::VectorXd& 
 std::string point_text(const StabilityReport& report, const PointReport& point) {
     std::string text;
     if (point.modes)
-        text += modes_text(report.member, *point.modes, report.derivation.system.linear);
+        text += modes_text(report.member, *point.modes);
     else
         text += fmt::format("  no independent oscillations: {}; the motion itself grows by {} in a time h\n",
                             point.obstacle, growth_text(std::fabs(point.exact_rate) > 1e-12 ? point.exact_rate : 0));

@@ -170,6 +170,15 @@ TEST_CASE("what the linear part, the limit or a measurement cannot tell is said"
     const std::string q = "q = { position = 1, velocity = 0 }";
     const test::Finished quartic = stability({scene_in(folder, "q'^2/2 - q^4/4", q)});
     CHECK(contains(quartic.out, "omega = 0              the linear part says nothing here\n"));
+    // Nothing holds both together: their centre moves on.
+    const test::Finished pair =
+        stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y)",
+                            "x = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }")});
+    CHECK(contains(pair.out, "omega = 0              free: moves on steadily\n  omega = 1.41421 "));
+    const test::Finished held =
+        stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y) - (x + y)^4",
+                            "x = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }")});
+    CHECK(contains(held.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
     // On the limit itself states grow in proportion to the number of steps.
     const std::string oscillator = scene_in(folder, "q'^2/2 - q^2/2", q);
     CHECK(contains(stability({oscillator, "--points", "2", "--step", "2"}).out,
