@@ -204,7 +204,7 @@ one core that was not alone. ω is the largest frequency of the motion.
 The fastest in double precision for an error, its step in units of 1/ω, and what a unit of time costs:
 
 {head}{winners}
-- Read along a row: nine more digits cost two to five times as much, not a thousand times. Accuracy is cheap once the order is high.
+- Read along a row: nine more digits cost two to six times as much, not a thousand times. Accuracy is cheap once the order is high.
 - Take **Lobatto with 8 to 10 points, hω near 2,** when you do not want to think; iterate to a tolerance a hundredth of the error wanted, or to rounding when
   energies matter for long times.
 - Low orders (Störmer–Verlet is Lobatto 2) win only where a few per cent of error is enough, or where the force has no smooth derivatives.
@@ -221,7 +221,7 @@ The best Gauss against the best Lobatto, ratio of times (below 1: Gauss is faste
 
 {head}{gauss}
 Lobatto reuses the gradient at the end of a step and has a node less to solve for; of the same order, it is ahead where the mass is constant. With a mass matrix that depends on the
-position all nodes are solved for, and the two are close.
+position all nodes are solved for, and Gauss is ahead.
 
 Gauss is stable for every step, Lobatto up to a limit (`lobatto stability`). Steps that pass over the fast oscillations of `stiff_fput`, whose stiff springs hold most of ω, and the largest energy error to the scene's
 end, relative to the energy of motion (fails: the step's equations have no solution, or the energy grows tenfold):
@@ -237,7 +237,7 @@ What float saves at an error of 1e-3, the least error each type reaches within h
 | scene | float : double at 1e-3 | least, float | double | long double | __float128 | long double : double | __float128 : double |
 |---|---|---|---|---|---|---|---|
 {types}
-float is for ensembles, where twice as many trajectories fit into a register, and errors of 1e-4 will do; one trajectory gains little or nothing. long double costs some 20 to 50
+float is for ensembles, where twice as many trajectories fit into a register, and errors of 1e-4 will do; one trajectory gains little or nothing. long double costs some 10 to 50
 times (no vector registers) and gives three more digits; __float128 is for references.
 
 `lobatto tune` chooses in double precision, since that is what `lobatto run` computes in: below some 1e-14 it says what is the least, and that `lobatto tradeoff` and `lobatto emit --precision` have more digits.

@@ -34,10 +34,17 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
     for (const auto& [key, m] : laboratory.notebook().all())
         if (m.complete && m.candidate.tolerance == 0 && laboratory.figure(m) < 0.3 && laboratory.figure(m) > 0)
             members[m.candidate.member].push_back(&m);
+    const std::vector<Measurement> front = pareto_front(laboratory);
+    // Those that are most often the best, then those of which most is known.
+    const auto merit = [&](const Member& member) {
+        return std::pair(std::count_if(front.begin(), front.end(),
+                                       [&](const Measurement& m) { return m.candidate.member == member; }),
+                         members.at(member).size());
+    };
     std::vector<const Member*> shown;
     for (const auto& [member, list] : members) shown.push_back(&member);
     std::stable_sort(shown.begin(), shown.end(),
-                     [&](const Member* a, const Member* b) { return members.at(*a).size() > members.at(*b).size(); });
+                     [&](const Member* a, const Member* b) { return merit(*a) > merit(*b); });
     if (shown.size() > most_curves) shown.resize(most_curves);
     std::sort(shown.begin(), shown.end(), [](const Member* a, const Member* b) { return *a < *b; });
     const double until = laboratory.until();
@@ -53,7 +60,6 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
         curves +=
             fmt::format("{}{} using 1:2 {} title \"{}\"", curves.empty() ? "plot " : ", \\\n     ", name, style, title);
     };
-    std::vector<Measurement> front = pareto_front(laboratory);
     std::vector<const Measurement*> best;
     for (const Measurement& m : front)
         if (laboratory.figure(m) < 0.3 && laboratory.figure(m) > 0) best.push_back(&m);
