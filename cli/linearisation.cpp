@@ -20,9 +20,9 @@ using Eigen::VectorXd;
 template <class Real>
 using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
-constexpr int most_turns = 64;     // of angles, in search of equilibria
-constexpr int most_attempts = 30;  // to find places where all formulas have values
-constexpr int most_wide = 100;     // rows of matrices whose eigenvalues are computed to 60 digits
+constexpr int most_turns = 64;  // of angles, in search of equilibria
+constexpr int most_looks = 10;  // from 10 to 1e-8 away
+constexpr int most_wide = 100;  // rows of matrices whose eigenvalues are computed to 60 digits
 constexpr double double_rounding = 1e-13, noise_of_turning = 1e-7;  // relative: of double eigenvalues; of double roots
 
 // A force known to vanish to 1e-45 of its terms may be that of a multiple root, 1e-22 or more away.
@@ -399,20 +399,21 @@ std::vector<Equilibrium> Linearisation::equilibria(const std::vector<VectorXd>& 
 
 int Linearisation::free_directions(const VectorXd& q) {
     if (!system_.separable) return 0;
-    constexpr int looks = 3;
     Noise noise(1);
-    Matrix<Wide> pulls = Matrix<Wide>::Zero(looks * q.size(), q.size());
-    for (int look = 0, attempt = 0; look < looks; ++attempt) {
-        if (attempt > most_attempts) return 0;
+    Matrix<Wide> pulls = Matrix<Wide>::Zero(most_looks * q.size(), q.size());
+    int looks = 0;
+    for (int look = 0; look < most_looks; ++look) {
         Position near = exactly(q);
-        for (cln::cl_R& x : near) x = x + noise.next() * cln::max(cln::abs(x), cln::cl_R(1)) / (1 << attempt / looks);
+        const cln::cl_R far = cln::expt(cln::cl_RA(10), 1 - look);
+        for (cln::cl_R& x : near) x = x + noise.next() * cln::max(cln::abs(x), cln::cl_R(1)) * far;
         try {
             pulls.middleRows(look * q.size(), q.size()) =
                 dense<Wide>(at_rest(near).stiffness, VectorXd::Ones(q.size()));
-            ++look;
+            ++looks;
         } catch (const DomainError&) {
         }
     }
+    if (looks < most_looks / 2) return 0;
     for (Eigen::Index row = 0; row < pulls.rows(); ++row)
         if (const Wide most = pulls.row(row).cwiseAbs().maxCoeff(); most > Wide(0)) pulls.row(row) /= most;
     Eigen::FullPivLU<Matrix<Wide>> elimination(pulls);

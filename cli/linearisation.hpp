@@ -55,7 +55,8 @@ public:
     std::vector<Equilibrium> equilibria(const std::vector<Eigen::VectorXd>& starts);
 
     // The dimension of the space of directions along which nothing pulls, wherever the system is: along them it moves
-    // on steadily, as the centre of mass of what nothing holds. Looks near q; 0 where the mass matrix is not constant.
+    // on steadily, as the centre of mass of what nothing holds. Looks near and far from q; 0 where the mass matrix is
+    // not constant.
     int free_directions(const Eigen::VectorXd& q);
 
 private:

@@ -215,11 +215,10 @@ std::string StepJudge::Judgement::text() const {
 std::string StepJudge::loss(const Judgement& judgement, const TrajectoryRequest& request,
                             const TrajectoryResult& result) {
     return fmt::format(
-        "the run is wrong, at its end at the latest, t = {:.6g}, q = {}, p = {}: its error is estimated as large as "
-        "the "
-        "motion itself, and the step is beyond the stability of the method: h omega = {:.3g} is more than {:.4g}, "
-        "omega "
-        "the largest frequency met. Try a smaller step, such as h = {:.6g}, or Gauss, which has no limit.",
+        "the run is wrong somewhere on its way to its end, t = {:.6g}, q = {}, p = {}: its error is estimated as large "
+        "as the motion itself, and the step is beyond the first limit of linear stability: h omega = {:.3g} is more "
+        "than {:.4g}, omega the largest frequency met. Try a smaller step, such as h = {:.6g}, or Gauss, which has no "
+        "limit.",
         result.time, list_text(result.q), list_text(result.p), judgement.radians, judgement.limit,
         request.step * judgement.limit / judgement.radians / 2);
 }

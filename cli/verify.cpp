@@ -115,9 +115,8 @@ Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& 
         result = there_and_back(kernel, start.parameters, start.q, start.p, start.step, steps, symplectic);
         if (result.rounding < 1e-6) break;
     }
-    Row row =
-        at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
-                "the step is not its own inverse with -h, or too long for this motion: it jumps over a singularity");
+    Row row = at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
+                      "the step is not its own inverse with -h, or so long that it jumps over a singularity");
     if (result.rests && row.holds) {
         row.bound = "at rest";
     } else if (!(result.rounding < 1e-6)) {

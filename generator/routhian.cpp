@@ -30,7 +30,7 @@ bool has_value_at_rest(const System& system, const std::vector<int>& cyclic) {
         for (const ex& term : system.terms) at_rest(term, system, cyclic);
         for (const ex& momentum : system.momentum) at_rest(momentum, system, cyclic);
         return true;
-    } catch (const GiNaC::pole_error&) {  // however small, a term that is infinite there
+    } catch (const std::domain_error&) {  // however small, a term that is infinite there, or 0^0
         return false;
     }
 }
@@ -38,15 +38,11 @@ bool has_value_at_rest(const System& system, const std::vector<int>& cyclic) {
 // The signs of the pivots of a symmetric matrix, row by row, c x c; 0 from the first on that vanishes.
 std::vector<int> pivot_signs(const std::vector<Sized>& entries, std::size_t c) {
     std::vector<cln::cl_R> values;
-    cln::cl_R size = 0;
-    for (const Sized& entry : entries) {
-        values.push_back(entry.value);
-        size = cln::max(size, entry.size);
-    }
+    for (const Sized& entry : entries) values.push_back(entry.value);
     std::vector<int> signs(c, 0);
     for (std::size_t k = 0; k < c; ++k) {
         const cln::cl_R& pivot = values[k * c + k];
-        if (Sized{pivot, size}.vanishes()) break;
+        if (Sized{pivot, entries[k * c + k].size}.vanishes()) break;
         signs[k] = pivot > 0 ? 1 : -1;
         for (std::size_t i = k + 1; i < c; ++i)
             for (std::size_t j = k + 1; j < c; ++j)
@@ -102,7 +98,7 @@ std::vector<int> find_cyclic(const Scene& scene, const System& system) {
     // A force may still hold a cyclic velocity; then its coordinate stays.
     if (cyclic.size() > most_cyclic) cyclic.resize(most_cyclic);
     if (static_cast<int>(cyclic.size()) == system.n) cyclic.pop_back();
-    if (!has_value_at_rest(system, cyclic) || !has_definite_inertia(scene, system, cyclic)) return {};
+    if (cyclic.empty() || !has_value_at_rest(system, cyclic) || !has_definite_inertia(scene, system, cyclic)) return {};
     return cyclic;
 }
 

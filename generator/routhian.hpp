@@ -7,8 +7,9 @@
 namespace lobatto {
 
 // The coordinates that neither L nor any force holds, whose velocities occur at most squared: each momentum is
-// constant, and its velocity follows from it in closed form. At most three are taken out, never all; none where their
-// part of the mass matrix is not definite: it might be singular somewhere, though the whole is not.
+// constant, and its velocity follows from it in closed form. At most three are taken out, never all; none where L
+// has no value at rest, or their part of the mass matrix is not definite: it might be singular somewhere, though the
+// whole is not.
 std::vector<int> find_cyclic(const Scene& scene, const System& system);
 
 // R(v, q, P) = L - sum P v over the cyclic ones (D29), and its derivatives.

@@ -236,7 +236,7 @@ private:
         linearity();
         find("cyclic coordinates", !cyclic.empty(),
              cyclic.empty()
-                 ? "every coordinate itself occurs, or its velocity more than squared, or its mass has no sign"
+                 ? "every coordinate itself occurs, or its velocity more than squared, or its mass may vanish"
                  : names(cyclic) +
                        ": L holds only the velocity, so the momentum is constant and the motion "
                        "follows from it without equations");

@@ -365,7 +365,7 @@ System build_system(const Scene& scene) {
         try {
             at_zero = all_at(system.momentum, system.v, 0);
             all_at({system.lagrangian}, system.v, 0);
-        } catch (const GiNaC::pole_error&) {  // however small, a term that is infinite at rest
+        } catch (const std::domain_error&) {  // however small, a term that is infinite at rest, or 0^0
             reason("the Lagrangian has no value at rest");
             at_zero.clear();
         }

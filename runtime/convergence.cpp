@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "runtime/error.hpp"
+#include "runtime/extent.hpp"
 
 namespace lobatto {
 
@@ -50,39 +51,45 @@ std::optional<States> states_with(LoadedStepper<Quadruple>& stepper, const Quadr
     return states;
 }
 
+Extent<Quadruple> extent_of(const States& states, const QuadrupleStart& start) {
+    const std::size_t n = start.q.size();
+    Extent<Quadruple> extent(n);
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        const std::size_t k = i % (2 * n);
+        extent.take(k, k < n ? start.q[k] : start.p[k - n], states[i]);
+    }
+    return extent;
+}
+
+Quadruple most(const States& values, std::size_t block) {
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(block);
+    return *std::max_element(begin, begin + std::ssize(values) / 2);
+}
+
 // The largest error of the positions relative to the farthest that one moves, or of the momenta likewise.
 double error_of(const States& states, const States& reference, const QuadrupleStart& start) {
     const std::size_t n = start.q.size();
+    const Extent<Quadruple> extent = extent_of(reference, start);
     double worst = 0;
-    for (const bool momenta : {false, true}) {
-        Quadruple error = 0, range = 0;
-        for (std::size_t i = 0; i < states.size(); ++i) {
-            if ((i / n % 2 == 1) != momenta) continue;
-            const Quadruple from = momenta ? start.p[i % n] : start.q[i % n];
-            range = std::max(range, size(reference[i] - from));
-            error = std::max(error, size(states[i] - reference[i]));
-        }
-        if (range > 0) worst = std::max(worst, static_cast<double>(error / range));
+    for (const std::size_t block : {std::size_t(0), n}) {
+        if (!extent.moves(block)) continue;
+        Quadruple error = 0;
+        for (std::size_t i = 0; i < states.size(); ++i)
+            if (i / n % 2 == block / n) error = std::max(error, size(states[i] - reference[i]));
+        worst = std::max(worst, static_cast<double>(error / most(extent.range, block)));
     }
     return worst;
 }
 
 // What rounding alone may put into error_of: that of the reference's steps, relative to the farthest moved.
 double rounding_error(const States& reference, const QuadrupleStart& start, int reference_ratio) {
-    const std::size_t n = start.q.size();
+    const Extent<Quadruple> extent = extent_of(reference, start);
     const int steps = coarse_steps * reference_ratio;
     double worst = least_error;
-    for (const bool momenta : {false, true}) {
-        Quadruple largest = 0, range = 0;
-        for (std::size_t i = 0; i < reference.size(); ++i) {
-            if ((i / n % 2 == 1) != momenta) continue;
-            const Quadruple from = momenta ? start.p[i % n] : start.q[i % n];
-            range = std::max(range, size(reference[i] - from));
-            largest = std::max({largest, size(reference[i]), size(from)});
-        }
-        if (range > 0)
-            worst = std::max(worst, std::ldexp(roundings * steps, -113) * static_cast<double>(largest / range));
-    }
+    for (const std::size_t block : {std::size_t(0), start.q.size()})
+        if (extent.moves(block))
+            worst = std::max(worst, std::ldexp(roundings * steps, -113) *
+                                        static_cast<double>(most(extent.largest, block) / most(extent.range, block)));
     return worst;
 }
 

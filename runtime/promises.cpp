@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "runtime/error.hpp"
+#include "runtime/extent.hpp"
 #include "runtime/trajectory.hpp"
 
 namespace lobatto {
@@ -77,7 +78,8 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
     LoadedStepper<real> stepper(kernel);
     const std::size_t n = q.size(), rows = 2 * n;
     const std::vector<real> start = joined(q, p);
-    std::vector<real> position = q, momentum = p, range(rows, real(0)), largest(rows, real(0)), q1, p1, T;
+    std::vector<real> position = q, momentum = p, q1, p1, T;
+    Extent<real> extent(n);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
         throw ComputationError("the motion cannot be reversed: the kernel refuses the scene's values");
     // What the way back from each state makes of a disturbance there: the inverse of the flow's derivative F, for a
@@ -102,10 +104,7 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
             returns.push_back(flow);
         }
         const std::vector<real> here = joined(position, momentum);
-        for (std::size_t i = 0; i < rows; ++i) {
-            range[i] = std::max(range[i], size(here[i] - start[i]));
-            largest[i] = std::max({largest[i], size(here[i]), size(start[i])});
-        }
+        for (std::size_t i = 0; i < rows; ++i) extent.take(i, start[i], here[i]);
     }
     if (result.steps == 0) throw ComputationError("the motion cannot be reversed: its first step fails");
 
@@ -130,18 +129,19 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
     const auto most_of = [n](const std::vector<real>& positions) {
         return *std::max_element(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(n));
     };
-    result.rests = most_of(range) < real(1e-8) * most_of(largest);
+    result.rests = most_of(extent.range) < real(1e-8) * most_of(extent.largest);
     // Rounding in component j, anywhere on the way, comes back to component i through these.
     for (const std::size_t block : {std::size_t(0), n}) {
+        if (!extent.moves(block)) continue;
         real moved = 0, missed = 0, growth = 0;
         for (std::size_t i = block; i < block + n; ++i) {
-            moved = std::max(moved, range[i]);
+            moved = std::max(moved, extent.range[i]);
             missed = std::max(missed, size(end[i] - start[i]));
-            growth = std::max(growth, largest[i]);
+            growth = std::max(growth, extent.largest[i]);
             for (const std::vector<real>& back : returns)
-                for (std::size_t j = 0; j < rows; ++j) growth = std::max(growth, size(back[i * rows + j]) * largest[j]);
+                for (std::size_t j = 0; j < rows; ++j)
+                    growth = std::max(growth, size(back[i * rows + j]) * extent.largest[j]);
         }
-        if (!(moved > 0)) continue;
         constexpr double roundings = 64;  // of a step, all the same way; measured: 0.8 on the linear oscillator, 53 on
                                           // 16 coordinates
         result.distance = std::max(result.distance, static_cast<double>(missed / moved));
@@ -185,7 +185,7 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
     for (std::size_t i = 0; i < rows; ++i) {
         real given = 0;
         for (std::size_t j = 0; j < rows; ++j) given = std::max(given, size(T[i * rows + j]) * own[j]);
-        if (own[i] < real(1e-20) * given) {
+        if (own[i] < real(1e-12) * given) {
             sizes[i] = given;
             shifts[i] = std::max(shifts[i], real(1e-14) * given);
         }
@@ -210,13 +210,17 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
         const real other = ordinary[block / n];
         if (most(sizes, block) < real(1e-20) * other)
             for (std::size_t i = block; i < block + n; ++i) sizes[i] = other, shifts[i] = real(1e-14) * other;
-        // For a component that rests, or nearly, at zero.
+        // For a component that rests at zero.
         const real most_size = most(sizes, block) > 0 ? most(sizes, block) : real(1),
                    most_shift =
                        std::min(most(shifts, block) > 0 ? most(shifts, block) : real(1), real(1e-6) * most_size);
         for (std::size_t i = block; i < block + n; ++i) {
-            if (!(sizes[i] > 0)) sizes[i] = most_size;
-            shifts[i] = std::max(shifts[i], real(1e-4) * most_shift);
+            if (sizes[i] > 0) {
+                shifts[i] = std::max(shifts[i], real(1e-14) * sizes[i]);
+            } else {
+                sizes[i] = most_size;
+                shifts[i] = std::max(shifts[i], real(1e-4) * most_shift);
+            }
         }
     }
     double defect = 0;
@@ -232,9 +236,9 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             stepper.state(time, q, p);
             return joined(q, p);
         };
-        // The better of two shifts: truncation spoils the first where the motion is violent, rounding the second.
+        // The best of three shifts: truncation spoils the first where the motion is violent, rounding the last.
         real best = -1;
-        for (const real e : {shifts[j], shifts[j] / 1000}) {
+        for (const real e : {30 * shifts[j], shifts[j], shifts[j] / 1000}) {
             const std::vector<real> f1 = image(e), b1 = image(-e), f2 = image(2 * e), b2 = image(-2 * e);
             real largest = 0, difference = 0;
             for (std::size_t i = 0; i < rows; ++i) {

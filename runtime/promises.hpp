@@ -25,8 +25,8 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
                       const std::vector<real>& p, real step, std::int64_t steps, bool symplectic = true);
 
 // |T d - D(d)| relative to |T d|, entries relative to the size of their component, over all 2n directions d, where D is
-// the difference (8 (step(z + e d) - step(z - e d)) - (step(z + 2e d) - step(z - 2e d))) / 12e, and e is 1e-6 or 1e-9
-// of what the component moves in the step, whichever agrees better: whether the tangent map is the derivative of the
+// the difference (8 (step(z + e d) - step(z - e d)) - (step(z + 2e d) - step(z - 2e d))) / 12e, and e is 3e-5, 1e-6 or
+// 1e-9 of what the component moves in the step, whichever agrees best: whether the tangent map is the derivative of the
 // step. Both errors are below 1e-18.
 double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step);
 

@@ -87,7 +87,7 @@ TEST_CASE("check says what it found, what that saves, and what it looked for in 
 TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
     const test::TemporaryFolder folder;
     const auto kind = [&](const std::string& lagrangian, const std::string& more = "") {
-        const std::string two = "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0.5 }\n";
+        const std::string two = "x = { position = 1, velocity = 0.1 }\ny = { position = 0, velocity = 0.5 }\n";
         return report_of(temporary_scene(folder, lagrangian, two, more)).at("kind").get<std::string>();
     };
     CHECK(kind("(x'^2 + y'^2)/2 - x^4 - y^4") == "Kinetic minus potential energy, with constant masses.");
@@ -98,6 +98,8 @@ TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
     CHECK(kind("(x'^2 + y'^2)/2 + x*y' - y*x'") ==
           "Quadratic in the velocities, with constant masses, and terms linear in them, as of magnetic fields and "
           "rotating frames.");
+    // No value at rest.
+    CHECK(kind("y'^2/2 + (1 + y^2)*x'^2/2 - 1e-70/x'") == "Not quadratic in the velocities, as in relativity.");
     CHECK(kind("-sqrt(1 - x'^2 - y'^2) - x^2") == "Not quadratic in the velocities, as in relativity.");
     CHECK(
         report_of(scene_path("driven_damped_pendulum")).at("kind") ==

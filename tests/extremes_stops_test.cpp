@@ -97,7 +97,7 @@ const Extremes table(
                  run_of("6.2", "1000"),
                  {"a step multiplies the motion by 2.9"},
                  -1}),
-        stopped("stiff pendulum driven in time, h omega = 3.2: just beyond the limit",
+        stopped("stiff pendulum driven in time, h omega = 3.2: beyond the first limit",
                 "beyond stability, by the frequency met and the estimated error",
                 {"q'^2/2 + 100*cos(q) + 5*q*sin(t)\"\ntime = \"t",
                  "q = { position = 0.1, velocity = 0 }",

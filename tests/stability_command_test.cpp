@@ -179,6 +179,10 @@ TEST_CASE("what the linear part, the limit or a measurement cannot tell is said"
         stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y) - (x + y)^4",
                             "x = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }")});
     CHECK(contains(held.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
+    const test::Finished trapped =
+        stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y) - (x + y)^4*exp(-1e5*(x + y)^2)",
+                            "x = { position = 0.001, velocity = 0 }\ny = { position = 0, velocity = 0 }")});
+    CHECK(contains(trapped.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
     // On the limit itself states grow in proportion to the number of steps.
     const std::string oscillator = scene_in(folder, "q'^2/2 - q^2/2", q);
     CHECK(contains(stability({oscillator, "--points", "2", "--step", "2"}).out,

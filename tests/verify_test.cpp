@@ -14,9 +14,10 @@ Finished verify(const std::vector<std::string>& arguments) {
     return run(command);
 }
 
-std::string scene_text(const std::string& lagrangian, const std::string& coordinates, const std::string& step) {
+std::string scene_text(const std::string& lagrangian, const std::string& coordinates, const std::string& step,
+                       const std::string& until = "10") {
     return "title = \"Test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" + coordinates +
-           "\n[method]\nfamily = \"lobatto\"\npoints = 4\n[run]\nstep = " + step + "\nuntil = 10\n";
+           "\n[method]\nfamily = \"lobatto\"\npoints = 4\n[run]\nstep = " + step + "\nuntil = " + until + "\n";
 }
 
 bool contains(const std::string& text, const std::string& part) {
@@ -86,13 +87,29 @@ TEST_CASE("correct code passes at rest, far from zero and near it, and where ene
         CHECK(!contains(result.out, "FAILED"));
         CHECK(contains(result.out, motion.says));
     }
-    // Rounding alone moves the radius of a circular orbit.
-    write_text(folder / "circle.toml",
-               scene_text("(r'^2 + r^2*a'^2)/2 + 1/r",
-                          "r = { position = 1, velocity = 0 }\na = { position = 0, velocity = 1 }", "0.1"));
-    const Finished circle = verify({(folder / "circle.toml").string()});
-    INFO(circle.out << circle.err);
-    CHECK(circle.exit_code == 0);
+    // The mass of x by itself is 0. Rounding alone moves the radius of a circular orbit, in any units, and the angle of
+    // a conical pendulum.
+    struct Scene {
+        const char *lagrangian, *coordinates, *step, *until = "10";
+    };
+    for (const Scene& scene : std::vector<Scene>{
+             {"x'*y' + x'*y^2 - y^3", "x = { position = 1, velocity = 0.3 }\ny = { position = 0.5, velocity = 1 }",
+              "0.1"},
+             {"(r'^2 + r^2*a'^2)/2 + 1/r", "r = { position = 1, velocity = 0 }\na = { position = 0, velocity = 1 }",
+              "0.1"},
+             {"(r'^2 + r^2*a'^2)/2 + 1/r",
+              "r = { position = 2, velocity = 0 }\na = { position = 0, velocity = \"2^(-3/2)\" }", "0.1"},
+             {"9.1e-31*(r'^2 + r^2*a'^2)/2 + 2.3e-28/r",
+              "r = { position = 5.3e-11, velocity = 0 }\na = { position = 0, velocity = "
+              "\"sqrt(2.3e-28/9.1e-31/5.3e-11^3)\" }",
+              "1e-18", "1e-17"},
+             {"(b'^2 + sin(b)^2*a'^2)/2 + cos(b)",
+              "b = { position = \"pi/3\", velocity = 0 }\na = { position = 0, velocity = \"sqrt(2)\" }", "0.1"}}) {
+        write_text(folder / "scene.toml", scene_text(scene.lagrangian, scene.coordinates, scene.step, scene.until));
+        const Finished result = verify({(folder / "scene.toml").string()});
+        INFO(result.out << result.err);
+        CHECK(result.exit_code == 0);
+    }
 }
 
 TEST_CASE("a check that fails ends with exit code 3, the check's name and what it means") {
