@@ -265,6 +265,7 @@ void sweep(const SweepOptions& options) {
     request.sink = [&](const EnsembleTrajectory& trajectory) {
         const bool departs = trajectory.status == LOBATTO_OK && watch.departs(trajectory);
         departures += departs ? 1 : 0;
+        if (trajectory.status == LOBATTO_OK) watch.look(trajectory);
         const int status = departs ? departed : trajectory.status;
         write(table, scene, grid, request, trajectory, status);
         if (status == LOBATTO_OK || failures.size() == failures_told) return;
@@ -280,6 +281,8 @@ void sweep(const SweepOptions& options) {
         result = integrate(kernel, request);
     }
     table.finish();
+    if (const std::string warning = watch.warning(); !warning.empty())
+        fmt::print(stderr, "lobatto: warning: {}.\n", warning);
 
     if (!options.quiet) {
         fmt::print("{}: kernel {}\n", scene.path, source.digest);

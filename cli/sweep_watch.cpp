@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/sweep_watch.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "cli/energy_watch.hpp"
+#include "cli/stability_limit.hpp"
+#include "runtime/frequency.hpp"
 
 namespace lobatto {
 
 namespace {
 
 constexpr double doubtful = 0.5;  // of the kinetic energy
+constexpr int most_looks = 1000;
+constexpr std::size_t most_coordinates = 64;
 
 // H(q, p) - H(q, at rest); 0 where there is none.
 double kinetic_energy(const LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
@@ -34,14 +40,50 @@ SweepWatch::SweepWatch(const Derivation& derivation, const Kernel& kernel, const
 
 bool SweepWatch::departs(const EnsembleTrajectory& trajectory) {
     if (!watches_ || trajectory.energy_error_largest == 0) return false;
-    request_.start(trajectory.index, start_);
-    if (stepper_.prepare(start_.parameters, request_.step) != LOBATTO_OK) return false;
-    p_ = request_.from_velocities ? stepper_.momentum(request_.time, start_.q, start_.rate) : start_.rate;
+    if (!prepare(trajectory)) return false;
     const double* const row = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns;
     const double* const middle = row + 1 + start_.q.size();
     const double kinetic = std::max(kinetic_energy(stepper_, request_.time, start_.q, p_),
                                     kinetic_energy(stepper_, row[0], {row + 1, middle}, {middle, middle + p_.size()}));
     return !(trajectory.energy_error_largest < doubtful * kinetic) && run_again();
+}
+
+bool SweepWatch::prepare(const EnsembleTrajectory& trajectory) {
+    request_.start(trajectory.index, start_);
+    if (stepper_.prepare(start_.parameters, request_.step) != LOBATTO_OK) return false;
+    p_ = request_.from_velocities ? stepper_.momentum(request_.time, start_.q, start_.rate) : start_.rate;
+    return true;
+}
+
+void SweepWatch::look(const EnsembleTrajectory& trajectory) {
+    const std::size_t n = derivation_.system.q.size();
+    if (n > most_coordinates || looks_ == most_looks || !prepare(trajectory)) return;
+    ++looks_;
+    const double* const row = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns;
+    const std::vector<double> q(row + 1, row + 1 + n), p(row + 1 + n, row + 1 + 2 * n);
+    std::vector<double> scale;
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+        const double size = std::max(std::fabs(i < n ? start_.q[i] : p_[i - n]), std::fabs(row[1 + i]));
+        scale.push_back(size > 0 && std::isfinite(size) ? size : 1);
+    }
+    for (const double omega : {largest_frequency(stepper_, request_.time, start_.q, p_, scale),
+                               largest_frequency(stepper_, row[0], q, p, scale)})
+        if (const double radians = std::fabs(request_.step) * omega; radians > radians_) {
+            radians_ = radians;
+            trajectory_ = trajectory.index;
+        }
+}
+
+std::string SweepWatch::warning() const {
+    const double limit = radians_ > 0 ? stability_limit(derivation_.quadrature, radians_) : radians_;
+    if (!(radians_ > limit)) return "";
+    return fmt::format(
+        "the step is beyond the linear stability limit, at most in trajectory {}: h omega = {:.3g} is more than "
+        "{:.4g}, "
+        "omega the largest frequency at starts and ends. Take a step below {:.2g} times this one, or Gauss, which has "
+        "no "
+        "limit",
+        trajectory_, radians_, limit, limit / radians_);
 }
 
 bool SweepWatch::run_again() {

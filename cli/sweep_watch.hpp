@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Whether the trajectories of a sweep stayed with their Lagrangian, as EnergyWatch tells it of a run.
+// Whether the trajectories of a sweep stayed with their Lagrangian, as EnergyWatch tells it of a run; and whether their
+// steps lie beyond the linear stability limit.
 #pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
 
 #include "generator/pipeline.hpp"
 #include "runtime/ensemble.hpp"
@@ -15,8 +20,15 @@ public:
     // kinetic energies of both ends leave that open are run once more by themselves.
     bool departs(const EnsembleTrajectory& trajectory);
 
+    // Looks for the largest frequency at the start and at the last kept state; of the first 1000 trajectories, of up to
+    // 64 coordinates.
+    void look(const EnsembleTrajectory& trajectory);
+    // Of the steps looked at, as a sentence; empty where none is beyond the limit.
+    std::string warning() const;
+
 private:
     bool run_again();
+    bool prepare(const EnsembleTrajectory& trajectory);
 
     const Derivation& derivation_;
     const EnsembleRequest& request_;
@@ -25,6 +37,9 @@ private:
     LoadedStepper<double> stepper_;
     EnsembleStart start_;
     std::vector<double> p_;  // of the start
+    int looks_ = 0;
+    double radians_ = 0;  // h omega, the largest met
+    std::int64_t trajectory_ = 0;
 };
 
 }  // namespace lobatto

@@ -394,6 +394,15 @@ TEST_CASE("trajectories that leave their Lagrangian are told from those that sta
     const test::Finished sprung = place.sweep({scene, "--vary", "x=0.5,1,1.5", "--vary", "l=0.1,1,1000"});
     CHECK(sprung.exit_code == 0);
     CHECK(sprung.err.empty());
+    // No energy is kept that would tell; the step does.
+    test::write_text(scene,
+                     "title = \"D\"\ntime = \"t\"\nlagrangian = \"q'^2/2 + 100*cos(q) + 5*q*sin(t)\"\n[coordinates]\n"
+                     "q = { position = 0.1, velocity = 0 }\n[method]\npoints = 4\n[run]\nstep = 0.32\nuntil = 40\n");
+    const test::Finished driven = place.sweep({scene, "--vary", "q=0.1,0.2"});
+    CHECK(driven.exit_code == 0);
+    CHECK(contains(driven.err,
+                   "lobatto: warning: the step is beyond the linear stability limit, at most in trajectory "));
+    CHECK(place.sweep({scene, "--vary", "q=0.1,0.2", "--step", "0.16"}).err.empty());
 }
 
 TEST_CASE("the step and the end are the same for all, and it is said when a varied parameter stands in them") {
