@@ -179,8 +179,21 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
     for (std::size_t i = 0; i < terms.size(); ++i) sort_in(terms[i], -1, i);
     for (std::size_t i = 0; i < forces.size(); ++i) sort_in(forces[i].second, forces[i].first, terms.size() + i);
 
+    // How far the variables of a row are from its first. Rows of the same distances stand together, most of them first,
+    // so that runs of neighbours are long: those of a ring are one run and the row that closes it.
+    const auto distances = [](const Row& row) {
+        std::vector<int> result;
+        for (const int variable : row.leaves.variables) result.push_back(variable - row.leaves.variables.front());
+        return result;
+    };
+    std::map<std::vector<int>, std::size_t> as_far;  // rows of one family, by distances
     // NOTE: the order of a sum's terms changes from process to process; that of variables and of values does not.
     const auto comes_before = [&](const Row& a, const Row& b) {
+        const std::vector<int> far_a = distances(a), far_b = distances(b);
+        if (far_a != far_b) {
+            const std::size_t many_a = as_far.at(far_a), many_b = as_far.at(far_b);
+            return many_a != many_b ? many_a > many_b : far_a < far_b;
+        }
         if (a.leaves.variables != b.leaves.variables) return a.leaves.variables < b.leaves.variables;
         return std::lexicographical_compare(a.leaves.coefficients.begin(), a.leaves.coefficients.end(),
                                             b.leaves.coefficients.begin(), b.leaves.coefficients.end(),
@@ -191,6 +204,8 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
     for (auto& [key, family] : families) {
         const int target = family.first;
         std::vector<Row>& rows = family.second;
+        as_far.clear();
+        for (const Row& row : rows) ++as_far[distances(row)];
         std::stable_sort(rows.begin(), rows.end(), comes_before);
         if (rows.size() < fewest_rows) {
             for (const Row& row : rows) {
@@ -277,6 +292,21 @@ bool are_neighbours(const Elements& elements) {
         }
     }
     return rows > 0 && 4 * in_runs >= 3 * rows;
+}
+
+int row_reach(const Elements& elements) {
+    int reach = 0;
+    for (const Element& element : elements.repeated) {
+        if (element.x.empty()) continue;
+        for (const RowRun& run : runs_of(element)) {
+            if (run.count < static_cast<int>(fewest_rows)) continue;
+            const std::vector<int>& row = element.rows[static_cast<std::size_t>(run.begin)];
+            const auto [least, most] = std::minmax_element(row.begin(), row.end());
+            if (*least != 0) return -1;
+            reach = std::max(reach, *most);
+        }
+    }
+    return reach;
 }
 
 }  // namespace lobatto

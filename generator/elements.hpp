@@ -34,6 +34,8 @@ struct RowRun {
 std::vector<RowRun> runs_of(const Element& element);
 // Whether most rows of all formulas stand in long runs, with the same distances between the variables of a row.
 bool are_neighbours(const Elements& elements);
+// How far the rows of long runs reach from the first coordinate, where all of them begin; -1 where some do not.
+int row_reach(const Elements& elements);
 
 // The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
 Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,

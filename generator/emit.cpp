@@ -295,11 +295,18 @@ private:
         std::vector<std::pair<std::string, const char*>> parameters{
             {any ? "const CoefficientsOf<given>&" : "const Coefficients&", "k"}};
         if (declaration.takes_time && !d_.system.autonomous) parameters.emplace_back(type("real"), "time");
-        for (const auto& [of, parameter] : declaration.parameters) parameters.emplace_back(type(of), parameter);
+        if (takes_how(declaration)) {
+            parameters.emplace_back("const Position", "q");
+            parameters.emplace_back("const Slope", "W");
+        } else {
+            for (const auto& [of, parameter] : declaration.parameters) parameters.emplace_back(type(of), parameter);
+        }
         return "\n" + wrapped(std::string("    // ") + declaration.comment, "    //     ") +
-               (any ? fmt::format("    template <{}class given, class number>\n",
-                                  takes_how(declaration) ? "class how = lobatto::OneByOne, " : "")
-                    : "") +
+               (takes_how(declaration)
+                    ? "    template <class how = lobatto::OneByOne, class given, class Position, "
+                      "class Slope,\n              class number = lobatto::element_of<Position>>\n    LOBATTO_INLINE\n"
+                : any ? "    template <class given, class number>\n"
+                      : "") +
                signature(type(declaration.result), declaration.program, parameters, text) + text + "    }\n";
     }
 

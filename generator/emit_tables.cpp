@@ -45,6 +45,9 @@ std::string separable_shapes(const Structure& structure, int nodes, Precision pr
         line(text, fmt::format("bool neighbours = {}", structure.neighbours && has_lanes(precision)),
              structure.neighbours ? "formulas go along neighbouring coordinates, which lie in lanes"
                                   : "coordinates are taken one by one");
+        if (structure.neighbours && has_lanes(precision))
+            line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
+                 "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
         line(text, fmt::format("bool clean = {}", structure.clean),
              structure.clean ? "round-off-clean steps" : "steps as fast as can be");
         line(text, fmt::format("bool absorbed = {}", structure.absorbed),

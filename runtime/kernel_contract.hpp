@@ -109,6 +109,10 @@ struct Formulas {
     }
 };
 
+// What an array of coordinates, a pointer or anything with [], holds.
+template <class Array>
+using element_of = std::decay_t<decltype(std::declval<const Array&>()[0])>;
+
 // Whether K's steps are those of kernel_clean.hpp.
 template <class K>
 constexpr bool is_clean() {

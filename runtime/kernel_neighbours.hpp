@@ -44,6 +44,63 @@ struct Rows {
 // Shorter runs of rows are not worth a Pack.
 constexpr int long_run = 8;
 
+// The coordinates of one node in registers, a Pack of neighbours each; beyond the last there are zeros.
+template <class V, int parts>
+struct Registers {
+    using real = real_of<V>;
+    V* part;
+
+    LOBATTO_INLINE real operator[](int place) const { return part[place / lanes_of<V>][place % lanes_of<V>]; }
+    LOBATTO_INLINE void add(int place, real x) const {
+        V one = V(real(0));
+        one.set(place % lanes_of<V>, x);
+        part[place / lanes_of<V>] += one;
+    }
+};
+
+// A V of an array of coordinates: those from `at` on, a multiple of V's lanes where they are in registers.
+template <class V, class number>
+LOBATTO_INLINE V load_from(const number* array, int at) {
+    if constexpr (std::is_same_v<V, number>)
+        return array[at];
+    else
+        return V::load(array + at);
+}
+template <class V, int parts>
+LOBATTO_INLINE V load_from(Registers<V, parts> array, int at) {
+    return at < parts * lanes_of<V> ? array.part[at / lanes_of<V>] : V(real_of<V>(0));
+}
+template <class V, class number>
+LOBATTO_INLINE void store_to(number* array, int at, const V& value) {
+    if constexpr (std::is_same_v<V, number>)
+        array[at] = value;
+    else
+        value.store(array + at);
+}
+template <class V, int parts>
+LOBATTO_INLINE void store_to(Registers<V, parts> array, int at, const V& value) {
+    if (at < parts * lanes_of<V>) array.part[at / lanes_of<V>] = value;
+}
+template <class number>
+LOBATTO_INLINE void add_to(number* array, int place, const number& x) {
+    array[place] += x;
+}
+template <class V, int parts>
+LOBATTO_INLINE void add_to(Registers<V, parts> array, int place, real_of<V> x) {
+    array.add(place, x);
+}
+template <class Array>
+constexpr bool are_registers = false;
+template <class V, int parts>
+constexpr bool are_registers<Registers<V, parts>> = true;
+
+// f(0), f(width), ... up to `count`, which the compiler knows, each written out.
+template <int width, class F>
+LOBATTO_INLINE void written_out(int count, const F& f) {
+#pragma GCC unroll 32
+    for (int at = 0; at < count; at += width) f(at);
+}
+
 // Going through rows of formulas. `indices` has the `variables` of each row; a run is rows whose variables are those of
 // the row before plus one. All runs of more than one row have the same distances between the variables of a row.
 template <int variables, const auto& indices>
@@ -65,88 +122,96 @@ struct RowLoop {
     // Adds to W (or sets it) what `count` rows from `begin` on give, as many at a time as V has lanes for them. What
     // variable j receives belongs offset(j) places behind what the first receives: those lanes move on from one V to
     // the next, so that each place of W is written once. Those that are far away are added where they belong.
-    template <class V, bool adds, class number, class Formula>
-    LOBATTO_INLINE static void run(int begin, int count, const number* q, number* W, const Formula& formula) {
-        constexpr bool in_lanes = !std::is_same_v<V, number>;
+    template <class V, bool adds, class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void run(int begin, int count, Position q, Slope W, const Formula& formula) {
+        using number = real_of<V>;
+        constexpr bool in_lanes = !std::is_same_v<V, element_of<Position>>;
         constexpr int width = in_lanes ? lanes_of<V> : 1;
-        const auto load = [](const number* from) LOBATTO_FORMULA {
-            if constexpr (in_lanes)
-                return V::load(from);
-            else
-                return *from;
-        };
-        const auto store = [](const V& value, number* to) LOBATTO_FORMULA {
-            if constexpr (in_lanes)
-                value.store(to);
-            else
-                *to = value;
-        };
         constexpr std::make_integer_sequence<int, variables> every{};
         const int first = indices[begin * variables] + least();
-        q += first;
-        W += first;
-        V before[variables];
-        for (int j = 0; j < variables; ++j) before[j] = V(real_of<number>(0));
-        int r = 0;
-        const auto add = [&](auto is_whole) LOBATTO_FORMULA {
+        V before[variables], here = load_from<V>(q, first);
+        for (int j = 0; j < variables; ++j) before[j] = V(number(0));
+        const auto add = [&](int r, auto is_whole) LOBATTO_FORMULA {
+            const int at = first + r;
             Rows<V, variables, in_lanes> rows;
             rows.row = begin + r;
             rows.count = is_whole ? width : count - r;
-            each(every, [&](auto j) LOBATTO_FORMULA { rows.x[j] = load(q + offset(j) + r); });
+            V there = here;  // the next, where a row reaches into it
+            if constexpr (farthest_within(width) > 0) there = load_from<V>(q, at + width);
+            each(every, [&](auto j) LOBATTO_FORMULA {
+                if constexpr (offset(j) > width)
+                    rows.x[j] = load_from<V>(q, at + offset(j));
+                else
+                    rows.x[j] = further<width, offset(j)>(here, there);
+            });
+            here = there;
             formula(rows);
-            V sum = adds ? load(W + r) : V(real_of<number>(0));
+            V sum = adds ? load_from<V>(W, at) : V(number(0));
             each(every, [&](auto j) LOBATTO_FORMULA {
                 V& result = rows.result[j];
                 if constexpr (in_lanes) {
                     if constexpr (!is_whole) result = first_lanes(result, count - r);
                 }
                 if constexpr (offset(j) > width)
-                    store(load(W + offset(j) + r) + result, W + offset(j) + r);
+                    store_to(W, at + offset(j), load_from<V>(W, at + offset(j)) + result);
                 else if constexpr (!adds && j == 0)
                     sum = passed_on<width, offset(j)>(before[j], result);
                 else
                     sum += passed_on<width, offset(j)>(before[j], result);
                 before[j] = result;
             });
-            store(sum, W + r);
-            r += width;
+            store_to(W, at, sum);
         };
-        while (r + width <= count) add(std::true_type());
+        const int whole = count / width * width;
+        if constexpr (are_registers<Position>)
+            written_out<width>(whole, [&](int r) LOBATTO_FORMULA { add(r, std::true_type()); });
+        else
+            for (int r = 0; r < whole; r += width) add(r, std::true_type());
+        int behind = whole;
         if constexpr (in_lanes) {
-            if (r < count) add(std::false_type());
+            if (whole < count) {
+                add(whole, std::false_type());
+                behind += width;
+            }
         }
-        if (r < count + farthest_within(width)) {
-            V sum = adds ? load(W + r) : V(real_of<number>(0));
+        if (behind < count + farthest_within(width)) {
+            V sum = adds ? load_from<V>(W, first + behind) : V(number(0));
             each(every, [&](auto j) LOBATTO_FORMULA {
                 if constexpr (offset(j) > 0 && offset(j) <= width)
-                    sum += passed_on<width, offset(j)>(before[j], V(real_of<number>(0)));
+                    sum += passed_on<width, offset(j)>(before[j], V(number(0)));
             });
-            store(sum, W + r);
+            store_to(W, first + behind, sum);
         }
     }
 
-    template <class number, class Formula>
-    static void row_by_row(int begin, int count, const number* q, number* W, const Formula& formula) {
-        for (int row = begin; row < begin + count; ++row) {
-            Rows<number, variables, false> one;
-            one.row = row;
-            one.count = 1;
-            for (int j = 0; j < variables; ++j) one.x[j] = q[indices[row * variables + j]];
-            formula(one);
-            for (int j = 0; j < variables; ++j) W[indices[row * variables + j]] += one.result[j];
-        }
+    template <class number, class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void one_row(int row, Position q, Slope W, const Formula& formula) {
+        Rows<number, variables, false> one;
+        one.row = row;
+        one.count = 1;
+        for (int j = 0; j < variables; ++j) one.x[j] = q[indices[row * variables + j]];
+        formula(one);
+        for (int j = 0; j < variables; ++j) add_to(W, indices[row * variables + j], one.result[j]);
     }
 
     // All runs of `runs`, pairs (first row, how many).
-    template <class V, const auto& runs, class number, class Formula>
-    LOBATTO_INLINE static void all(const number* q, number* W, const Formula& formula) {
+    template <class V, const auto& runs, class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void all(Position q, Slope W, const Formula& formula) {
         constexpr int run_count = sizeof(runs) / sizeof(runs[0]);
-        for (int i = 0; i < run_count; i += 2) {
-            if (runs[i + 1] < long_run)
-                row_by_row(runs[i], runs[i + 1], q, W, formula);
-            else
+        const auto one_run = [&](int i) LOBATTO_FORMULA {
+            if (runs[i + 1] >= long_run)
                 run<V, true>(runs[i], runs[i + 1], q, W, formula);
-        }
+            else if constexpr (are_registers<Position>)
+                written_out<1>(runs[i + 1],
+                               [&](int r) LOBATTO_FORMULA { one_row<real_of<V>>(runs[i] + r, q, W, formula); });
+            else
+                for (int row = runs[i]; row < runs[i] + runs[i + 1]; ++row)
+                    one_row<element_of<Position>>(row, q, W, formula);
+        };
+        if constexpr (are_registers<Position>)
+            written_out<2>(run_count, one_run);
+        else
+            for (int i = 0; i < run_count; i += 2) one_run(i);
     }
 
 private:
@@ -163,6 +228,11 @@ private:
             return before;
         else
             return moved_on<places>(before, values);
+    }
+    // `places` further on than `here`, behind which `there` stands.
+    template <int width, int places, class V>
+    LOBATTO_INLINE static V further(const V& here, const V& there) {
+        return passed_on<width, width - places>(here, there);
     }
 };
 
@@ -193,7 +263,7 @@ struct OneByOne {
     }
 };
 
-// or those of a run side by side in a Pack, for plain numbers in arrays with room.
+// or those of a run side by side in a Pack, for plain numbers in arrays with room,
 struct SideBySide {
     template <class real>
     using Lanes = Pack<real, native_lanes<real>>;
@@ -233,63 +303,138 @@ struct SideBySide {
     }
 };
 
+// or the same in registers, all written out.
+struct WrittenOut {
+    template <int count, class V, int parts>
+    LOBATTO_INLINE static void clear(Registers<V, parts> W) {
+        written_out<1>(parts, [&](int i) LOBATTO_FORMULA { W.part[i] = V(real_of<V>(0)); });
+    }
+    template <int count, class V, int parts>
+    LOBATTO_INLINE static void scale(Registers<V, parts> W, const real_of<V>* factor) {
+        written_out<lanes_of<V>>(count / lanes_of<V> * lanes_of<V>,
+                                 [&](int at) LOBATTO_FORMULA { W.part[at / lanes_of<V>] *= V::load(factor + at); });
+        if constexpr (count % lanes_of < V >> 0) {
+            real_of<V> rest[lanes_of<V>]{};
+            for (int i = 0; i < count % lanes_of<V>; ++i) rest[i] = factor[count / lanes_of<V> * lanes_of<V> + i];
+            W.part[parts - 1] *= V::load(rest);
+        }
+    }
+    template <class Slope, int place>
+    struct Place {
+        Slope W;
+        LOBATTO_INLINE void operator+=(typename Slope::real x) const { W.add(place, x); }
+    };
+    template <int place, class Slope>
+    LOBATTO_INLINE static Place<Slope, place> at(Slope W) {
+        return {W};
+    }
+    template <int variables, const auto& indices, const auto& runs, class V, int parts, class Formula>
+    LOBATTO_INLINE static void add_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
+        RowLoop<variables, indices>::template all<V, runs>(q, W, formula);
+    }
+    template <int count, int variables, const auto& indices, const auto& runs, class V, int parts, class Formula>
+    LOBATTO_INLINE static void set_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
+        RowLoop<variables, indices>::template run<V, false>(runs[0], runs[1], q, W, formula);
+    }
+};
+
 // How many numbers an array of coordinates holds.
 template <class K>
 constexpr int room_of = (K::coordinates / native_lanes<typename K::real> + 2) * native_lanes<typename K::real>;
 
-// One trajectory; its state and the memory of its last step, each twice: before the step and after it.
+// A Pack at a time.
+template <int count, class real>
+LOBATTO_INLINE void copy_lanes(const real* from, real* to) {
+    using V = Pack<real, native_lanes<real>>;
+    int i = 0;
+    for (; i + lanes_of<V> <= count; i += lanes_of<V>) V::load(from + i).store(to + i);
+    for (; i < count; ++i) to[i] = from[i];
+}
+
+// Whether the inner nodes of a step fit the registers of AVX-512, of which there are 32: these hold positions,
+// accelerations and what is under way.
 template <class K>
+constexpr bool fits_registers() {
+    using real = typename K::real;
+    constexpr int width = native_lanes<real>, parts = (K::coordinates + width - 1) / width;
+    if constexpr (K::neighbours)
+        return width * sizeof(real) == 64 && parts * (K::points - 2) <= 16 && K::row_reach >= 0 &&
+               K::row_reach <= width;
+    else
+        return false;
+}
+
+// One trajectory; its state, the memory of its last step, and room for the next. A step is solved in registers, all
+// written out, or in memory; to the same bits.
+template <class K, bool in_registers = fits_registers<K>()>
 struct NeighbourSweeps {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
-    static constexpr int width = native_lanes<real>, room = room_of<K>, end = (n + width - 1) / width * width;
+    static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
     static constexpr int evaluation_limit = 16, measured_every = 16;
     using V = Pack<real, width>;
+    using How = std::conditional_t<in_registers, WrittenOut, SideBySide>;
+    using Row = std::conditional_t<in_registers, Registers<V, parts>, real*>;
 
-    V before[inner_room][s];           // -h^2 A E: from the accelerations of the step before (D15)
-    V inner[inner_room][inner_room];   // -h^2 A
-    V simple[inner_room];              // the row sums of the latter
-    V on_velocity[inner_room];         // h c
-    V weight[s], arrival[inner_room];  // -h b and -h^2 b (1 - c)
+    real before[inner_room][s];           // -h^2 A E: from the accelerations of the step before (D15)
+    real inner[inner_room][inner_room];   // -h^2 A
+    real simple[inner_room];              // the row sums of the latter
+    real on_velocity[inner_room];         // h c
+    real weight[s], arrival[inner_room];  // -h b and -h^2 b (1 - c)
     real h{};
     real tolerance{};      // of increments, relative; 0: to rounding
     real shrinking{};      // rho, as last measured; 0: never
     int until_measured{};  // steps
+    int expected{};        // sweeps
     bool has_history{};
-    int now{};                                                    // which of the two is the present
-    alignas(V) real q[2][room]{}, u[2][room]{};                   // position and velocity
-    alignas(V) real w[2][inner_room * room]{}, w_end[2][room]{};  // W at the inner nodes of the last step, at its end
-    alignas(V) real X[inner_room * room]{}, rate[room]{}, inverse_scale[room]{}, change[room]{};
-    int evaluations{};  // of the last step
-    real increment{};   // the last one of the last step, relative
+    int now{}, then{1};                                            // the present, the beginning of the last step, of
+    alignas(V) real q[3][room]{}, u[3][room]{}, w_end[3][room]{};  // position, velocity, W there
+    int last{};                                                    // the last step, of
+    alignas(V) real w[2][inner_room * room]{};                     // W at the inner nodes
+    int evaluations{};                                             // of the last step
+    real increment{};                                              // the last one of the last step, relative
+
+    // Of the step that is being solved: positions of the inner nodes, q + h c v, v, and what u changes by. In registers
+    // also W and the end of the step, which otherwise are written where they belong.
+    struct InMemory {
+        alignas(V) real X[inner_room * room]{}, base[inner_room * room]{}, rate[room]{}, change[room]{};
+    };
+    struct InRegisters {
+        V X[inner_room * parts], base[inner_room * parts], rate[parts], change[parts];
+        V W[inner_room * parts], q1[parts], W1[parts];
+    };
+    struct Nothing {};
+    using Nodes = std::conditional_t<in_registers, InRegisters, InMemory>;
+    std::conditional_t<in_registers, Nothing, InMemory> memory{};
 
     void prepare(const typename K::Coefficients&, real step_size) {
         h = step_size;
         has_history = false;
-        until_measured = 0;
+        shrinking = real(0);
+        until_measured = expected = 0;
         for (int i = 0; i < m; ++i) {
             real row_sum = real(0);
             for (int j = 0; j < m; ++j) {
                 const real entry = -h * h * K::A[i * m + j];
-                inner[i][j] = V(entry);
+                inner[i][j] = entry;
                 row_sum += entry;
             }
-            simple[i] = V(row_sum);
+            simple[i] = row_sum;
             for (int l = 0; l < s; ++l) {
                 real entry = real(0);
                 for (int j = 0; j < m; ++j) entry += -h * h * K::A[i * m + j] * K::E[j * s + l];
-                before[i][l] = V(entry);
+                before[i][l] = entry;
             }
-            on_velocity[i] = V(h * K::c[i + 1]);
-            arrival[i] = V(-h * h * (K::b[i + 1] * (real(1) - K::c[i + 1])));
+            on_velocity[i] = h * K::c[i + 1];
+            arrival[i] = -h * h * (K::b[i + 1] * (real(1) - K::c[i + 1]));
         }
-        for (int i = 0; i < s; ++i) weight[i] = V(-h * K::b[i]);
+        for (int i = 0; i < s; ++i) weight[i] = -h * K::b[i];
     }
 
     // Begins at q and u, where W is W0.
     void begin(const real* position, const real* velocity, const real* W0) {
         has_history = false;
-        until_measured = 0;
+        until_measured = expected = 0;
         for (int c = 0; c < n; ++c) {
             q[now][c] = position[c];
             u[now][c] = velocity[c];
@@ -299,7 +444,7 @@ struct NeighbourSweeps {
 
     // W at node i of the last step.
     real acceleration(int i, int c) const {
-        return i == 0 ? w_end[1 - now][c] : i < s - 1 ? w[now][(i - 1) * room + c] : w_end[now][c];
+        return i == 0 ? w_end[then][c] : i < s - 1 ? w[last][(i - 1) * room + c] : w_end[now][c];
     }
 
     // Takes over a step that was taken otherwise: acceleration_at(i, c) at node i.
@@ -308,140 +453,201 @@ struct NeighbourSweeps {
         begin(position, velocity, w_end[now]);
         has_history = true;
         for (int c = 0; c < n; ++c) {
-            w_end[1 - now][c] = acceleration_at(0, c);
-            for (int i = 0; i < m; ++i) w[now][i * room + c] = acceleration_at(i + 1, c);
+            w_end[then][c] = acceleration_at(0, c);
+            for (int i = 0; i < m; ++i) w[last][i * room + c] = acceleration_at(i + 1, c);
             w_end[now][c] = acceleration_at(s - 1, c);
         }
     }
 
     // One step, h from `time`. False, and nothing has moved, where the sweeps do not contract.
     bool step(const typename K::Coefficients& k, real time) {
-        const bool measures = until_measured == 0;
-        if (has_history)
-            predict<true>();
-        else
-            predict<false>();
-        if (m > 0 && !solve(k, time, measures)) return false;
-        return finish(k, time);
+        if constexpr (in_registers) {
+            InRegisters nodes;
+            return step_in(nodes, k, time);
+        } else {
+            return step_in(memory, k, time);
+        }
     }
 
 private:
-    static void accelerate(const typename K::Coefficients& k, real time, const real* position, real* W) {
-        if constexpr (K::autonomous)
-            K::template acceleration<SideBySide>(k, position, W);
+    LOBATTO_INLINE bool step_in(Nodes& a, const typename K::Coefficients& k, real time) {
+        if (has_history)
+            predict<true>(a);
         else
-            K::template acceleration<SideBySide>(k, time, position, W);
+            predict<false>(a);
+        if (m > 0 && !solve(a, k, time)) return false;
+        return finish(a, k, time);
+    }
+
+    int next() const { return 3 - now - then; }
+    // The coordinates of node i in one of the arrays of Nodes.
+    LOBATTO_INLINE static Row row(V* nodes, int i = 0) { return {nodes + i * parts}; }
+    LOBATTO_INLINE static Row row(real* nodes, int i = 0) { return nodes + i * room; }
+    // W at inner node i, the position at the end and W there, of the step that is being solved.
+    LOBATTO_INLINE Row W_at(Nodes& a, int i) {
+        if constexpr (in_registers)
+            return row(a.W, i);
+        else
+            return row(w[1 - last], i);
+    }
+    LOBATTO_INLINE Row arrival_of(Nodes& a) {
+        if constexpr (in_registers)
+            return row(a.q1);
+        else
+            return q[next()];
+    }
+    LOBATTO_INLINE Row W_at_end(Nodes& a) {
+        if constexpr (in_registers)
+            return row(a.W1);
+        else
+            return w_end[next()];
+    }
+    // f(at) for all parts, which begin at coordinate `at`.
+    template <class F>
+    LOBATTO_INLINE static void over_parts(const F& f) {
+        if constexpr (in_registers)
+            written_out<width>(parts * width, f);
+        else
+            for (int at = 0; at < parts * width; at += width) f(at);
+    }
+
+    static void call(const typename K::Coefficients& k, real time, Row position, Row W) {
+        accelerate_here(k, time, position, W);
+    }
+    LOBATTO_INLINE static void accelerate_here(const typename K::Coefficients& k, real time, Row position, Row W) {
+        if constexpr (K::autonomous)
+            K::template acceleration<How>(k, position, W);
+        else
+            K::template acceleration<How>(k, time, position, W);
+    }
+    LOBATTO_INLINE static void accelerate(const typename K::Coefficients& k, real time, Row position, Row W) {
+        if constexpr (in_registers)
+            accelerate_here(k, time, position, W);
+        else
+            call(k, time, position, W);
     }
     real bound() const { return maximum(tolerance, Limits<real>::epsilon); }
 
-    // The positions at the nodes from the accelerations of the step before; and the measure of each coordinate: its
-    // displacement in a step, with the rounding of its position as floor.
+    // The positions at the nodes from the accelerations of the step before.
     template <bool with_history>
-    void predict() {
-        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
-        const V rounding = V(Limits<real>::epsilon / bound()), step_size = V(h);
-        const real *const position = q[now], *const velocity = u[now];
-        const real *const at_start = w_end[1 - now], *const inside = w[now], *const at_end = w_end[now];
-        for (int at = 0; at < end; at += width) {
+    LOBATTO_INLINE void predict(Nodes& a) const {
+        over_parts([&](int at) LOBATTO_FORMULA {
+            const V Q = V::load(q[now] + at), W_now = V::load(w_end[now] + at);
+            const V v = fused(V(weight[0]), W_now, V::load(u[now] + at));
+            store_to(row(a.rate), at, v);
             V W[s];
-            W[0] = V::load(at_start + at);
-            for (int j = 0; j < m; ++j) W[j + 1] = V::load(inside + j * room + at);
-            W[s - 1] = V::load(at_end + at);
-            const V Q = V::load(position + at), v = fused(weight[0], W[s - 1], V::load(velocity + at));
-            v.store(rate + at);
-            const V distance = fabs(Q);
-            const V scale = fabs(step_size * v) + fabs(step_size * (step_size * W[s - 1])) + V(floor) * distance;
-            (V(real(1)) / maximum(scale, fused(rounding, distance, V(Limits<real>::smallest))))
-                .store(inverse_scale + at);
+            if constexpr (with_history) {
+                W[0] = V::load(w_end[then] + at);
+                for (int j = 0; j < m; ++j) W[j + 1] = V::load(w[last] + j * room + at);
+                W[s - 1] = W_now;
+            }
 #pragma GCC unroll 16
             for (int i = 0; i < m; ++i) {
-                V x = fused(on_velocity[i], v, Q);
+                V x = fused(V(on_velocity[i]), v, Q);
+                store_to(row(a.base, i), at, x);
                 if constexpr (with_history) {
 #pragma GCC unroll 16
-                    for (int j = 0; j < s; ++j) x = fused(before[i][j], W[j], x);
+                    for (int j = 0; j < s; ++j) x = fused(V(before[i][j]), W[j], x);
                 } else {
-                    x = fused(simple[i], W[s - 1], x);
+                    x = fused(V(simple[i]), W_now, x);
                 }
-                x.store(X + i * room + at);
+                store_to(row(a.X, i), at, x);
             }
-        }
+        });
     }
 
-    // X = q + h c v - h^2 A W; the largest of what it moved by.
-    real sweep() {
+    // X = q + h c v - h^2 A W; and, where it `looks`, the largest of what it moved by, measured against the
+    // displacement of each coordinate in a step, with the rounding of its position as floor.
+    template <bool looks>
+    LOBATTO_INLINE real sweep(Nodes& a) {
+        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
+        const V on_distance = V(floor + Limits<real>::epsilon / bound()), step_size = V(h);
         V worst = V(real(0));
-        const real *const position = q[now], *const inside = w[1 - now];
-        for (int at = 0; at < end; at += width) {
-            const V Q = V::load(position + at), v = V::load(rate + at);
+        over_parts([&](int at) LOBATTO_FORMULA {
             V W[inner_room], farthest = V(real(0));
-            for (int j = 0; j < m; ++j) W[j] = V::load(inside + j * room + at);
+#pragma GCC unroll 16
+            for (int j = 0; j < m; ++j) W[j] = load_from<V>(W_at(a, j), at);
 #pragma GCC unroll 16
             for (int i = 0; i < m; ++i) {
-                V x = fused(on_velocity[i], v, Q);
+                V x = load_from<V>(row(a.base, i), at);
 #pragma GCC unroll 16
-                for (int j = 0; j < m; ++j) x = fused(inner[i][j], W[j], x);
-                const V moved = fabs(x - V::load(X + i * room + at));
-                farthest = i == 0 ? moved : maximum(farthest, moved);
-                x.store(X + i * room + at);
+                for (int j = 0; j < m; ++j) x = fused(V(inner[i][j]), W[j], x);
+                if constexpr (looks) {
+                    const V moved = fabs(x - load_from<V>(row(a.X, i), at));
+                    farthest = i == 0 ? moved : maximum(farthest, moved);
+                }
+                store_to(row(a.X, i), at, x);
             }
-            worst = maximum(worst, farthest * V::load(inverse_scale + at));
-        }
-        return largest(worst);
+            if constexpr (looks) {
+                const V rounding = fused(on_distance, fabs(V::load(q[now] + at)), V(Limits<real>::smallest));
+                const V speed = fabs(load_from<V>(row(a.rate), at)) + fabs(step_size * V::load(w_end[now] + at));
+                const V scale = minimum(fused(fabs(step_size), speed, rounding), V(Limits<real>::largest / real(8)));
+                worst = maximum(worst, farthest * rough_inverse(scale));
+            }
+        });
+        return looks ? largest(worst) : real(0);
     }
 
     // The accelerations at the inner nodes of the step. Where rho is measured, increments themselves go down to
-    // rounding: the last ratios are those of the errors that shrink most slowly.
-    bool solve(const typename K::Coefficients& k, real time, bool measures) {
+    // rounding: the last ratios are those of the errors that shrink most slowly. Otherwise only sweeps from that on
+    // with which the step before ended look at their increments.
+    LOBATTO_INLINE bool solve(Nodes& a, const typename K::Coefficients& k, real time) {
+        const bool measures = until_measured == 0;
         const real small = bound();
         real e_before = real(0), measured = real(0);
         for (evaluations = 1; evaluations <= evaluation_limit; ++evaluations) {
-            for (int i = 0; i < m; ++i) accelerate(k, time + K::c[i + 1] * h, X + i * room, w[1 - now] + i * room);
-            const real e = sweep();
+#pragma GCC unroll 16
+            for (int i = 0; i < m; ++i) accelerate(k, time + K::c[i + 1] * h, row(a.X, i), W_at(a, i));
+            if (!measures && evaluations < expected) {
+                sweep<false>(a);
+                continue;
+            }
+            const real e = sweep<true>(a);
             increment = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
             const real rho = measures ? real(1) : real(4) * maximum(measured, shrinking);  // 4: the motion changes it
             if (rho * e <= small || (e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0))) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
                 until_measured = !measures ? until_measured - 1 : measured > real(0) ? measured_every : 0;
+                if (!measures) expected = evaluations > 1 && real(8) * e <= small ? evaluations - 1 : evaluations;
                 return true;
             }
-            if (evaluations > 3 && !(e < real(0.8) * e_before || e <= real(16) * small)) return false;
+            if (evaluations > 3 && e_before > real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))
+                return false;
             e_before = e;
         }
         return false;
     }
 
     // (D16), (D17): the end of the step, each sum of increments rounded once.
-    bool finish(const typename K::Coefficients& k, real time) {
-        const int next = 1 - now;
-        const real *const position = q[now], *const velocity = u[now], *const at_start = w_end[now],
-                          *const inside = w[next], *const at_end = w_end[next];
-        real *const new_position = q[next], *const new_velocity = u[next];
-        const V step_size = V(h);
-        for (int at = 0; at < end; at += width) {
-            V moved = step_size * V::load(rate + at), difference = weight[0] * V::load(at_start + at);
+    LOBATTO_INLINE bool finish(Nodes& a, const typename K::Coefficients& k, real time) {
+        over_parts([&](int at) LOBATTO_FORMULA {
+            V moved = V(h) * load_from<V>(row(a.rate), at), difference = V(weight[0]) * V::load(w_end[now] + at);
 #pragma GCC unroll 16
             for (int j = 0; j < m; ++j) {
-                const V W = V::load(inside + j * room + at);
-                moved = fused(arrival[j], W, moved);
-                difference = fused(weight[j + 1], W, difference);
+                const V W = load_from<V>(W_at(a, j), at);
+                if constexpr (in_registers) W.store(w[1 - last] + j * room + at);
+                moved = fused(V(arrival[j]), W, moved);
+                difference = fused(V(weight[j + 1]), W, difference);
             }
-            (V::load(position + at) + moved).store(new_position + at);
-            difference.store(change + at);
-        }
-        accelerate(k, time + h, q[next], w_end[next]);
+            store_to(arrival_of(a), at, V::load(q[now] + at) + moved);
+            store_to(row(a.change), at, difference);
+        });
+        accelerate(k, time + h, arrival_of(a), W_at_end(a));
         V not_finite = V(real(0));
-        for (int at = 0; at < end; at += width) {
-            const V difference = fused(weight[s - 1], V::load(at_end + at), V::load(change + at));
-            const V moved = V::load(velocity + at) + difference;
-            moved.store(new_velocity + at);
-            not_finite = fused(V(real(0)), moved + V::load(new_position + at), not_finite);
-        }
-        if (!(sum(not_finite) == real(0))) {
-            has_history = false;  // W at the beginning of the step before is lost
-            return false;
-        }
-        now = next;
+        over_parts([&](int at) LOBATTO_FORMULA {
+            const V W1 = load_from<V>(W_at_end(a), at), q1 = load_from<V>(arrival_of(a), at);
+            const V u1 = V::load(u[now] + at) + fused(V(weight[s - 1]), W1, load_from<V>(row(a.change), at));
+            u1.store(u[next()] + at);
+            if constexpr (in_registers) {
+                q1.store(q[next()] + at);
+                W1.store(w_end[next()] + at);
+            }
+            not_finite = fused(V(real(0)), u1 + q1, not_finite);
+        });
+        if (!(sum(not_finite) == real(0))) return false;
+        then = std::exchange(now, next());
+        last = 1 - last;
         has_history = true;
         return true;
     }

@@ -517,7 +517,7 @@ struct Bits {
         return of(LOBATTO_EACH(i) { return ~part[i]; });
     }
     LOBATTO_INLINE friend Bits operator<<(const Bits& a, int places) {
-        return of(LOBATTO_EACH(i) { return a.part[i] << places; });
+        return of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] << places); });
     }
 
     LOBATTO_INLINE friend Bits operator>>(const Bits& a, int places) {  // zeros come in
@@ -535,7 +535,7 @@ struct Bits {
     // Where the last bit is set.
     LOBATTO_INLINE friend Mask<real, width> is_odd(const Bits& a) {
         constexpr int top = 8 * sizeof(Integer) - 1;
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return (a.part[i] << top) < 0; });
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] << top) < 0; });
     }
 
 private:
@@ -562,6 +562,15 @@ LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
         return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::fabs(a.part[i]); });
     else
         return from_bits(bits(a) & ~bits(Pack<real, width>(real(-0.0))));
+}
+
+// 1/x for x from the smallest normal number to a quarter of the largest, within a seventh of it: the exponent with its
+// sign changed, and the significand drawn as a line.
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> rough_inverse(const Pack<real, width>& x) {
+    using Integer = typename Bits<real, width>::Integer;
+    constexpr Integer line = sizeof(real) == 8 ? Integer(0x7fde623822fc16e6) : Integer(0x7ef311c7);
+    return from_bits(Bits<real, width>(line) - bits(x));
 }
 
 // How many lanes a type has, and of which number.

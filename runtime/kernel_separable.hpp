@@ -236,7 +236,7 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
     real q_before[n]{}, u_before[n]{};  // before the last step
     real W[s * n]{};                    // M^-1 grad V at the nodes of the last step; the last n at q
     bool has_history{};                 // W holds a whole step
-    bool is_current{};                  // W is that of the last step; else the sweeps' memory is
+    bool is_current{};  // W is that of the last step; else the sweeps' memory is, of chains also q_before
     std::conditional_t<is_swept, Swept, Nothing> swept{};
     std::conditional_t<is_frozen, FrozenJacobian<K>, Nothing> frozen{};
     Workspace<Arrays> workspace;
@@ -284,13 +284,14 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
         real value[s], slope[s];
         lagrange<s>(K::c, theta, value, slope);
         for (int k = 0; k < n; ++k) {
-            real moved = value[s - 1] * (q[k] - q_before[k]), rate = slope[s - 1] * (q[k] - q_before[k]);
+            const real start = position_before(k);
+            real moved = value[s - 1] * (q[k] - start), rate = slope[s - 1] * (q[k] - start);
             for (int i = 0; i < m; ++i) {
                 const real displacement = displacement_of(i, k);
                 moved += value[i + 1] * displacement;
                 rate += slope[i + 1] * displacement;
             }
-            position[k] = q_before[k] + moved;
+            position[k] = start + moved;
             velocity[k] = rate / step_size;
         }
     }
@@ -351,6 +352,19 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
         return Status::ok;
     }
 
+    // Where the last step began.
+    real position_before(int k) const {
+        if constexpr (along_coordinates) {
+            if (!is_current) return swept.sweeps.q[swept.sweeps.then][k];
+        }
+        return q_before[k];
+    }
+    real velocity_before(int k) const {
+        if constexpr (along_coordinates) {
+            if (!is_current) return swept.sweeps.u[swept.sweeps.then][k];
+        }
+        return u_before[k];
+    }
     // W at node i of the last step; node s - 1 is where the motion is now.
     real node_acceleration(int i, int k) const {
         if constexpr (is_swept) {
@@ -360,12 +374,12 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
     }
     // (D12) Q_i - q of the last step's interior node i.
     real displacement_of(int i, int k) const {
-        real moved = K::c[i + 1] * (u_before[k] - step_size * K::b[0] * node_acceleration(0, k));
+        real moved = K::c[i + 1] * (velocity_before(k) - step_size * K::b[0] * node_acceleration(0, k));
         for (int j = 0; j < m; ++j) moved -= step_size * K::A[i * m + j] * node_acceleration(j + 1, k);
         return step_size * moved;
     }
     real node_position(int i, int k) const {
-        return i == s - 1 ? q[k] : q_before[k] + (i > 0 ? displacement_of(i - 1, k) : real(0));
+        return i == s - 1 ? q[k] : position_before(k) + (i > 0 ? displacement_of(i - 1, k) : real(0));
     }
 
     // One step from (q, p) at `time` and d(q1, p1)/d(q, p) (D24), 2n x 2n.
@@ -452,24 +466,26 @@ private:
             return true;
         }
         if (!is_current)
-            for (int i = 0; i < s; ++i)
-                for (int k = 0; k < n; ++k) W[i * n + k] = any.sweeps.acceleration(i, k);
+            for (int k = 0; k < n; ++k) {
+                for (int i = 0; i < s; ++i) W[i * n + k] = any.sweeps.acceleration(i, k);
+                if constexpr (along_coordinates) {
+                    q_before[k] = any.sweeps.q[any.sweeps.then][k];
+                    u_before[k] = any.sweeps.u[any.sweeps.then][k];
+                }
+            }
         is_current = true;
         any.pause.fail();
         return false;
     }
 
-    // q and u move on where the sweeps succeed, and leave their values in q_before and u_before.
+    // q and u move on where the sweeps succeed, and leave their values in q_before and u_before, or in the sweeps'
+    // memory.
     template <class AnySweeps>
     bool sweeps_step(AnySweeps& sweeps) {
         if constexpr (along_coordinates) {
             if (!sweeps.step(coefficients, this->time())) return false;
-            for (int k = 0; k < n; ++k) {
-                q_before[k] = q[k];
-                u_before[k] = u[k];
-                q[k] = sweeps.q[sweeps.now][k];
-                u[k] = sweeps.u[sweeps.now][k];
-            }
+            copy_lanes<n>(sweeps.q[sweeps.now], q);
+            copy_lanes<n>(sweeps.u[sweeps.now], u);
         } else {
             real q1[n], u1[n];
             for (int k = 0; k < n; ++k) {

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Steps of chains and rings with neighbouring coordinates in lanes: solved in registers or in memory, the same bits.
+#include <doctest/doctest.h>
+
+#include <string>
+
+#include "tests/motions.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+using namespace lobatto::test;
+
+namespace {
+
+// Steps of a kernel in both ways (or twice in memory, of which address sanitisers know); prints what differs, then how
+// many steps and evaluations there were.
+const char* const program = R"(
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include "kernel.hpp"
+#include "motion.hpp"
+using namespace lobatto;
+using K = kernels::motion;
+static NeighbourSweeps<K, IN_REGISTERS> within;
+static NeighbourSweeps<K, false> through;
+template <class Sweeps> void begin(Sweeps& sweeps, const K::Coefficients& k, double h, double tolerance) {
+    double q[K::coordinates], u[K::coordinates], W[K::coordinates];
+    for (int i = 0; i < K::coordinates; ++i) q[i] = std::sin(0.3 * i), u[i] = 0.1 * std::cos(i);
+    Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
+    sweeps.prepare(k, h);
+    sweeps.tolerance = tolerance;
+    sweeps.begin(q, u, W);
+}
+static bool same(const double* a, const double* b) { return std::memcmp(a, b, sizeof(double) * K::coordinates) == 0; }
+int main() {
+    int steps = 0, evaluations = 0, failed = 0;
+    for (const double h : {0.05, 0.2, 40.0})
+        for (const double tolerance : {0.0, 1e-9}) {
+            K::Coefficients k;
+            K::prepare(K::Parameters(), h, k);
+            begin(within, k, h, tolerance);
+            begin(through, k, h, tolerance);
+            for (int i = 0; i < 60; ++i) {
+                const bool good = within.step(k, i * h), other = through.step(k, i * h);
+                if (good != other || within.evaluations != through.evaluations) std::printf("step %d differs\n", i);
+                if (!good) ++failed;
+                if (!good) break;
+                if (!same(within.q[within.now], through.q[through.now])) std::printf("q differs in step %d\n", i);
+                if (!same(within.u[within.now], through.u[through.now])) std::printf("u differs in step %d\n", i);
+                for (int node = 0; node < K::points; ++node)
+                    for (int c = 0; c < K::coordinates; ++c)
+                        if (within.acceleration(node, c) != through.acceleration(node, c))
+                            std::printf("W differs in step %d\n", i);
+                ++steps;
+                evaluations += within.evaluations;
+            }
+        }
+    std::printf("%d steps, %d failed, %s\n", steps, failed, evaluations > steps ? "solved" : "not solved");
+}
+)";
+
+// A chain between walls, with masses of their own, pulled on by a force that depends on time.
+const char* const driven_chain =
+    "time = \"t\"\nlagrangian = \"\"\"sum(i = 1 .. 21, (1 + i/8)*x[i]'^2/2 + a*cos(t)*x[i])\n"
+    "  - sum(i = 2 .. 21, spring[i]) - x[1]^2/2 - x[21]^2/2 - x[21]^4/8\"\"\"\n"
+    "[definitions]\n\"spring[i]\" = \"(x[i] - x[i-1])^2/2 + b*(x[i] - x[i-1])^4/4\"\n"
+    "[coordinates]\nx = { count = 21, position = \"i/40\", velocity = 0 }\n[parameters]\na = 0.25\nb = 0.5\n";
+// A closed one, whose last row is no neighbour's; with sines beside the springs, and springs to the second next.
+const char* const closed_chain =
+    "lagrangian = \"\"\"sum(i = 1 .. 24, x[i]'^2/2 + cos(x[i]))\n"
+    "  - sum(i = 1 .. 24, (x[mod(i, 24) + 1] - x[i])^4/4) - sum(i = 1 .. 22, (x[i+2] - x[i])^2/16)\"\"\"\n"
+    "[coordinates]\nx = { count = 24, position = \"i/40\", velocity = 0 }\n";
+
+}  // namespace
+
+// What computes here are kernels, which no sanitiser of ours looks into.
+TEST_SUITE_BEGIN("slow");
+
+TEST_CASE("a step along neighbours has the same bits in registers and in memory, and stays within its arrays") {
+    const TemporaryFolder folder;
+    write_text(folder / "both.cpp", program);
+    const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+    for (const char* const body : {driven_chain, closed_chain})
+        for (const char* const method : {"points = 5", "family = \"gauss\"\nstages = 2"}) {
+            INFO(body << method);
+            const Derivation derivation =
+                derivation_of(Motion{body, {}, {}, {}, 0.1}, method, "energy = false\ntangent = false");
+            REQUIRE(derivation.structure.neighbours);
+            write_text(folder / "motion.hpp", emit(derivation).header);
+            const auto check = [&](const std::vector<std::string>& target, bool runs_here) {
+                INFO(target.front());
+                std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off"};
+                command.insert(command.end(), target.begin(), target.end());
+                for (const std::string& argument :
+                     {std::string("-I"), std::string(LOBATTO_SOURCE_DIR "/runtime"), (folder / "both.cpp").string(),
+                      std::string("-o"), (folder / "both").string()})
+                    command.push_back(argument);
+                const Finished built = run(command);
+                INFO(built.err);
+                REQUIRE(built.exit_code == 0);
+                if (!runs_here) return;
+                const Finished both = run({"env", "ASAN_OPTIONS=detect_leaks=0", (folder / "both").string()});
+                CHECK(both.out == "240 steps, 2 failed, solved\n");
+                CHECK(both.err == "");
+            };
+            check({"-march=x86-64", "-O0", "-DIN_REGISTERS=false", "-fsanitize=address"}, true);
+            check({"-march=haswell", "-O1", "-DIN_REGISTERS=true"}, has_avx2);
+            check({"-march=x86-64-v4", "-O1", "-DIN_REGISTERS=true"}, has_avx512);
+        }
+}
+
+TEST_SUITE_END();
