@@ -161,6 +161,7 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
         std::size_t source;  // in terms, then forces
     };
     Shapes shapes(system, variables);
+    const int velocities = static_cast<int>(variables.size()) - system.n;
     std::map<std::string, std::pair<int, std::vector<Row>>> families;  // by formula: target slot, rows
     const auto sort_in = [&](const ex& term, int acted_on, std::size_t source) {
         const Id root = shapes.convert(term);
@@ -172,7 +173,10 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
             while (target < count && leaves.variables[static_cast<std::size_t>(target)] != acted_on) ++target;
             if (target == count) leaves.variables.push_back(acted_on);
         }
-        const std::string key = std::to_string(target) + ":" + leaves.shape;
+        // Velocities, the first of the variables where there are any, are another family: they count in the energy.
+        std::string key = std::to_string(target) + ":";
+        for (const int variable : leaves.variables) key += variable < velocities ? 'v' : 'q';
+        key += ":" + leaves.shape;
         const auto place = families.emplace(key, std::make_pair(target, std::vector<Row>())).first;
         place->second.second.push_back({root, std::move(leaves), source});
     };

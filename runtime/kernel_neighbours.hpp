@@ -7,7 +7,8 @@
 // each sweep, so W at positions that moved by e at last errs by rho e: the iteration ends when that is rounding, or as
 // much as is asked for, without another look at the new positions.
 //
-// Arrays of coordinates have room for room_of<K> numbers: whole Packs and one to spare, where formulas may write zeros.
+// Arrays of coordinates have room for room_of<K> numbers: whole Packs and two to spare, where formulas may read what
+// does not matter and write zeros.
 #ifndef LOBATTO_KERNEL_NEIGHBOURS_HPP
 #define LOBATTO_KERNEL_NEIGHBOURS_HPP
 
@@ -129,6 +130,7 @@ struct RowLoop {
         constexpr int width = in_lanes ? lanes_of<V> : 1;
         constexpr std::make_integer_sequence<int, variables> every{};
         const int first = indices[begin * variables] + least();
+        constexpr bool overlaps = farthest_within(width) > 0;  // what is loaded for one V serves the next too
         V before[variables], here = load_from<V>(q, first);
         for (int j = 0; j < variables; ++j) before[j] = V(number(0));
         const auto add = [&](int r, auto is_whole) LOBATTO_FORMULA {
@@ -136,8 +138,9 @@ struct RowLoop {
             Rows<V, variables, in_lanes> rows;
             rows.row = begin + r;
             rows.count = is_whole ? width : count - r;
-            V there = here;  // the next, where a row reaches into it
-            if constexpr (farthest_within(width) > 0) there = load_from<V>(q, at + width);
+            if constexpr (!overlaps) here = load_from<V>(q, at);
+            V there = here;
+            if constexpr (overlaps) there = load_from<V>(q, at + width);
             each(every, [&](auto j) LOBATTO_FORMULA {
                 if constexpr (offset(j) > width)
                     rows.x[j] = load_from<V>(q, at + offset(j));
@@ -340,7 +343,7 @@ struct WrittenOut {
 
 // How many numbers an array of coordinates holds.
 template <class K>
-constexpr int room_of = (K::coordinates / native_lanes<typename K::real> + 2) * native_lanes<typename K::real>;
+constexpr int room_of = (K::coordinates / native_lanes<typename K::real> + 3) * native_lanes<typename K::real>;
 
 // A Pack at a time.
 template <int count, class real>
@@ -605,14 +608,21 @@ private:
             const real e = sweep<true>(a);
             increment = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
-            const real rho = measures ? real(1) : real(4) * maximum(measured, shrinking);  // 4: the motion changes it
-            if (rho * e <= small || (e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0))) {
+            // 4: the motion changes rho; where this step did not show it, small ones are not trusted.
+            const real rho = measures             ? real(1)
+                             : measured > real(0) ? real(4) * maximum(measured, shrinking)
+                                                  : maximum(real(4) * shrinking, real(0.015625));
+            const bool is_rounding = e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0);
+            if (rho * e <= small || is_rounding) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
                 until_measured = !measures ? until_measured - 1 : measured > real(0) ? measured_every : 0;
-                if (!measures) expected = evaluations > 1 && real(8) * e <= small ? evaluations - 1 : evaluations;
+                // The next step looks from this sweep on, or from the one before where that may do, or where only
+                // the two together showed that the rest is rounding.
+                const bool sooner = is_rounding || real(8) * e <= small;
+                if (!measures) expected = sooner && evaluations > 1 ? evaluations - 1 : evaluations;
                 return true;
             }
-            if (evaluations > 3 && e_before > real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))
+            if (evaluations > 3 && e_before != real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))
                 return false;
             e_before = e;
         }

@@ -12,8 +12,8 @@ using namespace lobatto::test;
 
 namespace {
 
-// Steps of a kernel in both ways (or twice in memory, of which address sanitisers know); prints what differs, then how
-// many steps and evaluations there were.
+// Its formulas in all ways, and steps of a kernel in both (or twice in memory, of which address sanitisers know);
+// prints what differs, then how many steps and evaluations there were.
 const char* const program = R"(
 #include <cmath>
 #include <cstdio>
@@ -32,8 +32,36 @@ template <class Sweeps> void begin(Sweeps& sweeps, const K::Coefficients& k, dou
     sweeps.tolerance = tolerance;
     sweeps.begin(q, u, W);
 }
+// W in three ways against W beside the second derivatives, which is computed row by row without any of these.
+template <class How, class Position, class Slope> void accelerate(const K::Coefficients& k, Position q, Slope W) {
+    if constexpr (K::autonomous)
+        K::acceleration<How>(k, q, W);
+    else
+        K::acceleration<How>(k, 0.25, q, W);
+}
+static void compare_formulas() {
+    constexpr int n = K::coordinates, width = native_lanes<double>, parts = (n + width - 1) / width;
+    using V = Pack<double, width>;
+    K::Coefficients k;
+    K::prepare(K::Parameters(), 0.1, k);
+    double q[n], exact[n], second[K::entries], one[n];
+    alignas(V) double room[room_of<K>] = {}, side[room_of<K>] = {};
+    for (int i = 0; i < n; ++i) room[i] = q[i] = std::sin(0.3 * i) + 0.01 * i;
+    Formulas<K>::node(k, 0.25, static_cast<const double*>(q), +exact, +second);
+    accelerate<OneByOne>(k, static_cast<const double*>(q), +one);
+    accelerate<SideBySide>(k, static_cast<const double*>(room), +side);
+    V position[parts], slope[parts];
+    for (int i = 0; i < parts; ++i) position[i] = V::load(room + i * width);
+    accelerate<WrittenOut>(k, Registers<V, parts>{position}, Registers<V, parts>{slope});
+    for (int i = 0; i < n; ++i) {
+        const double written = slope[i / width][i % width];
+        for (const double W : {one[i], side[i], written})
+            if (!(std::fabs(W - exact[i]) < 1e-13)) std::printf("W of %d: %g for %g\n", i, W, exact[i]);
+    }
+}
 static bool same(const double* a, const double* b) { return std::memcmp(a, b, sizeof(double) * K::coordinates) == 0; }
 int main() {
+    compare_formulas();
     int steps = 0, evaluations = 0, failed = 0;
     for (const double h : {0.05, 0.2, 40.0})
         for (const double tolerance : {0.0, 1e-9}) {

@@ -211,6 +211,27 @@ TEST_CASE("banded and repeated equations give the motion of full matrices") {
     }
 }
 
+TEST_CASE("positions and velocities of one formula are told apart in the energy of loops") {
+    const Scene squares = scene(
+        "lagrangian = \"sum(i=1..12, x[i]'^2/2 + x[i]^4*x[i]'^2/2) - sum(i=1..12, x[i]^2)\"\n"
+        "[coordinates]\nx = { count = 12, position = \"i/10\", velocity = 0.5 }\n" +
+        run);
+    const Derivation derivation = derive(squares);
+    REQUIRE(derivation.structure.form == Form::general);
+    REQUIRE(derivation.structure.looped);
+    LoadedStepper<double> stepper(test::kernel_in_own_cache(derivation, Precision::double_));
+    REQUIRE(stepper.prepare({}, 0.05) == LOBATTO_OK);
+    std::vector<double> q;
+    double exact = 0, H = 0;
+    for (int i = 1; i <= 12; ++i) {
+        q.push_back(i / 10.0);
+        exact += 0.125 * (1 + std::pow(q.back(), 4)) + q.back() * q.back();
+    }
+    const std::vector<double> p = stepper.momentum(0, q, std::vector<double>(12, 0.5));
+    REQUIRE(stepper.energy(0, q, p, H) == LOBATTO_OK);
+    CHECK(std::fabs(H - exact) < 1e-12);
+}
+
 TEST_CASE("a linear chain in loops takes the general path's steps with one correction each") {
     const auto chain = [](int n) {
         return scene(
