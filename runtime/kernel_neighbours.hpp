@@ -593,33 +593,36 @@ private:
 
     // The accelerations at the inner nodes of the step. Where rho is measured, increments themselves go down to
     // rounding: the last ratios are those of the errors that shrink most slowly. Otherwise only sweeps from that on
-    // with which the step before ended look at their increments.
+    // with which the step before ended look at their increments, or from the one before it where rho is small: two
+    // increments show whether it still is.
     LOBATTO_INLINE bool solve(Nodes& a, const typename K::Coefficients& k, real time) {
         const bool measures = until_measured == 0;
         const real small = bound();
+        constexpr real trusted = real(0.015625);  // of rho, where this step has not shown it
+        const int first_look = real(4) * shrinking < trusted ? expected - 1 : expected;
         real e_before = real(0), measured = real(0);
+        int enough = 0;  // sweeps, of a step that goes on for the sake of measuring
         for (evaluations = 1; evaluations <= evaluation_limit; ++evaluations) {
 #pragma GCC unroll 16
             for (int i = 0; i < m; ++i) accelerate(k, time + K::c[i + 1] * h, row(a.X, i), W_at(a, i));
-            if (!measures && evaluations < expected) {
+            if (!measures && evaluations < first_look) {
                 sweep<false>(a);
                 continue;
             }
             const real e = sweep<true>(a);
             increment = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
-            // 4: the motion changes rho; where this step did not show it, small ones are not trusted.
-            const real rho = measures             ? real(1)
-                             : measured > real(0) ? real(4) * maximum(measured, shrinking)
-                                                  : maximum(real(4) * shrinking, real(0.015625));
+            const real known = real(4) * maximum(measured, shrinking);  // 4: the motion changes rho
+            if (enough == 0 && known > real(0) && known * e <= small) enough = evaluations;
+            const real rho = measures ? real(1) : measured > real(0) ? known : maximum(known, trusted);
             const bool is_rounding = e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0);
             if (rho * e <= small || is_rounding) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
                 until_measured = !measures ? until_measured - 1 : measured > real(0) ? measured_every : 0;
-                // The next step looks from this sweep on, or from the one before where that may do, or where only
-                // the two together showed that the rest is rounding.
-                const bool sooner = is_rounding || real(8) * e <= small;
-                if (!measures) expected = sooner && evaluations > 1 ? evaluations - 1 : evaluations;
+                // Whether one sweep less would have done, or only two together showed that the rest is rounding.
+                const bool sooner =
+                    is_rounding || real(8) * e <= small || (e_before > real(0) && known * e_before <= small);
+                expected = measures && enough > 0 ? enough : sooner && evaluations > 1 ? evaluations - 1 : evaluations;
                 return true;
             }
             if (evaluations > 3 && e_before != real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))
