@@ -14,6 +14,7 @@
 #include "kernel_neighbours.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_pack.hpp"
+#include "kernel_rows.hpp"
 #include "kernel_separable.hpp"
 #include "kernel_solve.hpp"
 #include "kernel_sweeps.hpp"

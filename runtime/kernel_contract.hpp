@@ -13,7 +13,7 @@
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
 //   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of kernel_separable.hpp are the
 //   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of kernel_solve.hpp order the
-//   unknowns, `neighbours` that acceleration can go SideBySide (kernel_neighbours.hpp; with row_reach, how far its rows
+//   unknowns, `neighbours` that acceleration can go SideBySide (kernel_rows.hpp; with row_reach, how far its rows
 //   reach), and `absorbed` says that quadratic_part(k, S0) gives a constant part of S to iterate with; `clean` (in
 //   loops) that steps are those of kernel_clean.hpp. Gauss's nodes stand between two ends of weight zero.
 // Form::general: see kernel_general.hpp.
