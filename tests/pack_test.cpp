@@ -101,6 +101,14 @@ TEST_CASE_TEMPLATE("packs are loaded from and stored to any address", K, Kind<do
     CHECK(to[K::width + 2] == 0);
 }
 
+TEST_CASE_TEMPLATE("a rough inverse is right to a seventh over the whole range", K, Kind<double, 4>, Kind<float, 8>) {
+    using real = typename K::real;
+    using P = Pack<real, K::width>;
+    const real largest = std::numeric_limits<real>::max() / 4;
+    for (real x = std::numeric_limits<real>::min(); x < largest; x *= real(1.03))
+        REQUIRE(std::fabs(rough_inverse(P(x))[0] * x - 1) < real(1) / 7);
+}
+
 TEST_CASE("a pack keeps the sign of zero, and no comparison with NaN but != holds") {
     using P = Pack<double, 8>;
     CHECK(std::signbit(P(-0.0)[5]));
