@@ -8,6 +8,7 @@
 #include <map>
 #include <string>
 
+#include "generator/expansion.hpp"
 #include "generator/graph.hpp"
 
 namespace lobatto {
@@ -311,6 +312,44 @@ int row_reach(const Elements& elements) {
         }
     }
     return reach;
+}
+
+Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
+    Walls walls;
+    walls.others = elements.others;
+    for (std::size_t number = 0; number < elements.repeated.size(); ++number) {
+        const Element& element = elements.repeated[number];
+        if (element.target >= 0 || element.x.size() != 2 || !element.a.empty()) continue;
+        const std::vector<int>& row = element.rows.front();
+        if (runs_of(element).size() != 1 || element.rows.size() + 1 != q.size()) continue;
+        if (std::min(row[0], row[1]) != 0 || std::max(row[0], row[1]) != 1) continue;
+        const std::size_t lower = row[0] == 0 ? 0 : 1, upper = 1 - lower;
+        // Whether all terms of one coordinate alone are the formula at its wall, which is then taken away.
+        const auto hangs = [&](const GiNaC::symbol& end, std::size_t slot) {
+            std::vector<ex> rest;
+            ex alone = 0;
+            for (const ex& term : walls.others) {
+                const bool is_alone = term.has(end) && std::all_of(q.begin(), q.end(), [&](const GiNaC::symbol& other) {
+                                          return other == end || !term.has(other);
+                                      });
+                if (is_alone)
+                    alone += term;
+                else
+                    rest.push_back(term);
+            }
+            GiNaC::exmap at_wall;
+            at_wall[element.x[slot]] = end;
+            at_wall[element.x[1 - slot]] = 0;
+            if (alone.is_zero() || !expanded((alone - element.term.subs(at_wall)).diff(end)).is_zero()) return false;
+            walls.others = rest;
+            return true;
+        };
+        walls.element = number;
+        walls.before = hangs(q.front(), upper);
+        walls.behind = hangs(q.back(), lower);
+        if (walls.before || walls.behind) break;
+    }
+    return walls;
 }
 
 }  // namespace lobatto

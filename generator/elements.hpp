@@ -37,6 +37,15 @@ bool are_neighbours(const Elements& elements);
 // How far the rows of long runs reach from the first coordinate, where all of them begin; -1 where some do not.
 int row_reach(const Elements& elements);
 
+// Where the formula of all pairs of neighbours holds beyond the first coordinate, or the last, with zero for the one
+// that is not there: a chain between walls.
+struct Walls {
+    std::size_t element = 0;  // its number
+    bool before = false, behind = false;
+    std::vector<GiNaC::ex> others;  // without what stands for the walls
+};
+Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q);
+
 // The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
 Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,
                        const std::vector<GiNaC::ex>& terms, const std::vector<std::pair<int, GiNaC::ex>>& forces);

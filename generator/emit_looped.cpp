@@ -179,11 +179,13 @@ std::vector<RowFunction> LoopedText::row_functions() const {
         if (element.x.empty()) continue;
         const std::string name = element_name(number);
         std::vector<Statement> list;
-        for (const Output& output : program(name + "_slope").outputs)
-            list.push_back(
-                {fmt::format("rows.result[{}]{}", variable_of(output), output.target.ends_with("-=") ? " -=" : ""),
-                 output.value});
-        const std::string inside = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+        std::string takes;
+        for (const Output& output : program(name + "_slope").outputs) {
+            list.push_back({fmt::format("rows.result[{}]", variable_of(output)), output.value});
+            if (output.target.ends_with("-="))
+                takes += fmt::format("        rows.takes[{}] = true;\n", variable_of(output));
+        }
+        const std::string inside = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines() + takes;
         std::string begin;
         for (std::size_t j = 0; j < element.x.size(); ++j)
             if (const std::string value = fmt::format("x{}", j); mentions(inside, value))
@@ -205,6 +207,7 @@ std::string LoopedText::along_rows() const {
         const auto [least, most] = std::minmax_element(element.rows.front().begin(), element.rows.front().end());
         return runs.size() == 1 && *least == 0 && *most <= 2 && *most + runs.front().count == d_.system.n;
     };
+    const Walls walls = walls_of(d_.structure.elements, d_.system.q);
     std::string text;
     bool is_first = true;
     for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
@@ -212,17 +215,20 @@ std::string LoopedText::along_rows() const {
         if (element.x.empty()) continue;  // a constant that repeats: of the energy, not of the forces
         const std::string name = element_name(number);
         const bool sets = is_first && covers(element);
+        std::string hung;
+        if (number == walls.element) {
+            if (walls.before) hung = ", lobatto::wall_before";
+            if (walls.behind) hung += hung.empty() ? ", lobatto::wall_behind" : " | lobatto::wall_behind";
+        }
         if (is_first && !sets) text += "        how::template clear<coordinates>(W);\n";
         is_first = false;
-        text +=
-            wrapped(fmt::format("        how::template {}<{}{}, {}_x, {}_run>(q, W, [&](auto& rows) LOBATTO_FORMULA {{ "
-                                "{}(k, {}rows); }});",
-                                sets ? "set_rows" : "add_rows", sets ? "coordinates, " : "", element.x.size(), name,
-                                name, name, time),
-                    "            ");
+        text += wrapped(fmt::format("        how::template {}<coordinates, {}, {}_x, {}_run{}>(q, W, [&](auto& rows) "
+                                    "LOBATTO_FORMULA {{ {}(k, {}rows); }});",
+                                    sets ? "set_rows" : "add_rows", element.x.size(), name, name, hung, name, time),
+                        "            ");
     }
     std::vector<Statement> list;
-    for (const Output& output : program("rest_slope").outputs)
+    for (const Output& output : program("inside_slope").outputs)
         list.push_back(
             {"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W) +=", output.value});
     text += FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();

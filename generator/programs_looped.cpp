@@ -117,6 +117,14 @@ private:
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));
         p_.programs.push_back(std::move(quadratic));
+        if (!d_.structure.neighbours) return;
+        // The same where the walls of a chain are rows.
+        Program inside{"inside_slope", {}};
+        std::vector<ex> slopes = gradient_of(walls_of(elements, d_.system.q).others, variables);
+        for (const auto& [acted_on, force] : elements.other_forces) slopes[static_cast<std::size_t>(acted_on)] -= force;
+        for (std::size_t i = 0; i < slopes.size(); ++i)
+            if (!slopes[i].is_zero()) inside.outputs.push_back({add_to(at(slope(), i)), convert(slopes[i])});
+        p_.programs.push_back(std::move(inside));
     }
 
     void element(std::size_t number, const Element& element) {

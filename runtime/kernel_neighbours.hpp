@@ -32,17 +32,17 @@ constexpr bool fits_registers() {
         return false;
 }
 
-// One trajectory; its state, the memory of its last step, and room for the next. A step is solved in registers, all
-// written out, or in memory; to the same bits.
+// One trajectory; its state, the memory of its last step, and room for the next. Most steps are quick ones: as many
+// sweeps as the last measurement found enough, and one test of the last increment, in registers, all written out, or in
+// memory; to the same bits. A step that does not pass, and now and then one to measure with, is taken carefully: in
+// memory, and every sweep looks at its increments.
 template <class K, bool in_registers = fits_registers<K>()>
 struct NeighbourSweeps {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
     static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
-    static constexpr int evaluation_limit = 16, measured_every = 16;
+    static constexpr int evaluation_limit = 16, longest_interval = 256, shortest_interval = 4;
     using V = Pack<real, width>;
-    using How = std::conditional_t<in_registers, WrittenOut, SideBySide>;
-    using Row = std::conditional_t<in_registers, Registers<V, parts>, real*>;
 
     real before[inner_room][s];           // -h^2 A E: from the accelerations of the step before (D15)
     real inner[inner_room][inner_room];   // -h^2 A
@@ -52,8 +52,14 @@ struct NeighbourSweeps {
     real h{};
     real tolerance{};      // of increments, relative; 0: to rounding
     real shrinking{};      // rho, as last measured; 0: never
+    real measured_for{};   // the tolerance
     int until_measured{};  // steps
-    int expected{};        // sweeps
+    int interval{};        // between the last two measurements, in steps
+    int expected{};        // sweeps of a quick step; 0: unknown
+    int late{};            // how many of the last quick steps, without a break, took more
+    // Squares of increments that are small enough: on_rate v^2 + still, the latter as in the last careful step.
+    real on_rate{};
+    alignas(V) real still[room]{};
     bool has_history{};
     int now{}, then{1};                                            // the present, the beginning of the last step, of
     alignas(V) real q[3][room]{}, u[3][room]{}, w_end[3][room]{};  // position, velocity, W there
@@ -71,15 +77,13 @@ struct NeighbourSweeps {
         V X[inner_room * parts], base[inner_room * parts], rate[parts], change[parts];
         V W[inner_room * parts], q1[parts], W1[parts];
     };
-    struct Nothing {};
-    using Nodes = std::conditional_t<in_registers, InRegisters, InMemory>;
-    std::conditional_t<in_registers, Nothing, InMemory> memory{};
+    InMemory memory{};
 
     void prepare(const typename K::Coefficients&, real step_size) {
         h = step_size;
         has_history = false;
         shrinking = real(0);
-        until_measured = expected = 0;
+        until_measured = interval = expected = 0;
         for (int i = 0; i < m; ++i) {
             real row_sum = real(0);
             for (int j = 0; j < m; ++j) {
@@ -102,7 +106,7 @@ struct NeighbourSweeps {
     // Begins at q and u, where W is W0.
     void begin(const real* position, const real* velocity, const real* W0) {
         has_history = false;
-        until_measured = expected = 0;
+        until_measured = interval = expected = 0;
         for (int c = 0; c < n; ++c) {
             q[now][c] = position[c];
             u[now][c] = velocity[c];
@@ -129,56 +133,47 @@ struct NeighbourSweeps {
 
     // One step, h from `time`. False, and nothing has moved, where the sweeps do not contract.
     bool step(const typename K::Coefficients& k, real time) {
-        if constexpr (in_registers) {
-            InRegisters nodes;
-            return step_in(nodes, k, time);
-        } else {
-            return step_in(memory, k, time);
+        if (tolerance != measured_for) until_measured = 0;
+        if (m == 0 || (expected > 0 && until_measured > 0)) {
+            bool good;
+            if constexpr (in_registers) {
+                InRegisters nodes;
+                good = quick_step(nodes, k, time);
+            } else {
+                good = quick_step(memory, k, time);
+            }
+            if (good) {
+                --until_measured;
+                late = evaluations > expected ? late + 1 : 0;
+                if (late > 3) expected = evaluations;
+                return true;
+            }
         }
+        return careful_step(k, time);
     }
 
 private:
-    LOBATTO_INLINE bool step_in(Nodes& a, const typename K::Coefficients& k, real time) {
-        if (has_history)
-            predict<true>(a);
-        else
-            predict<false>(a);
-        if (m > 0 && !solve(a, k, time)) return false;
-        return finish(a, k, time);
-    }
-
     int next() const { return 3 - now - then; }
-    // The coordinates of node i in one of the arrays of Nodes.
-    LOBATTO_INLINE static Row row(V* nodes, int i = 0) { return {nodes + i * parts}; }
-    LOBATTO_INLINE static Row row(real* nodes, int i = 0) { return nodes + i * room; }
+    // The coordinates of node i in one of the arrays of a step.
+    LOBATTO_INLINE static Registers<V, parts> row(V* nodes, int i = 0) { return {nodes + i * parts}; }
+    LOBATTO_INLINE static real* row(real* nodes, int i = 0) { return nodes + i * room; }
     // W at inner node i, the position at the end and W there, of the step that is being solved.
-    LOBATTO_INLINE Row W_at(Nodes& a, int i) {
-        if constexpr (in_registers)
-            return row(a.W, i);
-        else
-            return row(w[1 - last], i);
-    }
-    LOBATTO_INLINE Row arrival_of(Nodes& a) {
-        if constexpr (in_registers)
-            return row(a.q1);
-        else
-            return q[next()];
-    }
-    LOBATTO_INLINE Row W_at_end(Nodes& a) {
-        if constexpr (in_registers)
-            return row(a.W1);
-        else
-            return w_end[next()];
-    }
+    LOBATTO_INLINE Registers<V, parts> W_at(InRegisters& a, int i) { return row(a.W, i); }
+    LOBATTO_INLINE real* W_at(InMemory&, int i) { return row(w[1 - last], i); }
+    LOBATTO_INLINE Registers<V, parts> arrival_of(InRegisters& a) { return row(a.q1); }
+    LOBATTO_INLINE real* arrival_of(InMemory&) { return q[next()]; }
+    LOBATTO_INLINE Registers<V, parts> W_at_end(InRegisters& a) { return row(a.W1); }
+    LOBATTO_INLINE real* W_at_end(InMemory&) { return w_end[next()]; }
     // f(at) for all parts, which begin at coordinate `at`.
-    template <class F>
+    template <class Nodes, class F>
     LOBATTO_INLINE static void over_parts(const F& f) {
-        if constexpr (in_registers)
+        if constexpr (std::is_same_v<Nodes, InRegisters>)
             written_out<width>(parts * width, f);
         else
             for (int at = 0; at < parts * width; at += width) f(at);
     }
 
+    template <class How, class Row>
     LOBATTO_INLINE static void accelerate_here(const typename K::Coefficients& k, real time, Row position, Row W) {
         if constexpr (K::autonomous)
             K::template acceleration<How>(k, position, W);
@@ -186,21 +181,57 @@ private:
             K::template acceleration<How>(k, time, position, W);
     }
     // In memory one copy of the formulas serves all nodes.
-    static void accelerate_apart(const typename K::Coefficients& k, real time, Row position, Row W) {
-        accelerate_here(k, time, position, W);
+    static void accelerate(const typename K::Coefficients& k, real time, real* position, real* W) {
+        accelerate_here<SideBySide>(k, time, position, W);
     }
-    LOBATTO_INLINE static void accelerate(const typename K::Coefficients& k, real time, Row position, Row W) {
-        if constexpr (in_registers)
-            accelerate_here(k, time, position, W);
+    LOBATTO_INLINE static void accelerate(const typename K::Coefficients& k, real time, Registers<V, parts> position,
+                                          Registers<V, parts> W) {
+        accelerate_here<WrittenOut>(k, time, position, W);
+    }
+    template <class Nodes>
+    LOBATTO_INLINE void accelerate_nodes(Nodes& a, const typename K::Coefficients& k, real time) {
+#pragma GCC unroll 16
+        for (int i = 0; i < m; ++i) accelerate(k, time + K::c[i + 1] * h, row(a.X, i), W_at(a, i));
+    }
+
+    // One sweep more than expected, or two, are no reason for a careful step.
+    template <class Nodes>
+    LOBATTO_INLINE bool quick_step(Nodes& a, const typename K::Coefficients& k, real time) {
+        predict<true>(a);
+        if constexpr (m > 0) {
+            for (evaluations = 1;; ++evaluations) {
+                accelerate_nodes(a, k, time);
+                if (evaluations >= expected) {
+                    if (is_settled(a)) break;
+                    if (evaluations > expected + 1) return false;
+                }
+                sweep(a);
+            }
+        }
+        return finish(a, k, time);
+    }
+    bool careful_step(const typename K::Coefficients& k, real time) {
+        if (has_history)
+            predict<true>(memory);
         else
-            accelerate_apart(k, time, position, W);
+            predict<false>(memory);
+        if (m > 0 && !solve(k, time)) return false;
+        return finish(memory, k, time);
     }
-    real bound() const { return maximum(tolerance, Limits<real>::epsilon); }
+
+    real bound() const {
+        return maximum(tolerance, Limits<real>::epsilon);
+    }
+    // What increments are measured against beside the displacement of each coordinate in a step: the rounding of its
+    // position, relative to the bound.
+    real on_distance() const {
+        return Limits<real>::epsilon / Limits<real>::root_epsilon + Limits<real>::epsilon / bound();
+    }
 
     // The positions at the nodes from the accelerations of the step before.
-    template <bool with_history>
+    template <bool with_history, class Nodes>
     LOBATTO_INLINE void predict(Nodes& a) const {
-        over_parts([&](int at) LOBATTO_FORMULA {
+        over_parts<Nodes>([&](int at) LOBATTO_FORMULA {
             const V Q = V::load(q[now] + at), W_now = V::load(w_end[now] + at);
             const V v = fused(V(weight[0]), W_now, V::load(u[now] + at));
             store_to(row(a.rate), at, v);
@@ -225,70 +256,105 @@ private:
         });
     }
 
-    // X = q + h c v - h^2 A W; and, where it `looks`, the largest of what it moved by, measured against the
-    // displacement of each coordinate in a step, with the rounding of its position as floor.
-    template <bool looks>
-    LOBATTO_INLINE real sweep(Nodes& a) {
-        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
-        const V on_distance = V(floor + Limits<real>::epsilon / bound()), step_size = V(h);
-        V worst = V(real(0));
-        over_parts([&](int at) LOBATTO_FORMULA {
-            V W[inner_room], farthest = V(real(0));
+    // f(i, x): x = (q + h c v - h^2 A W)_i of all inner nodes, for the part that begins at coordinate `at`.
+    template <class Nodes, class F>
+    LOBATTO_INLINE void map_stages(Nodes& a, int at, const F& f) {
+        V W[inner_room];
 #pragma GCC unroll 16
-            for (int j = 0; j < m; ++j) W[j] = load_from<V>(W_at(a, j), at);
+        for (int j = 0; j < m; ++j) W[j] = load_from<V>(W_at(a, j), at);
 #pragma GCC unroll 16
-            for (int i = 0; i < m; ++i) {
-                V x = load_from<V>(row(a.base, i), at);
+        for (int i = 0; i < m; ++i) {
+            V x = load_from<V>(row(a.base, i), at);
 #pragma GCC unroll 16
-                for (int j = 0; j < m; ++j) x = fused(V(inner[i][j]), W[j], x);
-                if constexpr (looks) {
-                    const V moved = fabs(x - load_from<V>(row(a.X, i), at));
-                    farthest = i == 0 ? moved : maximum(farthest, moved);
-                }
-                store_to(row(a.X, i), at, x);
-            }
-            if constexpr (looks) {
-                const V rounding = fused(on_distance, fabs(V::load(q[now] + at)), V(Limits<real>::smallest));
-                const V speed = fabs(load_from<V>(row(a.rate), at)) + fabs(step_size * V::load(w_end[now] + at));
-                const V scale = minimum(fused(fabs(step_size), speed, rounding), V(Limits<real>::largest / real(8)));
-                worst = maximum(worst, farthest * rough_inverse(scale));
-            }
+            for (int j = 0; j < m; ++j) x = fused(V(inner[i][j]), W[j], x);
+            f(i, x);
+        }
+    }
+    template <class Nodes>
+    LOBATTO_INLINE void sweep(Nodes& a) {
+        over_parts<Nodes>([&](int at) LOBATTO_FORMULA {
+            map_stages(a, at, [&](int i, const V& x) LOBATTO_FORMULA { store_to(row(a.X, i), at, x); });
         });
-        return looks ? largest(worst) : real(0);
+    }
+    // A sweep that looks: the largest of what it moves by, measured against the displacement of each coordinate in a
+    // step, with the rounding of its position as floor.
+    real look(InMemory& a) {
+        const V step_size = V(h), on_position = V(on_distance());
+        V worst = V(real(0));
+        over_parts<InMemory>([&](int at) LOBATTO_FORMULA {
+            V farthest = V(real(0));
+            map_stages(a, at, [&](int i, const V& x) LOBATTO_FORMULA {
+                const V moved = fabs(x - V::load(row(a.X, i) + at));
+                farthest = i == 0 ? moved : maximum(farthest, moved);
+                x.store(row(a.X, i) + at);
+            });
+            const V rounding = fused(on_position, fabs(V::load(q[now] + at)), V(Limits<real>::smallest));
+            const V speed = fabs(V::load(a.rate + at)) + fabs(step_size * V::load(w_end[now] + at));
+            const V scale = minimum(fused(fabs(step_size), speed, rounding), V(Limits<real>::largest / real(8)));
+            worst = maximum(worst, farthest * rough_inverse(scale));
+        });
+        return largest(worst);
+    }
+    // Whether another sweep would move no coordinate by more than is small enough; in squares, which are the fewest
+    // instructions, summed over the nodes. What is not finite shows at the end of the step.
+    template <class Nodes>
+    LOBATTO_INLINE bool is_settled(Nodes& a) {
+        Bits<real, width> signs(0);
+        over_parts<Nodes>([&](int at) LOBATTO_FORMULA {
+            V moved = V(real(0));
+            map_stages(a, at, [&](int i, const V& x) LOBATTO_FORMULA {
+                const V d = x - load_from<V>(row(a.X, i), at);
+                moved = i == 0 ? d * d : fused(d, d, moved);
+            });
+            const V rate = load_from<V>(row(a.rate), at);
+            signs = signs | bits(fused(V(on_rate) * rate, rate, V::load(still + at)) - moved);
+        });
+        return !any(from_bits(signs) < V(real(0)));
+    }
+    // Makes increments of `enough` small enough, relative to what they are measured against in a sweep that looks.
+    // False where their squares are too small or too large for numbers: then no step is quick.
+    bool settle_at(real enough) {
+        on_rate = (enough * h) * (enough * h);
+        V most = V(real(0));
+        over_parts<InMemory>([&](int at) LOBATTO_FORMULA {
+            const V bent = V(h * h) * fabs(V::load(w_end[now] + at));
+            const V distance = V(enough) * fused(V(on_distance()), fabs(V::load(q[now] + at)), bent);
+            (distance * distance).store(still + at);
+            most = maximum(most, distance * distance);
+        });
+        return largest(most) > Limits<real>::smallest / Limits<real>::epsilon && is_finite(sum(most) + on_rate);
     }
 
-    // The accelerations at the inner nodes of the step. Where rho is measured, increments themselves go down to
-    // rounding: the last ratios are those of the errors that shrink most slowly. Otherwise only sweeps from that on
-    // with which the step before ended look at their increments, or from the one before it where rho is small: two
-    // increments show whether it still is.
-    LOBATTO_INLINE bool solve(Nodes& a, const typename K::Coefficients& k, real time) {
+    // The accelerations at the inner nodes of a careful step. Where rho is measured, increments themselves go down to
+    // rounding: the last ratios are those of the errors that shrink most slowly.
+    bool solve(const typename K::Coefficients& k, real time) {
         const bool measures = until_measured == 0;
         const real small = bound();
         constexpr real trusted = real(0.015625);  // of rho, where this step has not shown it
-        const int first_look = real(4) * shrinking < trusted ? expected - 1 : expected;
-        real e_before = real(0), measured = real(0);
-        int enough = 0;  // sweeps, of a step that goes on for the sake of measuring
+        real e_before = real(0), measured = real(0), after[evaluation_limit + 1];  // so many sweeps
         for (evaluations = 1; evaluations <= evaluation_limit; ++evaluations) {
-#pragma GCC unroll 16
-            for (int i = 0; i < m; ++i) accelerate(k, time + K::c[i + 1] * h, row(a.X, i), W_at(a, i));
-            if (!measures && evaluations < first_look) {
-                sweep<false>(a);
-                continue;
-            }
-            const real e = sweep<true>(a);
-            increment = e;
+            accelerate_nodes(memory, k, time);
+            const real e = look(memory);
+            increment = after[evaluations] = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
             const real known = real(4) * maximum(measured, shrinking);  // 4: the motion changes rho
-            if (enough == 0 && known > real(0) && known * e <= small) enough = evaluations;
             const real rho = measures ? real(1) : measured > real(0) ? known : maximum(known, trusted);
             const bool is_rounding = e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0);
             if (rho * e <= small || is_rounding) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
-                until_measured = !measures ? until_measured - 1 : measured > real(0) ? measured_every : 0;
-                // Whether one sweep less would have done, or only two together showed that the rest is rounding.
-                const bool sooner =
-                    is_rounding || real(8) * e <= small || (e_before > real(0) && known * e_before <= small);
-                expected = measures && enough > 0 ? enough : sooner && evaluations > 1 ? evaluations - 1 : evaluations;
+                real enough = shrinking > real(0) ? small / maximum(real(4) * shrinking, trusted) : small;
+                if (is_rounding) enough = maximum(enough, real(2) * e);
+                if (measures) {
+                    measured_for = tolerance;
+                    interval = minimum(maximum(4 * interval, shortest_interval), longest_interval);
+                    until_measured = interval;
+                    expected = 1;
+                    while (expected < evaluations && after[expected] > enough) ++expected;
+                } else {
+                    until_measured = interval = shortest_interval;
+                    expected = evaluations;
+                }
+                if (!settle_at(enough)) expected = 0;
                 return true;
             }
             if (evaluations > 3 && e_before != real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))
@@ -299,13 +365,15 @@ private:
     }
 
     // (D16), (D17): the end of the step, each sum of increments rounded once.
+    template <class Nodes>
     LOBATTO_INLINE bool finish(Nodes& a, const typename K::Coefficients& k, real time) {
-        over_parts([&](int at) LOBATTO_FORMULA {
+        constexpr bool stores = std::is_same_v<Nodes, InRegisters>;
+        over_parts<Nodes>([&](int at) LOBATTO_FORMULA {
             V moved = V(h) * load_from<V>(row(a.rate), at), difference = V(weight[0]) * V::load(w_end[now] + at);
 #pragma GCC unroll 16
             for (int j = 0; j < m; ++j) {
                 const V W = load_from<V>(W_at(a, j), at);
-                if constexpr (in_registers) W.store(w[1 - last] + j * room + at);
+                if constexpr (stores) W.store(w[1 - last] + j * room + at);
                 moved = fused(V(arrival[j]), W, moved);
                 difference = fused(V(weight[j + 1]), W, difference);
             }
@@ -314,17 +382,17 @@ private:
         });
         accelerate(k, time + h, arrival_of(a), W_at_end(a));
         V not_finite = V(real(0));
-        over_parts([&](int at) LOBATTO_FORMULA {
+        over_parts<Nodes>([&](int at) LOBATTO_FORMULA {
             const V W1 = load_from<V>(W_at_end(a), at), q1 = load_from<V>(arrival_of(a), at);
             const V u1 = V::load(u[now] + at) + fused(V(weight[s - 1]), W1, load_from<V>(row(a.change), at));
             u1.store(u[next()] + at);
-            if constexpr (in_registers) {
+            if constexpr (stores) {
                 q1.store(q[next()] + at);
                 W1.store(w_end[next()] + at);
             }
             not_finite = fused(V(real(0)), u1 + q1, not_finite);
         });
-        if (!(sum(not_finite) == real(0))) return false;
+        if (any(not_finite != V(real(0)))) return false;
         then = std::exchange(now, next());
         last = 1 - last;
         has_history = true;

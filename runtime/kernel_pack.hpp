@@ -221,6 +221,21 @@ LOBATTO_INLINE Float16 square_root(Float16 a) {
     return __builtin_ia32_sqrtps512_mask(a, a, static_cast<unsigned short>(-1), current_rounding);
 }
 #endif
+#ifndef __clang__
+// g++ takes a general permutation, with its indices in a register, for what is a shift of two registers.
+#define LOBATTO_SHIFTS 1
+template <int places>
+LOBATTO_INLINE Double8 moved_on(Double8 before, Double8 values) {
+    return (Double8)__builtin_ia32_alignq512_mask((Long8)values, (Long8)before, 8 - places, (Long8)values,
+                                                  static_cast<unsigned char>(-1));
+}
+template <int places>
+LOBATTO_INLINE Float16 moved_on(Float16 before, Float16 values) {
+    typedef int Int16 __attribute__((vector_size(64)));
+    return (Float16)__builtin_ia32_alignd512_mask((Int16)values, (Int16)before, 16 - places, (Int16)values,
+                                                  static_cast<unsigned short>(-1));
+}
+#endif
 LOBATTO_INLINE bool any(Register<double, 8>::Truths truths) {
     return __builtin_ia32_cvtq2mask512((Long8)truths) != 0;
 }
@@ -595,6 +610,12 @@ template <int places, class real, int width, int... lanes>
 LOBATTO_INLINE Pack<real, width> moved_on(const Pack<real, width>& before, const Pack<real, width>& values,
                                           std::integer_sequence<int, lanes...>) {
     Pack<real, width> result;
+#ifdef LOBATTO_SHIFTS
+    if constexpr (width * sizeof(real) == 64) {
+        result.part[0] = registers::moved_on<places>(before.part[0], values.part[0]);
+        return result;
+    }
+#endif
 #if __has_builtin(__builtin_shufflevector)
     result.part[0] = __builtin_shufflevector(before.part[0], values.part[0], (width - places + lanes)...);
 #else

@@ -16,11 +16,12 @@
 
 namespace lobatto {
 
-// Rows of a repeated formula: its variables x, and what it gives for each, to be added to W. V: a number, of one row;
-// or, `in_lanes`, a Pack of `count` rows that follow one another from `row` on.
+// Rows of a repeated formula: its variables x, and what it gives for each, to be added to W, or taken away from it. V:
+// a number, of one row; or, `in_lanes`, a Pack of `count` rows that follow one another from `row` on.
 template <class V, int variables, bool in_lanes>
 struct Rows {
     V x[variables], result[variables]{};
+    bool takes[variables]{};  // known to the compiler
     int row, count;
 
     // A coefficient, of which the table has one value a row.
@@ -39,6 +40,10 @@ struct Rows {
 
 // Shorter runs of rows are not worth a Pack.
 constexpr int long_run = 8;
+
+// Where a chain hangs on walls: rows of two neighbours go on beyond its first coordinate, or its last, with zero in the
+// place of the coordinate that is not there.
+constexpr int no_wall = 0, wall_before = 1, wall_behind = 2;
 
 // The coordinates of one node in registers, a Pack of neighbours each; beyond the last there are zeros.
 template <class V, int parts>
@@ -98,9 +103,11 @@ LOBATTO_INLINE void written_out(int count, const F& f) {
 }
 
 // Going through rows of formulas. `indices` has the `variables` of each row; a run is rows whose variables are those of
-// the row before plus one. All runs of more than one row have the same distances between the variables of a row.
-template <int variables, const auto& indices>
+// the row before plus one. All runs of more than one row have the same distances between the variables of a row. With
+// walls there is one run, over all coordinates, of rows of two neighbours.
+template <int variables, const auto& indices, int walls = no_wall>
 struct RowLoop {
+    static_assert(walls == no_wall || variables == 2);
     // How far variable j is behind the first.
     static constexpr int least() {
         int first = indices[0];
@@ -127,7 +134,18 @@ struct RowLoop {
         const int first = indices[begin * variables] + least();
         constexpr bool overlaps = farthest_within(width) > 0;  // what is loaded for one V serves the next too
         V before[variables], here = load_from<V>(q, first);
+        bool takes[variables]{};
         for (int j = 0; j < variables; ++j) before[j] = V(number(0));
+        if constexpr ((walls & wall_before) != 0) {  // the last lane of what would stand before
+            Rows<V, variables, in_lanes> rows;
+            rows.row = begin;
+            rows.count = width;
+            each(every, [&](auto j) LOBATTO_FORMULA {
+                rows.x[j] = offset(j) == 0 ? V(number(0)) : passed_on<width, width - 1>(V(number(0)), here);
+            });
+            formula(rows);
+            for (int j = 0; j < variables; ++j) before[j] = rows.result[j];
+        }
         const auto add = [&](int r, auto is_whole) LOBATTO_FORMULA {
             const int at = first + r;
             Rows<V, variables, in_lanes> rows;
@@ -148,14 +166,17 @@ struct RowLoop {
             each(every, [&](auto j) LOBATTO_FORMULA {
                 V& result = rows.result[j];
                 if constexpr (in_lanes) {
-                    if constexpr (!is_whole) result = first_lanes(result, count - r);
+                    // The row at the wall gives to its first variable only.
+                    constexpr bool hangs = (walls & wall_behind) != 0 && offset(j) > 0;
+                    if constexpr (!is_whole) result = first_lanes(result, count - (hangs ? 1 : 0) - r);
                 }
+                takes[j] = rows.takes[j];
                 if constexpr (offset(j) > width)
-                    store_to(W, at + offset(j), load_from<V>(W, at + offset(j)) + result);
+                    store_to(W, at + offset(j), joined(load_from<V>(W, at + offset(j)), result, takes[j]));
                 else if constexpr (!adds && j == 0)
-                    sum = passed_on<width, offset(j)>(before[j], result);
+                    sum = sign(passed_on<width, offset(j)>(before[j], result), takes[j]);
                 else
-                    sum += passed_on<width, offset(j)>(before[j], result);
+                    sum = joined(sum, passed_on<width, offset(j)>(before[j], result), takes[j]);
                 before[j] = result;
             });
             store_to(W, at, sum);
@@ -172,16 +193,15 @@ struct RowLoop {
                 behind += width;
             }
         }
-        if (behind < count + farthest_within(width)) {
+        if ((walls & wall_behind) == 0 && behind < count + farthest_within(width)) {
             V sum = adds ? load_from<V>(W, first + behind) : V(number(0));
             each(every, [&](auto j) LOBATTO_FORMULA {
                 if constexpr (offset(j) > 0 && offset(j) <= width)
-                    sum += passed_on<width, offset(j)>(before[j], V(number(0)));
+                    sum = joined(sum, passed_on<width, offset(j)>(before[j], V(number(0))), takes[j]);
             });
             store_to(W, first + behind, sum);
         }
     }
-
     template <class number, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void one_row(int row, Position q, Slope W, const Formula& formula) {
         Rows<number, variables, false> one;
@@ -189,12 +209,35 @@ struct RowLoop {
         one.count = 1;
         for (int j = 0; j < variables; ++j) one.x[j] = q[indices[row * variables + j]];
         formula(one);
-        for (int j = 0; j < variables; ++j) add_to(W, indices[row * variables + j], one.result[j]);
+        for (int j = 0; j < variables; ++j) add_to(W, indices[row * variables + j], sign(one.result[j], one.takes[j]));
+    }
+
+    // The rows at the walls of a chain of `count` coordinates, by themselves.
+    template <class number, class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void wall_rows(int count, Position q, Slope W, const Formula& formula) {
+        const auto hang = [&](int place, bool is_behind) LOBATTO_FORMULA {
+            Rows<number, variables, false> one;
+            one.row = 0;
+            one.count = 1;
+            for (int j = 0; j < variables; ++j) one.x[j] = (offset(j) == 0) == is_behind ? q[place] : number(0);
+            formula(one);
+            for (int j = 0; j < variables; ++j)
+                if ((offset(j) == 0) == is_behind) add_to(W, place, sign(one.result[j], one.takes[j]));
+        };
+        if constexpr ((walls & wall_before) != 0) hang(0, false);
+        if constexpr ((walls & wall_behind) != 0) hang(count - 1, true);
+    }
+
+    // The one run, with the rows at the walls where they are rows as others are.
+    template <class V, bool adds, const auto& runs, class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void entire(Position q, Slope W, const Formula& formula) {
+        run<V, adds>(runs[0], runs[1] + ((walls & wall_behind) != 0 ? 1 : 0), q, W, formula);
     }
 
     // All runs of `runs`, pairs (first row, how many).
     template <class V, const auto& runs, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void all(Position q, Slope W, const Formula& formula) {
+        static_assert(walls == no_wall);
         constexpr int run_count = sizeof(runs) / sizeof(runs[0]);
         const auto one_run = [&](int i) LOBATTO_FORMULA {
             if (runs[i + 1] >= long_run)
@@ -213,6 +256,14 @@ struct RowLoop {
     }
 
 private:
+    template <class V>
+    LOBATTO_INLINE static V sign(const V& given, bool takes) {
+        return takes ? -given : given;
+    }
+    template <class V>
+    LOBATTO_INLINE static V joined(const V& sum, const V& given, bool takes) {
+        return takes ? sum - given : sum + given;
+    }
     // f(0), f(1), ... of numbers known to the compiler.
     template <class F, int... numbers>
     LOBATTO_INLINE static void each(std::integer_sequence<int, numbers...>, const F& f) {
@@ -249,15 +300,18 @@ struct OneByOne {
         return W[place];
     }
     // `runs`: pairs (first row, how many).
-    template <int variables, const auto& indices, const auto& runs, class number, class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
+              class Formula>
     LOBATTO_INLINE static void add_rows(const number* q, number* W, const Formula& formula) {
         RowLoop<variables, indices>::template all<number, runs>(q, W, formula);
+        RowLoop<variables, indices, walls>::template wall_rows<number>(count, q, W, formula);
     }
     // The same where the rows are one run that reaches all of W, of `count`, on which nothing stands yet.
-    template <int count, int variables, const auto& indices, const auto& runs, class number, class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
+              class Formula>
     LOBATTO_INLINE static void set_rows(const number* q, number* W, const Formula& formula) {
         clear<count>(W);
-        add_rows<variables, indices, runs>(q, W, formula);
+        add_rows<count, variables, indices, runs, walls>(q, W, formula);
     }
 };
 
@@ -291,13 +345,18 @@ struct SideBySide {
     LOBATTO_INLINE static Place<real, place> at(real* W) {
         return {W};
     }
-    template <int variables, const auto& indices, const auto& runs, class real, class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class real,
+              class Formula>
     LOBATTO_INLINE static void add_rows(const real* q, real* W, const Formula& formula) {
-        RowLoop<variables, indices>::template all<Lanes<real>, runs>(q, W, formula);
+        if constexpr (walls != no_wall)
+            RowLoop<variables, indices, walls>::template entire<Lanes<real>, true, runs>(q, W, formula);
+        else
+            RowLoop<variables, indices>::template all<Lanes<real>, runs>(q, W, formula);
     }
-    template <int count, int variables, const auto& indices, const auto& runs, class real, class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class real,
+              class Formula>
     LOBATTO_INLINE static void set_rows(const real* q, real* W, const Formula& formula) {
-        RowLoop<variables, indices>::template run<Lanes<real>, false>(runs[0], runs[1], q, W, formula);
+        RowLoop<variables, indices, walls>::template entire<Lanes<real>, false, runs>(q, W, formula);
     }
 };
 
@@ -326,13 +385,18 @@ struct WrittenOut {
     LOBATTO_INLINE static Place<Slope, place> at(Slope W) {
         return {W};
     }
-    template <int variables, const auto& indices, const auto& runs, class V, int parts, class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class V, int parts,
+              class Formula>
     LOBATTO_INLINE static void add_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
-        RowLoop<variables, indices>::template all<V, runs>(q, W, formula);
+        if constexpr (walls != no_wall)
+            RowLoop<variables, indices, walls>::template entire<V, true, runs>(q, W, formula);
+        else
+            RowLoop<variables, indices>::template all<V, runs>(q, W, formula);
     }
-    template <int count, int variables, const auto& indices, const auto& runs, class V, int parts, class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class V, int parts,
+              class Formula>
     LOBATTO_INLINE static void set_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
-        RowLoop<variables, indices>::template run<V, false>(runs[0], runs[1], q, W, formula);
+        RowLoop<variables, indices, walls>::template entire<V, false, runs>(q, W, formula);
     }
 };
 

@@ -186,7 +186,7 @@ template <class K>
 struct FrozenJacobian {
     typename LoopedStages<K>::Matrix matrix;
     typename K::real S[K::entries > 0 ? K::entries : 1];
-    bool usable;
+    bool usable, is_factored;
 };
 
 // Whether sweeps have neighbouring coordinates in lanes, not nodes.
@@ -247,7 +247,10 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
         const Status status = K::prepare(parameters, h, coefficients);
         if (status != Status::ok) return status;
         if constexpr (is_swept) swept.sweeps.prepare(coefficients, h);
-        if constexpr (is_frozen) return freeze(frozen);
+        if constexpr (is_frozen) {
+            frozen.is_factored = false;
+            if constexpr (K::linear) return freeze(frozen);
+        }
         return Status::ok;
     }
 
@@ -578,6 +581,7 @@ private:
             return correct_once(stages, frozen, a);
         } else {
             if constexpr (is_frozen) {
+                if (!frozen.is_factored) factor_quadratic_part(frozen);
                 if (frozen.usable) {
                     const Status status = chord(stages, frozen, a);
                     if (status != Status::not_converged) return status;
@@ -633,15 +637,22 @@ private:
     template <class FrozenPart>
     Status freeze(FrozenPart& part) {
         return workspace.with([&](Arrays& a) {
-            if constexpr (K::linear) {
-                for (int k = 0; k < n; ++k) a.q1[k] = real(0);
-                Formulas<K>::node(coefficients, real(0), a.q1, a.W1, part.S);
-            } else {
-                K::quadratic_part(coefficients, part.S);
-            }
-            part.usable = LoopedStages<K>(coefficients, step_size).factor(part.S, 0, part.matrix);
-            return part.usable || !K::linear ? Status::ok : Status::singular_jacobian;
+            for (int k = 0; k < n; ++k) a.q1[k] = real(0);
+            Formulas<K>::node(coefficients, real(0), a.q1, a.W1, part.S);
+            factor(part);
+            return part.usable ? Status::ok : Status::singular_jacobian;
         });
+    }
+    // The Jacobian of V's quadratic part: when it is first asked for, because sweeps take most steps.
+    template <class FrozenPart>
+    void factor_quadratic_part(FrozenPart& part) {
+        K::quadratic_part(coefficients, part.S);
+        factor(part);
+    }
+    template <class FrozenPart>
+    void factor(FrozenPart& part) {
+        part.usable = LoopedStages<K>(coefficients, step_size).factor(part.S, 0, part.matrix);
+        part.is_factored = true;
     }
 
     // One increment with the frozen Jacobian; its size.

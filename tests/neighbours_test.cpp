@@ -100,6 +100,16 @@ const char* const closed_chain =
     "  - sum(i = 1 .. 24, (x[mod(i, 24) + 1] - x[i])^4/4) - sum(i = 1 .. 22, (x[i+2] - x[i])^2/16)\"\"\"\n"
     "[coordinates]\nx = { count = 24, position = \"i/40\", velocity = 0 }\n";
 
+// Chains on walls: both, with masses of their own; or one, beside other forces and before them.
+const char* const hung_chain =
+    "lagrangian = \"\"\"sum(i = 1 .. 21, (1 + i/8)*x[i]'^2/2) - sum(i = 2 .. 21, spring[i])\n"
+    "  - x[1]^2/2 - x[1]^4/8 - x[21]^2/2 - x[21]^4/8\"\"\"\n"
+    "[definitions]\n\"spring[i]\" = \"(x[i] - x[i-1])^2/2 + (x[i] - x[i-1])^4/8\"\n"
+    "[coordinates]\nx = { count = 21, position = \"i/40\", velocity = 0 }\n";
+const char* const half_hung_chain =
+    "lagrangian = \"\"\"sum(i = 1 .. 16, x[i]'^2/2 - x[i]^4/4) - sum(i = 1 .. 15, (x[i+1] - x[i])^6/6) - x[16]^6/6\n"
+    "  - (x[3] - x[9])^2/2\"\"\"\n[coordinates]\nx = { count = 16, position = \"i/40\", velocity = 0 }\n";
+
 }  // namespace
 
 // What computes here are kernels, which no sanitiser of ours looks into.
@@ -110,13 +120,16 @@ TEST_CASE("a step along neighbours has the same bits in registers and in memory,
     write_text(folder / "both.cpp", program);
     const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
-    for (const char* const body : {driven_chain, closed_chain})
+    for (const char* const body : {driven_chain, closed_chain, hung_chain, half_hung_chain})
         for (const char* const method : {"points = 5", "family = \"gauss\"\nstages = 2"}) {
             INFO(body << method);
             const Derivation derivation =
                 derivation_of(Motion{body, {}, {}, {}, 0.1}, method, "energy = false\ntangent = false");
             REQUIRE(derivation.structure.neighbours);
-            write_text(folder / "motion.hpp", emit(derivation).header);
+            const std::string header = emit(derivation).header;
+            CHECK((header.find("_run, lobatto::wall_") != std::string::npos) ==
+                  (body == hung_chain || body == half_hung_chain));
+            write_text(folder / "motion.hpp", header);
             const auto check = [&](const std::vector<std::string>& target, bool runs_here) {
                 INFO(target.front());
                 std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off"};
