@@ -207,7 +207,7 @@ std::string LoopedText::along_rows() const {
         const auto [least, most] = std::minmax_element(element.rows.front().begin(), element.rows.front().end());
         return runs.size() == 1 && *least == 0 && *most <= 2 && *most + runs.front().count == d_.system.n;
     };
-    const Walls walls = walls_of(d_.structure.elements, d_.system.q);
+    const Walls& walls = d_.structure.walls;
     std::string text;
     bool is_first = true;
     for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {

@@ -120,7 +120,7 @@ private:
         if (!d_.structure.neighbours) return;
         // The same where the walls of a chain are rows.
         Program inside{"inside_slope", {}};
-        std::vector<ex> slopes = gradient_of(walls_of(elements, d_.system.q).others, variables);
+        std::vector<ex> slopes = gradient_of(d_.structure.walls.others, variables);
         for (const auto& [acted_on, force] : elements.other_forces) slopes[static_cast<std::size_t>(acted_on)] -= force;
         for (std::size_t i = 0; i < slopes.size(); ++i)
             if (!slopes[i].is_zero()) inside.outputs.push_back({add_to(at(slope(), i)), convert(slopes[i])});

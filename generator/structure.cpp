@@ -347,6 +347,15 @@ private:
              result_.neighbours      ? "formulas go along coordinates that stand side by side: vector lanes hold these"
              : result_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
                                      : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
+        if (!result_.neighbours) return;
+        result_.walls = walls_of(result_.elements, system_.q);
+        const bool before = result_.walls.before, behind = result_.walls.behind;
+        if (before || behind)
+            find("walls", true,
+                 (before && behind ? "both ends hang on them"
+                  : before         ? name(0) + " hangs on one"
+                                   : name(static_cast<int>(system_.q.size()) - 1) + " hangs on one") +
+                     std::string(" by the formula of neighbours, in whose loop it goes along"));
     }
 
     // h^2 |A| |entries|, where those of M^-1 V'' stand, at the start; norms of largest row sums.

@@ -61,6 +61,7 @@ struct Structure {
     bool unrolled = true;        // separable: every node and coordinate written out; else loops over both
     bool looped = false;         // terms of L that repeat are written once, in loops over tables
     Elements elements;           // looped: of V in q, or of L in z
+    Walls walls;                 // of neighbours
     bool neighbours = false;     // looped, and its formulas go along neighbouring coordinates
     bool diagonal_part =
         false;              // separable: the constant part of M^-1 V'' is diagonal, and taken into the stage map (D31)

@@ -81,9 +81,7 @@ struct NeighbourSweeps {
 
     void prepare(const typename K::Coefficients&, real step_size) {
         h = step_size;
-        has_history = false;
-        shrinking = real(0);
-        until_measured = interval = expected = 0;
+        forget();
         for (int i = 0; i < m; ++i) {
             real row_sum = real(0);
             for (int j = 0; j < m; ++j) {
@@ -105,8 +103,7 @@ struct NeighbourSweeps {
 
     // Begins at q and u, where W is W0.
     void begin(const real* position, const real* velocity, const real* W0) {
-        has_history = false;
-        until_measured = interval = expected = 0;
+        forget();
         for (int c = 0; c < n; ++c) {
             q[now][c] = position[c];
             u[now][c] = velocity[c];
@@ -153,6 +150,11 @@ struct NeighbourSweeps {
     }
 
 private:
+    void forget() {
+        has_history = false;
+        shrinking = real(0);
+        until_measured = interval = expected = late = 0;
+    }
     int next() const { return 3 - now - then; }
     // The coordinates of node i in one of the arrays of a step.
     LOBATTO_INLINE static Registers<V, parts> row(V* nodes, int i = 0) { return {nodes + i * parts}; }
@@ -276,10 +278,20 @@ private:
             map_stages(a, at, [&](int i, const V& x) LOBATTO_FORMULA { store_to(row(a.X, i), at, x); });
         });
     }
+    // What increments of coordinates that hardly move are measured against: the rounding of the largest displacement in
+    // a step. A blow must not be followed down to the denormal numbers that run ahead of it.
+    real least_distance() const {
+        V most = V(real(0));
+        over_parts<InMemory>([&](int at) LOBATTO_FORMULA { most = maximum(most, displacement(at)); });
+        return Limits<real>::epsilon * minimum(largest(most), Limits<real>::largest / real(8));
+    }
+    LOBATTO_INLINE V displacement(int at) const {
+        return V(fabs(h)) * (fabs(V::load(memory.rate + at)) + fabs(V(h) * V::load(w_end[now] + at)));
+    }
     // A sweep that looks: the largest of what it moves by, measured against the displacement of each coordinate in a
-    // step, with the rounding of its position as floor.
-    real look(InMemory& a) {
-        const V step_size = V(h), on_position = V(on_distance());
+    // step, or what is `least`, with the rounding of its position as floor.
+    real look(InMemory& a, real least) {
+        const V on_position = V(on_distance()), floor = V(least + Limits<real>::smallest);
         V worst = V(real(0));
         over_parts<InMemory>([&](int at) LOBATTO_FORMULA {
             V farthest = V(real(0));
@@ -288,9 +300,8 @@ private:
                 farthest = i == 0 ? moved : maximum(farthest, moved);
                 x.store(row(a.X, i) + at);
             });
-            const V rounding = fused(on_position, fabs(V::load(q[now] + at)), V(Limits<real>::smallest));
-            const V speed = fabs(V::load(a.rate + at)) + fabs(step_size * V::load(w_end[now] + at));
-            const V scale = minimum(fused(fabs(step_size), speed, rounding), V(Limits<real>::largest / real(8)));
+            const V rounding = fused(on_position, fabs(V::load(q[now] + at)), floor);
+            const V scale = minimum(displacement(at) + rounding, V(Limits<real>::largest / real(8)));
             worst = maximum(worst, farthest * rough_inverse(scale));
         });
         return largest(worst);
@@ -313,11 +324,11 @@ private:
     }
     // Makes increments of `enough` small enough, relative to what they are measured against in a sweep that looks.
     // False where their squares are too small or too large for numbers: then no step is quick.
-    bool settle_at(real enough) {
+    bool settle_at(real enough, real least) {
         on_rate = (enough * h) * (enough * h);
         V most = V(real(0));
         over_parts<InMemory>([&](int at) LOBATTO_FORMULA {
-            const V bent = V(h * h) * fabs(V::load(w_end[now] + at));
+            const V bent = fused(V(h * h), fabs(V::load(w_end[now] + at)), V(least));
             const V distance = V(enough) * fused(V(on_distance()), fabs(V::load(q[now] + at)), bent);
             (distance * distance).store(still + at);
             most = maximum(most, distance * distance);
@@ -329,12 +340,12 @@ private:
     // rounding: the last ratios are those of the errors that shrink most slowly.
     bool solve(const typename K::Coefficients& k, real time) {
         const bool measures = until_measured == 0;
-        const real small = bound();
+        const real small = bound(), least = least_distance();
         constexpr real trusted = real(0.015625);  // of rho, where this step has not shown it
         real e_before = real(0), measured = real(0), after[evaluation_limit + 1];  // so many sweeps
         for (evaluations = 1; evaluations <= evaluation_limit; ++evaluations) {
             accelerate_nodes(memory, k, time);
-            const real e = look(memory);
+            const real e = look(memory, least);
             increment = after[evaluations] = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
             const real known = real(4) * maximum(measured, shrinking);  // 4: the motion changes rho
@@ -354,7 +365,7 @@ private:
                     until_measured = interval = shortest_interval;
                     expected = evaluations;
                 }
-                if (!settle_at(enough)) expected = 0;
+                if (!settle_at(enough, least)) expected = 0;
                 return true;
             }
             if (evaluations > 3 && e_before != real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))

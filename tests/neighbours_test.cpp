@@ -24,11 +24,12 @@ using namespace lobatto;
 using K = kernels::motion;
 static NeighbourSweeps<K, IN_REGISTERS> within;
 static NeighbourSweeps<K, false> through;
-template <class Sweeps> void begin(Sweeps& sweeps, const K::Coefficients& k, double h, double tolerance) {
+template <class Sweeps> void begin(Sweeps& sweeps, const K::Coefficients& k, double h, double tolerance,
+                                   bool prepares = true) {
     double q[K::coordinates], u[K::coordinates], W[K::coordinates];
     for (int i = 0; i < K::coordinates; ++i) q[i] = std::sin(0.3 * i), u[i] = 0.1 * std::cos(i);
     Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
-    sweeps.prepare(k, h);
+    if (prepares) sweeps.prepare(k, h);
     sweeps.tolerance = tolerance;
     sweeps.begin(q, u, W);
 }
@@ -60,8 +61,60 @@ static void compare_formulas() {
     }
 }
 static bool same(const double* a, const double* b) { return std::memcmp(a, b, sizeof(double) * K::coordinates) == 0; }
+// What a motion before has measured must not show.
+static void begin_again() {
+    K::Coefficients k;
+    K::prepare(K::Parameters(), 0.2, k);
+    double end[2][K::coordinates];
+    for (int run = 0; run < 2; ++run) {
+        begin(through, k, 0.2, 1e-9, run == 0);
+        for (int i = 0; i < 47; ++i)
+            if (!through.step(k, i * 0.2)) std::printf("step %d failed\n", i);
+        for (int c = 0; c < K::coordinates; ++c) end[run][c] = through.q[through.now][c];
+    }
+    if (!same(end[0], end[1])) std::printf("a second run differs\n");
+}
+// A blow that runs into a chain at rest: each step against the same step iterated to rounding with a look at every
+// sweep. In units of the largest displacement; `careful` counts steps that were not quick.
+static void follow_a_blow(double h, double tolerance, double bound) {
+    static NeighbourSweeps<K, IN_REGISTERS> sweeps, looking;
+    double q[K::coordinates] = {}, u[K::coordinates] = {}, W[K::coordinates];
+    u[3] = 1.5;
+    K::Coefficients k;
+    K::prepare(K::Parameters(), h, k);
+    Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
+    sweeps.prepare(k, h);
+    sweeps.tolerance = tolerance;
+    sweeps.begin(q, u, W);
+    double worst = 0;
+    int quick = 0;
+    const int count = 400;
+    for (int i = 0; i < count; ++i) {
+        looking = sweeps;
+        looking.tolerance = 0;
+        looking.expected = 0;
+        const int before = sweeps.until_measured;
+        if (!looking.step(k, i * h) || !sweeps.step(k, i * h)) std::printf("step %d of a blow failed\n", i);
+        if (sweeps.until_measured == before - 1) ++quick;
+        double difference = 0, displacement = 0;
+        for (int c = 0; c < K::coordinates; ++c) {
+            difference = std::fmax(difference, std::fabs(sweeps.q[sweeps.now][c] - looking.q[looking.now][c]));
+            difference = std::fmax(difference, h * std::fabs(sweeps.u[sweeps.now][c] - looking.u[looking.now][c]));
+            displacement = std::fmax(displacement, std::fabs(looking.q[looking.now][c] - looking.q[looking.then][c]));
+        }
+        worst = std::fmax(worst, difference / displacement);
+    }
+    if (!(worst < bound)) std::printf("a blow, h = %g, to %g: off by %g\n", h, tolerance, worst);
+    if (!(quick > count / 2)) std::printf("a blow, h = %g, to %g: %d of %d steps are quick\n", h, tolerance, quick, count);
+}
 int main() {
     compare_formulas();
+    begin_again();
+    for (const double h : {0.02, 0.1}) {
+        follow_a_blow(h, 0, 1e-13);
+        follow_a_blow(h, 1e-9, 4e-9);
+        follow_a_blow(h, 1e-5, 4e-5);
+    }
     int steps = 0, evaluations = 0, failed = 0;
     for (const double h : {0.05, 0.2, 40.0})
         for (const double tolerance : {0.0, 1e-9}) {
