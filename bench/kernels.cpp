@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "cli/kernel_of.hpp"
+#include "cli/stability_limit.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
@@ -92,9 +93,12 @@ constexpr std::array tolerances = {0.0, 1e-12, 1e-10, 1e-9, 1e-7};
 
 Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
-    const auto run = [stepper, tolerance, until = problem.until](double setting,
-                                                                 std::vector<Trajectory>& trajectories) -> Effort {
+    // A step that `lobatto run` warns of is not a setting, however good it looks at T.
+    const double longest = stability_limit(quadrature_of(method)) / problem.frequency;
+    const auto run = [stepper, tolerance, longest, until = problem.until](
+                         double setting, std::vector<Trajectory>& trajectories) -> Effort {
         const double h = until / setting;
+        if (h > longest) return {};
         const auto steps = static_cast<std::int64_t>(setting);
         const lobatto_kernel& table = stepper->kernel().table();
         if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, tolerance, trajectories);

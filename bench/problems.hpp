@@ -150,6 +150,7 @@ struct Problem {
     double until;       // T
     std::vector<double> q, p;
     double longest_step;   // where the scan of steps begins
+    double frequency;      // the highest of small motions: our steps stay within the linear stability limit
     long reference_steps;  // of the reference solution
 };
 const std::vector<Problem>& problems();
