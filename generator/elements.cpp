@@ -5,6 +5,7 @@
 #include "generator/elements.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <map>
 #include <string>
 
@@ -340,7 +341,12 @@ Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
             GiNaC::exmap at_wall;
             at_wall[element.x[slot]] = end;
             at_wall[element.x[1 - slot]] = 0;
-            if (alone.is_zero() || !expanded((alone - element.term.subs(at_wall)).diff(end)).is_zero()) return false;
+            try {
+                if (alone.is_zero() || !expanded((alone - element.term.subs(at_wall)).diff(end)).is_zero())
+                    return false;
+            } catch (const std::exception&) {  // the formula has no value at zero
+                return false;
+            }
             walls.others = rest;
             return true;
         };

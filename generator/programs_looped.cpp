@@ -147,11 +147,13 @@ private:
         if (is_force) gradient[static_cast<std::size_t>(element.target)] = term;
         const ConstantPart constant_part = free_of(element.x);
         Program node{name + "_node", {}}, slope_only{name + "_slope", {}}, quadratic{name + "_quadratic", {}};
+        // Action and reaction: the same value, added and taken away.
         Ids slopes;
+        std::vector<bool> taken;
         for (std::size_t j = 0; j < gradient.size(); ++j) {
-            // Action and reaction: the same value, added and taken away.
             std::size_t i = 0;
-            while (i < j && !expanded(gradient[i] + gradient[j]).is_zero()) ++i;
+            while (i < j && (taken[i] || !expanded(gradient[i] + gradient[j]).is_zero())) ++i;
+            taken.push_back(i < j);
             slopes.push_back(i < j ? slopes[i] : convert(gradient[j]));
             if (!gradient[j].is_zero())
                 slope_only.outputs.push_back({fmt::format("{}[i{}] {}=", slope(), j, i < j ? '-' : '+'), slopes[j]});

@@ -137,7 +137,7 @@ struct Motion {
     real tolerance{};                 // of increments, relative; the iteration of a step ends there, or at rounding
     real q[n]{};                      // position
     std::int32_t iterations{};        // of the last step
-    real increment{};                 // last increment of the last step, relative to its displacement
+    real increment{};                 // last increment of the last step that looked, relative to its displacement
     real event_values[event_room]{};  // at the last state looked at (kernel_events.hpp)
 
     real time() const { return start_time + real(steps) * step_size; }

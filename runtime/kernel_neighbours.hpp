@@ -39,20 +39,22 @@ constexpr bool fits_registers() {
 template <class K, bool in_registers = fits_registers<K>()>
 struct NeighbourSweeps {
     using real = typename K::real;
-    static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
+    static constexpr int n = K::coordinates, s = K::points, m = s - 2;
+    static_assert(m > 0);
     static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
     static constexpr int evaluation_limit = 16, longest_interval = 256, shortest_interval = 4;
     using V = Pack<real, width>;
 
-    real before[inner_room][s];           // -h^2 A E: from the accelerations of the step before (D15)
-    real inner[inner_room][inner_room];   // -h^2 A
-    real simple[inner_room];              // the row sums of the latter
-    real on_velocity[inner_room];         // h c
-    real weight[s], arrival[inner_room];  // -h b and -h^2 b (1 - c)
+    real before[m][s];           // -h^2 A E: from the accelerations of the step before (D15)
+    real inner[m][m];            // -h^2 A
+    real simple[m];              // the row sums of the latter
+    real on_velocity[m];         // h c
+    real weight[s], arrival[m];  // -h b and -h^2 b (1 - c)
     real h{};
     real tolerance{};      // of increments, relative; 0: to rounding
     real shrinking{};      // rho, as last measured; 0: never
     real measured_for{};   // the tolerance
+    real noise{};          // increments that were rounding, and those up to twice as large
     int until_measured{};  // steps
     int interval{};        // between the last two measurements, in steps
     int expected{};        // sweeps of a quick step; 0: unknown
@@ -64,18 +66,18 @@ struct NeighbourSweeps {
     int now{}, then{1};                                            // the present, the beginning of the last step, of
     alignas(V) real q[3][room]{}, u[3][room]{}, w_end[3][room]{};  // position, velocity, W there
     int last{};                                                    // the last step, of
-    alignas(V) real w[2][inner_room * room]{};                     // W at the inner nodes
+    alignas(V) real w[2][m * room]{};                              // W at the inner nodes
     int evaluations{};                                             // of the last step
-    real increment{};                                              // the last one of the last step, relative
+    real increment{};                                              // the last one that was looked at, relative
 
     // Of the step that is being solved: positions of the inner nodes, q + h c v, v, and what u changes by. In registers
     // also W and the end of the step, which otherwise are written where they belong.
     struct InMemory {
-        alignas(V) real X[inner_room * room]{}, base[inner_room * room]{}, rate[room]{}, change[room]{};
+        alignas(V) real X[m * room]{}, base[m * room]{}, rate[room]{}, change[room]{};
     };
     struct InRegisters {
-        V X[inner_room * parts], base[inner_room * parts], rate[parts], change[parts];
-        V W[inner_room * parts], q1[parts], W1[parts];
+        V X[m * parts], base[m * parts], rate[parts], change[parts];
+        V W[m * parts], q1[parts], W1[parts];
     };
     InMemory memory{};
 
@@ -131,7 +133,8 @@ struct NeighbourSweeps {
     // One step, h from `time`. False, and nothing has moved, where the sweeps do not contract.
     bool step(const typename K::Coefficients& k, real time) {
         if (tolerance != measured_for) until_measured = 0;
-        if (m == 0 || (expected > 0 && until_measured > 0)) {
+        int spent = 0;  // sweeps of a quick step that was none
+        if (expected > 0 && until_measured > 0) {
             bool good;
             if constexpr (in_registers) {
                 InRegisters nodes;
@@ -145,14 +148,17 @@ struct NeighbourSweeps {
                 if (late > 3) expected = evaluations;
                 return true;
             }
+            spent = evaluations;
         }
-        return careful_step(k, time);
+        const bool good = careful_step(k, time);
+        evaluations += spent;
+        return good;
     }
 
 private:
     void forget() {
         has_history = false;
-        shrinking = real(0);
+        shrinking = noise = real(0);
         until_measured = interval = expected = late = 0;
     }
     int next() const { return 3 - now - then; }
@@ -200,15 +206,13 @@ private:
     template <class Nodes>
     LOBATTO_INLINE bool quick_step(Nodes& a, const typename K::Coefficients& k, real time) {
         predict<true>(a);
-        if constexpr (m > 0) {
-            for (evaluations = 1;; ++evaluations) {
-                accelerate_nodes(a, k, time);
-                if (evaluations >= expected) {
-                    if (is_settled(a)) break;
-                    if (evaluations > expected + 1) return false;
-                }
-                sweep(a);
+        for (evaluations = 1;; ++evaluations) {
+            accelerate_nodes(a, k, time);
+            if (evaluations >= expected) {
+                if (is_settled(a)) break;
+                if (evaluations > expected + 1) return false;
             }
+            sweep(a);
         }
         return finish(a, k, time);
     }
@@ -217,7 +221,7 @@ private:
             predict<true>(memory);
         else
             predict<false>(memory);
-        if (m > 0 && !solve(k, time)) return false;
+        if (!solve(k, time)) return false;
         return finish(memory, k, time);
     }
 
@@ -261,7 +265,7 @@ private:
     // f(i, x): x = (q + h c v - h^2 A W)_i of all inner nodes, for the part that begins at coordinate `at`.
     template <class Nodes, class F>
     LOBATTO_INLINE void map_stages(Nodes& a, int at, const F& f) {
-        V W[inner_room];
+        V W[m];
 #pragma GCC unroll 16
         for (int j = 0; j < m; ++j) W[j] = load_from<V>(W_at(a, j), at);
 #pragma GCC unroll 16
@@ -307,7 +311,7 @@ private:
         return largest(worst);
     }
     // Whether another sweep would move no coordinate by more than is small enough; in squares, which are the fewest
-    // instructions, summed over the nodes. What is not finite shows at the end of the step.
+    // instructions, summed over the nodes. Of the differences only the signs are asked for.
     template <class Nodes>
     LOBATTO_INLINE bool is_settled(Nodes& a) {
         Bits<real, width> signs(0);
@@ -320,10 +324,11 @@ private:
             const V rate = load_from<V>(row(a.rate), at);
             signs = signs | bits(fused(V(on_rate) * rate, rate, V::load(still + at)) - moved);
         });
-        return !any(from_bits(signs) < V(real(0)));
+        return !any(is_odd(signs >> (8 * static_cast<int>(sizeof(real)) - 1)));
     }
-    // Makes increments of `enough` small enough, relative to what they are measured against in a sweep that looks.
-    // False where their squares are too small or too large for numbers: then no step is quick.
+    // Makes increments of `enough` small enough, relative to what they are measured against in a sweep that looks: of
+    // which the next steps compute the part of the velocity anew. False where squares are too small or too large for
+    // numbers: then no step is quick.
     bool settle_at(real enough, real least) {
         on_rate = (enough * h) * (enough * h);
         V most = V(real(0));
@@ -333,7 +338,9 @@ private:
             (distance * distance).store(still + at);
             most = maximum(most, distance * distance);
         });
-        return largest(most) > Limits<real>::smallest / Limits<real>::epsilon && is_finite(sum(most) + on_rate);
+        const real farthest = least / Limits<real>::epsilon;  // displacement of a coordinate in a step
+        return largest(most) > Limits<real>::smallest / Limits<real>::epsilon && is_finite(sum(most) + on_rate) &&
+               farthest * farthest < Limits<real>::largest * Limits<real>::epsilon;
     }
 
     // The accelerations at the inner nodes of a careful step. Where rho is measured, increments themselves go down to
@@ -354,7 +361,8 @@ private:
             if (rho * e <= small || is_rounding) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
                 real enough = shrinking > real(0) ? small / maximum(real(4) * shrinking, trusted) : small;
-                if (is_rounding) enough = maximum(enough, real(2) * e);
+                if (is_rounding) noise = maximum(noise, real(2) * e);
+                enough = maximum(enough, noise);
                 if (measures) {
                     measured_for = tolerance;
                     interval = minimum(maximum(4 * interval, shortest_interval), longest_interval);

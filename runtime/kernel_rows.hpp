@@ -107,7 +107,6 @@ LOBATTO_INLINE void written_out(int count, const F& f) {
 // walls there is one run, over all coordinates, of rows of two neighbours.
 template <int variables, const auto& indices, int walls = no_wall>
 struct RowLoop {
-    static_assert(walls == no_wall || variables == 2);
     // How far variable j is behind the first.
     static constexpr int least() {
         int first = indices[0];
@@ -131,6 +130,7 @@ struct RowLoop {
         constexpr bool in_lanes = !std::is_same_v<V, element_of<Position>>;
         constexpr int width = in_lanes ? lanes_of<V> : 1;
         constexpr std::make_integer_sequence<int, variables> every{};
+        static_assert(walls == no_wall || (variables == 2 && offset(0) + offset(1) == 1));
         const int first = indices[begin * variables] + least();
         constexpr bool overlaps = farthest_within(width) > 0;  // what is loaded for one V serves the next too
         V before[variables], here = load_from<V>(q, first);
@@ -202,6 +202,7 @@ struct RowLoop {
             store_to(W, first + behind, sum);
         }
     }
+
     template <class number, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void one_row(int row, Position q, Slope W, const Formula& formula) {
         Rows<number, variables, false> one;
@@ -238,21 +239,25 @@ struct RowLoop {
     template <class V, const auto& runs, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void all(Position q, Slope W, const Formula& formula) {
         static_assert(walls == no_wall);
-        constexpr int run_count = sizeof(runs) / sizeof(runs[0]);
-        const auto one_run = [&](int i) LOBATTO_FORMULA {
-            if (runs[i + 1] >= long_run)
-                run<V, true>(runs[i], runs[i + 1], q, W, formula);
-            else if constexpr (are_registers<Position>)
-                written_out<1>(runs[i + 1],
-                               [&](int r) LOBATTO_FORMULA { one_row<real_of<V>>(runs[i] + r, q, W, formula); });
-            else
-                for (int row = runs[i]; row < runs[i] + runs[i + 1]; ++row)
-                    one_row<element_of<Position>>(row, q, W, formula);
-        };
-        if constexpr (are_registers<Position>)
-            written_out<2>(run_count, one_run);
-        else
-            for (int i = 0; i < run_count; i += 2) one_run(i);
+        constexpr int run_count = sizeof(runs) / sizeof(runs[0]) / 2;
+        if constexpr (are_registers<Position>) {
+            each(std::make_integer_sequence<int, run_count>(), [&](auto i) LOBATTO_FORMULA {
+                constexpr int begin = runs[2 * decltype(i)::value], count = runs[2 * decltype(i)::value + 1];
+                if constexpr (count >= long_run)
+                    run<V, true>(begin, count, q, W, formula);
+                else
+                    written_out<1>(count,
+                                   [&](int r) LOBATTO_FORMULA { one_row<real_of<V>>(begin + r, q, W, formula); });
+            });
+        } else {
+            for (int i = 0; i < run_count; ++i) {
+                const int begin = runs[2 * i], count = runs[2 * i + 1];
+                if (count >= long_run)
+                    run<V, true>(begin, count, q, W, formula);
+                else
+                    for (int row = begin; row < begin + count; ++row) one_row<element_of<Position>>(row, q, W, formula);
+            }
+        }
     }
 
 private:

@@ -27,7 +27,7 @@ struct Motion {
 };
 
 // `steps` steps of the scene's own size from its own start.
-Motion motion(const Derivation& derivation, std::int64_t steps) {
+Motion motion(const Derivation& derivation, std::int64_t steps, double tolerance = 0) {
     const Scene& scene = derivation.scene;
     const Kernel kernel = test::kernel_in_own_cache(derivation, Precision::double_);
     TrajectoryRequest request;
@@ -36,6 +36,7 @@ Motion motion(const Derivation& derivation, std::int64_t steps) {
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps;
     request.every = steps;
+    request.tolerance = tolerance;
     for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
         request.q.push_back(scene.evaluate(scene.initial_position[k], "position").to_double());
         request.p.push_back(scene.evaluate(scene.initial_rate[k], "rate").to_double());
@@ -230,6 +231,41 @@ TEST_CASE("positions and velocities of one formula are told apart in the energy 
     const std::vector<double> p = stepper.momentum(0, q, std::vector<double>(12, 0.5));
     REQUIRE(stepper.energy(0, q, p, H) == LOBATTO_OK);
     CHECK(std::fabs(H - exact) < 1e-12);
+}
+
+TEST_CASE("derivatives of a repeated term that are equal and opposite several times") {
+    const Scene shear = scene(
+        "lagrangian = \"sum(i = 1 .. 24, x[i]'^2/2) - sum(i = 1 .. 21, (x[i] - x[i+1] - x[i+2] + x[i+3])^4/4)\"\n"
+        "[coordinates]\nx = { count = 24, position = \"sin(i)\", velocity = 0 }\n" +
+        run);
+    const Derivation shortcut = derive(shear);
+    REQUIRE(shortcut.structure.looped);
+    CHECK(distance(motion(shortcut, 50), motion(derive(shear, true), 50)) < 1e-12);
+}
+
+TEST_CASE("a formula without a value at zero is no wall") {
+    const Scene quotients = scene(
+        "lagrangian = \"\"\"sum(i = 1 .. 24, x[i]'^2/2) - sum(i = 1 .. 23, x[i+1]/x[i] + x[i]/x[i+1])\n"
+        "  - (x[1] - 1)^2\"\"\"\n[coordinates]\nx = { count = 24, position = 1, velocity = \"sin(i)/10\" }\n" +
+        run);
+    const Derivation shortcut = derive(quotients);
+    CHECK_FALSE(shortcut.structure.walls.before);
+    CHECK(distance(motion(shortcut, 50), motion(derive(quotients, true), 50)) < 1e-12);
+}
+
+TEST_CASE("steps of a chain do not depend on the unit of length, a power of two") {
+    const auto in_units = [](const std::string& L) {
+        const Scene chain = scene(
+            "lagrangian = \"\"\"sum(i = 1 .. 256, x[i]'^2/2)\n"
+            "  + sum(i = 1 .. 255, 4*L^2*cos((x[i+1] - x[i])/L))\"\"\"\n"
+            "[coordinates]\nx = { count = 256, position = \"0.05*L*sin(0.37*i^2)\", velocity = 0 }\n"
+            "[parameters]\nL = { value = " +
+            L + ", constant = true }\n[method]\npoints = 4\n[run]\nstep = 0.3\nuntil = 90\n");
+        return motion(derive(chain), 300, 1e-3);
+    };
+    const Motion one = in_units("1"), many = in_units("4096");
+    CHECK(one.result.iterations == many.result.iterations);
+    for (std::size_t k = 0; k < one.q.size(); ++k) CHECK(many.q[k] == 4096 * one.q[k]);
 }
 
 TEST_CASE("a linear chain in loops takes the general path's steps with one correction each") {
