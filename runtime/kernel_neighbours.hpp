@@ -54,7 +54,7 @@ struct NeighbourSweeps {
     real tolerance{};      // of increments, relative; 0: to rounding
     real shrinking{};      // rho, as last measured; 0: never
     real measured_for{};   // the tolerance
-    real noise{};          // increments that were rounding, and those up to twice as large
+    real noise{};          // increments to this tolerance that were rounding, and those up to twice as large
     int until_measured{};  // steps
     int interval{};        // between the last two measurements, in steps
     int expected{};        // sweeps of a quick step; 0: unknown
@@ -132,7 +132,10 @@ struct NeighbourSweeps {
 
     // One step, h from `time`. False, and nothing has moved, where the sweeps do not contract.
     bool step(const typename K::Coefficients& k, real time) {
-        if (tolerance != measured_for) until_measured = 0;
+        if (tolerance != measured_for) {
+            until_measured = 0;
+            noise = real(0);
+        }
         int spent = 0;  // sweeps of a quick step that was none
         if (expected > 0 && until_measured > 0) {
             bool good;
@@ -361,7 +364,7 @@ private:
             if (rho * e <= small || is_rounding) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
                 real enough = shrinking > real(0) ? small / maximum(real(4) * shrinking, trusted) : small;
-                if (is_rounding) noise = maximum(noise, real(2) * e);
+                if (is_rounding) noise = maximum(noise, minimum(real(2) * e, real(4) * small));
                 enough = maximum(enough, noise);
                 if (measures) {
                     measured_for = tolerance;

@@ -75,7 +75,7 @@ static void begin_again() {
     if (!same(end[0], end[1])) std::printf("a second run differs\n");
 }
 // A blow that runs into a chain at rest: each step against the same step iterated to rounding with a look at every
-// sweep. In units of the largest displacement; `careful` counts steps that were not quick.
+// sweep, in units of the largest displacement. What the first hundred steps, to 1e-2, have measured must not serve.
 static void follow_a_blow(double h, double tolerance, double bound) {
     static NeighbourSweeps<K, IN_REGISTERS> sweeps, looking;
     double q[K::coordinates] = {}, u[K::coordinates] = {}, W[K::coordinates];
@@ -84,12 +84,12 @@ static void follow_a_blow(double h, double tolerance, double bound) {
     K::prepare(K::Parameters(), h, k);
     Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
     sweeps.prepare(k, h);
-    sweeps.tolerance = tolerance;
     sweeps.begin(q, u, W);
     double worst = 0;
     int quick = 0;
-    const int count = 400;
+    const int loose = 100, count = 500;
     for (int i = 0; i < count; ++i) {
+        sweeps.tolerance = i < loose ? 1e-2 : tolerance;
         looking = sweeps;
         looking.tolerance = 0;
         looking.expected = 0;
@@ -102,7 +102,7 @@ static void follow_a_blow(double h, double tolerance, double bound) {
             difference = std::fmax(difference, h * std::fabs(sweeps.u[sweeps.now][c] - looking.u[looking.now][c]));
             displacement = std::fmax(displacement, std::fabs(looking.q[looking.now][c] - looking.q[looking.then][c]));
         }
-        worst = std::fmax(worst, difference / displacement);
+        if (i >= loose) worst = std::fmax(worst, difference / displacement);
     }
     if (!(worst < bound)) std::printf("a blow, h = %g, to %g: off by %g\n", h, tolerance, worst);
     if (!(quick > count / 2)) std::printf("a blow, h = %g, to %g: %d of %d steps are quick\n", h, tolerance, quick, count);
@@ -115,6 +115,7 @@ int main() {
         follow_a_blow(h, 1e-9, 4e-9);
         follow_a_blow(h, 1e-5, 4e-5);
     }
+    follow_a_blow(0.19, 1e-9, 2e-8);  // at most 9e-9; 5e-5 of a chain between walls, when what 1e-2 measured served
     int steps = 0, evaluations = 0, failed = 0;
     for (const double h : {0.05, 0.2, 40.0})
         for (const double tolerance : {0.0, 1e-9}) {
