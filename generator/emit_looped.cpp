@@ -228,7 +228,7 @@ std::string LoopedText::along_rows() const {
                         "            ");
     }
     std::vector<Statement> list;
-    for (const Output& output : program("inside_slope").outputs)
+    for (const Output& output : program(walls.before || walls.behind ? "inside_slope" : "rest_slope").outputs)
         list.push_back(
             {"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W) +=", output.value});
     text += FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();

@@ -84,21 +84,20 @@ private:
                 symbols_[variables[i]] = g().input({at("z", i), at("z", i), Stage::iterate, start});
             }
         const Elements& elements = d_.structure.elements;
-        std::vector<ex> gradient = gradient_of(elements.others, variables);
-        const SparseMatrix hessian = derivative_of(gradient, variables);
-        std::map<std::pair<int, int>, ex> entries = hessian.entries();
-        for (const auto& [acted_on, force] : elements.other_forces) {
-            const ex term = general_ ? force : -force;
-            gradient[static_cast<std::size_t>(acted_on)] += term;
-            const SparseMatrix slopes = derivative_of({term}, variables);
-            for (const auto& [place, value] : slopes.entries()) entries[{acted_on, place.second}] += value;
-        }
+        // The gradient of terms and the forces beside them.
+        const auto add_slopes = [&](Program& program, const std::vector<ex>& terms) {
+            std::vector<ex> gradient = gradient_of(terms, variables);
+            for (const auto& [acted_on, force] : elements.other_forces)
+                gradient[static_cast<std::size_t>(acted_on)] += general_ ? force : -force;
+            for (std::size_t i = 0; i < gradient.size(); ++i)
+                if (!gradient[i].is_zero()) program.outputs.push_back({add_to(at(slope(), i)), convert(gradient[i])});
+            return gradient;
+        };
         const ConstantPart constant_part = free_of(variables);
         Program node{"rest_node", {}}, slope_only{"rest_slope", {}}, quadratic{"rest_quadratic", {}};
-        for (std::size_t i = 0; i < gradient.size(); ++i)
-            if (!gradient[i].is_zero()) slope_only.outputs.push_back({add_to(at(slope(), i)), convert(gradient[i])});
+        const SparseMatrix second_derivatives = derivative_of(add_slopes(slope_only, elements.others), variables);
         node.outputs = slope_only.outputs;
-        for (const auto& [place, value] : entries) {
+        for (const auto& [place, value] : second_derivatives.entries()) {
             const auto known = entry_.find(place);
             if (known == entry_.end()) continue;  // zero after all
             node.outputs.push_back({add_to(at(second(), known->second)), convert(value)});
@@ -117,13 +116,10 @@ private:
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));
         p_.programs.push_back(std::move(quadratic));
-        if (!d_.structure.neighbours) return;
+        if (!d_.structure.walls.before && !d_.structure.walls.behind) return;
         // The same where the walls of a chain are rows.
         Program inside{"inside_slope", {}};
-        std::vector<ex> slopes = gradient_of(d_.structure.walls.others, variables);
-        for (const auto& [acted_on, force] : elements.other_forces) slopes[static_cast<std::size_t>(acted_on)] -= force;
-        for (std::size_t i = 0; i < slopes.size(); ++i)
-            if (!slopes[i].is_zero()) inside.outputs.push_back({add_to(at(slope(), i)), convert(slopes[i])});
+        add_slopes(inside, d_.structure.walls.others);
         p_.programs.push_back(std::move(inside));
     }
 
