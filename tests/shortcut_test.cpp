@@ -249,6 +249,7 @@ TEST_CASE("a formula without a value at zero is no wall") {
         "  - (x[1] - 1)^2\"\"\"\n[coordinates]\nx = { count = 24, position = 1, velocity = \"sin(i)/10\" }\n" +
         run);
     const Derivation shortcut = derive(quotients);
+    REQUIRE(shortcut.structure.neighbours);
     CHECK_FALSE(shortcut.structure.walls.before);
     CHECK(distance(motion(shortcut, 50), motion(derive(quotients, true), 50)) < 1e-12);
 }
