@@ -6,11 +6,15 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <future>
+#include <limits>
+#include <map>
 #include <thread>
 
+#include "bench/reference.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/stability_limit.hpp"
 #include "generator/pipeline.hpp"
@@ -20,17 +24,26 @@ namespace lobatto::bench {
 
 namespace {
 
-std::vector<Method> methods_in_race(bool few) {
+std::string scene_path(const Problem& problem) {
+    return std::string(LOBATTO_SOURCE_DIR) + "/bench/scenes/" + problem.scene;
+}
+
+std::vector<Method> methods_in_race(bool few, bool separable) {
     std::vector<Method> methods;
     for (const int points : {3, 4, 5, 6, 7, 8, 9, 10, 12})
         if (!few || points % 4 == 1) methods.push_back({Family::lobatto, points});
     for (const int stages : {2, 3, 4, 6, 8, 10})
         if (!few || stages == 8) methods.push_back({Family::gauss, stages});
+    if (separable)
+        for (const int stages : sizes_of(Family::splitting))
+            if (!few || stages == 11) methods.push_back({Family::splitting, stages});
     return methods;
 }
 
 // Gradients of V, or of L, that a run took.
 long evaluations_of(const lobatto_kernel& kernel, const lobatto_advance& call) {
+    if (kernel.form == LOBATTO_SEPARABLE && kernel.unknowns == 0)  // explicit
+        return static_cast<long>(call.steps_done) * (kernel.nodes - 1);
     const bool lobatto_nodes = std::string(kernel.method).starts_with("Lobatto");
     const bool ends_apart = kernel.form == LOBATTO_SEPARABLE && lobatto_nodes;
     return static_cast<long>(call.iterations) * (kernel.nodes - (ends_apart ? 2 : 0)) +
@@ -91,15 +104,38 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, dou
 // Where the iteration of a step ends, relative to the displacement in it; 0: at rounding.
 constexpr std::array tolerances = {0.0, 1e-12, 1e-10, 1e-9, 1e-7};
 
+// Whether the energy error of a run a hundred times as long stays within ten times that of the run: a step beyond the
+// linear stability limit may look good at T and be lost at 3 T.
+bool endures(const Problem& problem, LoadedStepper<double>& stepper, std::int64_t steps, double tolerance,
+             Trajectory trajectory) {
+    constexpr std::int64_t looks = 16, times = 100;
+    constexpr double rounding = 1e-13;
+    const double H0 = energy_of(problem, trajectory);
+    const auto error_after = [&](std::int64_t count) {
+        if (!run_one(stepper, count, tolerance, trajectory).good) return std::numeric_limits<double>::infinity();
+        return std::fabs(energy_of(problem, trajectory) / H0 - 1);
+    };
+    double largest = rounding;
+    for (std::int64_t look = 0; look < looks; ++look)
+        largest = std::fmax(largest, error_after((look + 1) * steps / looks - look * steps / looks));
+    for (std::int64_t time = 1; time < times && largest < 1; ++time)
+        if (!(error_after(steps) <= 10 * largest)) return false;
+    return largest < 1;
+}
+
 Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
-    // A step that `lobatto run` warns of is not a setting, however good it looks at T.
+    // Beyond this, of which `lobatto run` warns, a step must prove itself.
     const double longest = stability_limit(quadrature_of(method)) / problem.frequency;
-    const auto run = [stepper, tolerance, longest, until = problem.until](
-                         double setting, std::vector<Trajectory>& trajectories) -> Effort {
-        const double h = until / setting;
-        if (h > longest) return {};
+    const auto proven = std::make_shared<std::map<std::int64_t, bool>>();
+    const auto run = [stepper, tolerance, longest, proven, &problem](double setting,
+                                                                     std::vector<Trajectory>& trajectories) -> Effort {
+        const double h = problem.until / setting;
         const auto steps = static_cast<std::int64_t>(setting);
+        if (h > longest && proven->count(steps) == 0)
+            (*proven)[steps] = stepper->prepare({}, h) == LOBATTO_OK &&
+                               endures(problem, *stepper, steps, tolerance, trajectories.front());
+        if (h > longest && !proven->at(steps)) return {};
         const lobatto_kernel& table = stepper->kernel().table();
         if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, tolerance, trajectories);
         if (stepper->prepare({}, h) != LOBATTO_OK) return {};
@@ -115,13 +151,14 @@ Contestant contestant_of(const Problem& problem, Method method, double tolerance
 }  // namespace
 
 KernelSource source_of(const Problem& problem, Method method) {
-    Scene scene = read_scene(std::string(LOBATTO_SOURCE_DIR) + "/bench/scenes/" + problem.scene);
+    Scene scene = read_scene(scene_path(problem));
     scene.method = method;
     return emit(derive(scene));
 }
 
 Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together) {
-    const std::vector<Method> methods = methods_in_race(few);
+    const bool separable = derive(read_scene(scene_path(problem))).system.separable;
+    const std::vector<Method> methods = methods_in_race(few, separable);
     std::vector<KernelSource> sources;
     for (const Method& method : methods) sources.push_back(source_of(problem, method));
     // Compilers side by side; the generator itself is for one thread.
@@ -138,7 +175,8 @@ Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t to
         const Kernel kernel = together > 0 ? ensemble_kernel_of(sources[i], Precision::double_, together)
                                            : kernel_of(sources[i], Precision::double_);
         for (const double tolerance : tolerances)
-            contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel));
+            if (tolerance == 0 || methods[i].family != Family::splitting)
+                contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel));
     }
     return contestants;
 }

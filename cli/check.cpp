@@ -72,9 +72,10 @@ Checked check(const CheckCommand& options) {
     result.derivation = derive(scene, options.general);
     result.operations = operations_of(emit(result.derivation));
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    scene.method.arithmetic = StepArithmetic::plain;  // which the general path has alone
-    result.without = options.general ? result.derivation : derive(scene, true);
-    result.operations_without = options.general ? result.operations : operations_of(emit(result.without));
+    scene.method.arithmetic = StepArithmetic::plain;                                // which the general path has alone
+    const bool alone = options.general || result.derivation.structure.is_explicit;  // which have no other path
+    result.without = alone ? result.derivation : derive(scene, true);
+    result.operations_without = alone ? result.operations : operations_of(emit(result.without));
     result.outputs = outputs_of(result.derivation, result.operations);
     return result;
 }

@@ -98,24 +98,38 @@ double small_phase(const Propagation& step) {
 }  // namespace
 
 double error_power(const Method& method) {
-    const int degree = method.family == Family::lobatto ? method.points - 1 : method.points;
+    const int degree = method.family == Family::lobatto     ? method.points - 1
+                       : method.family == Family::splitting ? 5  // of the polynomial between the ends of a step
+                                                            : method.points;
     return (method.order() + 1.0) / (degree + 1.0);
 }
 
 ErrorEstimate::ErrorEstimate(const Quadrature& quadrature) {
-    for (const GiNaC::ex& point : quadrature.control)
-        control_.push_back(GiNaC::ex_to<GiNaC::numeric>(point.evalf()).to_double());
+    if (quadrature.is_explicit())
+        for (const double end : {0.0, 1.0})
+            for (const int derivative : {0, 1, 2}) data_.push_back({end, derivative});
+    else
+        for (const GiNaC::ex& point : quadrature.control)
+            data_.push_back({GiNaC::ex_to<GiNaC::numeric>(point.evalf()).to_double(), 0});
     const auto lagrange = [&](std::size_t j, double theta) {
         double product = 1;
-        for (std::size_t i = 0; i < control_.size(); ++i)
-            if (i != j) product *= (theta - control_[i]) / (control_[j] - control_[i]);
+        for (std::size_t i = 0; i < data_.size(); ++i)
+            if (i != j) product *= (theta - data_[i].point) / (data_[j].point - data_[i].point);
         return product;
+    };
+    // Hermite's polynomials of degree 5: those of the end 1 are those of the end 0, seen from there.
+    const auto hermite = [](const Datum& datum, double theta) {
+        const double t = datum.point == 0 ? theta : 1 - theta, sign = datum.point == 0 ? 1 : -1, rest = 1 - t;
+        const double cube = rest * rest * rest;
+        return datum.derivative == 0   ? cube * (1 + t * (3 + 6 * t))
+               : datum.derivative == 1 ? sign * cube * t * (1 + 3 * t)
+                                       : cube * t * t / 2;
     };
     for (const double theta : {0.25, 0.5, 0.75}) {
         std::vector<double> ahead, here;
-        for (std::size_t j = 0; j < control_.size(); ++j) {
-            ahead.push_back(lagrange(j, 1 + theta));
-            here.push_back(lagrange(j, theta));
+        for (std::size_t j = 0; j < data_.size(); ++j) {
+            ahead.push_back(quadrature.is_explicit() ? hermite(data_[j], 1 + theta) : lagrange(j, 1 + theta));
+            here.push_back(quadrature.is_explicit() ? hermite(data_[j], theta) : lagrange(j, theta));
         }
         ahead_.push_back(ahead);
         here_.push_back(here);
@@ -131,9 +145,11 @@ double ErrorEstimate::jump(double z) const {
     double largest = 0;
     for (std::size_t i = 0; i < ahead_.size(); ++i) {
         std::complex<double> sum = 0;
-        for (std::size_t j = 0; j < control_.size(); ++j)
-            sum +=
-                ahead_[i][j] * std::polar(1.0, z * control_[j]) - here_[i][j] * std::polar(1.0, z * (1 + control_[j]));
+        for (std::size_t j = 0; j < data_.size(); ++j) {
+            const std::complex<double> rate = std::pow(std::complex<double>(0, z), data_[j].derivative);
+            sum += rate * (ahead_[i][j] * std::polar(1.0, z * data_[j].point) -
+                           here_[i][j] * std::polar(1.0, z * (1 + data_[j].point)));
+        }
         largest = std::max(largest, std::abs(sum));
     }
     return largest;

@@ -53,7 +53,13 @@ public:
     double of_oscillation(double steps, double jump) const;
 
 private:
-    std::vector<double> control_;
+    // The polynomial of a step is sum_j l_j(theta) times the derivative of that order at that point; of splitting
+    // methods, positions, velocities and accelerations at the ends.
+    struct Datum {
+        double point = 0;
+        int derivative = 0;
+    };
+    std::vector<Datum> data_;
     std::vector<std::vector<double>> ahead_, here_;  // l_j(1 + theta), l_j(theta) for each theta
     std::vector<long double> a_, delta_;             // polynomials in z^2
     double phase_of_short_ = 0;                      // phase(shortest)

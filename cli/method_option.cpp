@@ -5,6 +5,7 @@
 #include <string>
 
 #include "generator/source.hpp"
+#include "generator/splitting.hpp"
 
 namespace lobatto {
 
@@ -13,6 +14,12 @@ void MethodOption::add_members_to(CLI::App& command) {
     CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
     lobatto->check(CLI::Range(2, 12));
     gauss->check(CLI::Range(1, 10))->excludes(lobatto);
+    command
+        .add_option("--splitting", splitting,
+                    "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
+        ->check(CLI::IsMember(splitting_stages()))
+        ->excludes(lobatto)
+        ->excludes(gauss);
 }
 
 void MethodOption::add_to(CLI::App& command) {
@@ -33,17 +40,26 @@ void MethodOption::add_to(CLI::App& command) {
 
 void MethodOption::apply(Scene& scene) const {
     Method& method = scene.method;
-    if (points) method.family = Family::lobatto, method.points = *points;
-    if (stages) method.family = Family::gauss, method.points = *stages;
+    if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
     if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
     if (tolerance) {
         if (method.arithmetic == StepArithmetic::clean)
             throw InputError(scene.path +
                              ": clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave "
                              "out --tolerance, or add --arithmetic plain");
+        if (method.family == Family::splitting)
+            throw InputError(scene.path + ": splitting methods iterate nothing; leave out --tolerance");
         method.tolerance = *tolerance;
     }
-    if (method.arithmetic == StepArithmetic::clean) method.tolerance = 0;  // the scene's, with --arithmetic clean
+    // The scene's has no meaning with --arithmetic clean or --splitting.
+    if (method.arithmetic == StepArithmetic::clean || method.family == Family::splitting) method.tolerance = 0;
+}
+
+std::optional<Method> MethodOption::member() const {
+    if (points) return Method{Family::lobatto, *points};
+    if (stages) return Method{Family::gauss, *stages};
+    if (splitting) return Method{Family::splitting, *splitting};
+    return std::nullopt;
 }
 
 }  // namespace lobatto

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The method on the command line, instead of the scene's: --points or --stages, --tolerance or --arithmetic.
+// The method on the command line, instead of the scene's: --points, --stages or --splitting, --tolerance or
+// --arithmetic.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,13 +12,14 @@
 namespace lobatto {
 
 struct MethodOption {
-    std::optional<int> points, stages;
+    std::optional<int> points, stages, splitting;
     std::optional<double> tolerance;
     std::optional<std::string> arithmetic;
 
     void add_to(CLI::App& command);
-    void add_members_to(CLI::App& command);  // --points and --stages alone
+    void add_members_to(CLI::App& command);  // --points, --stages and --splitting alone
     void apply(Scene& scene) const;
+    std::optional<Method> member() const;  // nothing where none is named
 };
 
 }  // namespace lobatto

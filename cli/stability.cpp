@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "cli/stability_chart.hpp"
 #include "cli/stability_text.hpp"
 #include "generator/source.hpp"
+#include "generator/splitting_stability.hpp"
 
 namespace lobatto {
 
@@ -47,18 +49,33 @@ fs::path chart_path(const std::string& given, const std::string& scene) {
     return path;
 }
 
+// In words: exact polynomials of coefficients with 15 digits would fill pages.
+std::string text_of_splitting(const Method& method) {
+    std::string text = fmt::format("{} (order {})\n\nBounded where |trace| < 2 (D36); by h*omega, from 0:\n",
+                                   method.name(), method.order());
+    for (const UnstableSteps& steps : unstable_steps(quadrature_of(method))) {
+        text += fmt::format("  stable   to {:.10f}\n", steps.from);
+        if (std::isfinite(steps.to))
+            text += fmt::format("  unstable to {:.10f}; growth a step: at most 1 + {:.2g}\n", steps.to,
+                                std::expm1(steps.rate));
+        else
+            text += "  unstable beyond, as far as is looked\n";
+    }
+    return text;
+}
+
 void show_members(const StabilityCommand& options) {
     if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
         throw InputError("--chart, --step and --set belong to a scene; name one");
     if (options.method.tolerance || options.method.arithmetic)
         throw InputError("--tolerance and --arithmetic belong to a scene; name one");
-    std::vector<Method> methods;
-    if (options.method.points)
-        methods = {{Family::lobatto, *options.method.points}};
-    else if (options.method.stages)
-        methods = {{Family::gauss, *options.method.stages}};
-    else
-        methods = all_methods();
+    const std::optional<Method> member = options.method.member();
+    if (member && member->family == Family::splitting) {
+        if (options.json) throw InputError("--json is of Lobatto and Gauss, whose limits are exact; leave it out");
+        std::cout << text_of_splitting(*member);
+        return;
+    }
+    const std::vector<Method> methods = member ? std::vector{*member} : all_methods();
     std::vector<Stability> members;
     for (const Method& method : methods) members.push_back(stability(quadrature_of(method)));
     std::cout << (options.json ? json_of(members) : members.size() == 1 ? text_of(members.front()) : text_of(members));
@@ -68,6 +85,11 @@ void show_scene(const StabilityCommand& options) {
     const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart, *options.scene);
     Scene scene = read_scene(*options.scene);
     options.method.apply(scene);
+    if (scene.method.family == Family::splitting)
+        throw InputError(
+            fmt::format("{}: what is exact here is of Lobatto and Gauss; choose one (--points 4), or ask for "
+                        "the limits of the method alone: lobatto stability --splitting {}",
+                        scene.path, scene.method.points));
     const StabilityReport report = stability_report(std::move(scene), options.overrides);
     if (!chart.empty())
         draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "generator/splitting_stability.hpp"
 #include "generator/stability.hpp"
 
 namespace lobatto {
@@ -25,6 +26,11 @@ bool has_limit(const Quadrature& quadrature, double up_to) {
 
 double stability_limit(const Quadrature& quadrature, double up_to) {
     constexpr double none = std::numeric_limits<double>::infinity();
+    if (quadrature.is_explicit()) {
+        for (const UnstableSteps& steps : unstable_steps(quadrature))
+            if (steps.rate >= negligible) return steps.from;
+        return none;
+    }
     if (quadrature.method.family == Family::gauss || !has_limit(quadrature, up_to)) return none;
     const Stability exact = stability(quadrature);
     for (std::size_t k = 0; k < exact.limits.size(); ++k)

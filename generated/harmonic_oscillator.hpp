@@ -21,7 +21,7 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "1e326f4961b7fc96";
+    static constexpr const char* digest = "67a793d8bf7e76ac";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -36,6 +36,7 @@ struct harmonic_oscillator {
     static constexpr int events = 0;            // that are watched for
     static constexpr int event_direction[1] = {};
     static constexpr int points = 4;            // nodes of a step, both ends included
+    static constexpr bool is_explicit = false;  // the inner nodes are solved for
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};

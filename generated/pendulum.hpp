@@ -21,7 +21,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "d746be19923a9414";
+    static constexpr const char* digest = "180286fdcd6ce036";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -36,6 +36,7 @@ struct pendulum {
     static constexpr int events = 0;            // that are watched for
     static constexpr int event_direction[1] = {};
     static constexpr int points = 4;            // nodes of a step, both ends included
+    static constexpr bool is_explicit = false;  // the inner nodes are solved for
     static constexpr bool unrolled = true;      // every node and coordinate is written out
     static constexpr bool diagonal_part = false;  // nothing is taken into the stage map
     static constexpr bool neighbours = false;   // coordinates are taken one by one

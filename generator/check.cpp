@@ -90,8 +90,9 @@ std::vector<Check> check_written_out(const Derivation& derivation) {
     const std::size_t n = static_cast<std::size_t>(system.n), s = c.size(), controls = x.size(), m = controls - 2;
     const ex h = d.h;
 
-    // L_d from its definition: the quadrature of L along the interpolating polynomial; and the virtual work of outer
-    // forces at control point j.
+    // L_d from its definition: the quadrature of L along the interpolating polynomial, or along the path that is
+    // straight between nodes, whose kinetic energy is that of constant velocities; and the virtual work of outer forces
+    // at control point j.
     ex action = 0;
     std::vector<GiNaC::exmap> along(b.size());
     for (std::size_t i = 0; i < b.size(); ++i) {
@@ -99,6 +100,10 @@ std::vector<Check> check_written_out(const Derivation& derivation) {
         for (std::size_t k = 0; k < n; ++k) {
             ex position = 0, velocity = 0;
             for (std::size_t j = 0; j < controls; ++j) {
+                if (quadrature.is_explicit()) {
+                    if (x[j].is_equal(quadrature.nodes[i])) position += d.Q[j][k];
+                    continue;
+                }
                 position += quadrature.basis[j].subs(quadrature.theta == quadrature.nodes[i]) * d.Q[j][k];
                 velocity += quadrature.D(at(i), at(j)) * d.Q[j][k] / h;
             }
@@ -106,6 +111,13 @@ std::vector<Check> check_written_out(const Derivation& derivation) {
             along[i][system.v[k]] = velocity;
         }
         action += h * b[i] * system.lagrangian.subs(along[i], GiNaC::subs_options::no_pattern);
+    }
+    for (std::size_t j = 0; j + 1 < controls && quadrature.is_explicit(); ++j) {
+        GiNaC::exmap straight;
+        for (std::size_t k = 0; k < n; ++k)
+            straight[system.v[k]] = (d.Q[j + 1][k] - d.Q[j][k]) / ((x[j + 1] - x[j]) * h);
+        const ex kinetic = system.lagrangian + system.potential;
+        action += h * (x[j + 1] - x[j]) * kinetic.subs(straight, GiNaC::subs_options::no_pattern);
     }
     const auto work = [&](std::size_t j, std::size_t k) {
         ex sum = 0;
@@ -156,19 +168,20 @@ std::vector<Check> check_written_out(const Derivation& derivation) {
         for (std::size_t l = 0; l < n; ++l) sum += inverse_mass(at(k), at(l)) * vector[l];
         return h * sum;
     };
-    const bool lobatto = quadrature.method.family == Family::lobatto;
+    const bool nodes_are_unknowns = quadrature.method.family != Family::gauss;
     const std::size_t stages = s - 2;
     GiNaC::exmap path;  // the positions at the nodes along the polynomial
     std::vector<Expressions> stage_sum(stages, Expressions(n));
     for (std::size_t i = 0; i < stages; ++i) {
-        const unsigned row = at(lobatto ? i + 1 : i);
         for (std::size_t k = 0; k < n; ++k) {
             ex position = 0;
-            for (std::size_t j = 0; j < controls; ++j) position += quadrature.B(row, at(j)) * d.Q[j][k];
-            if (!lobatto) path[d.Y[i + 1][k]] = position;
+            for (std::size_t j = 0; j < controls && !nodes_are_unknowns; ++j)
+                position += quadrature.B(at(i), at(j)) * d.Q[j][k];
+            if (!nodes_are_unknowns) path[d.Y[i + 1][k]] = position;
             for (std::size_t j = 0; j < m; ++j) {
-                ex weight = 0;
-                for (std::size_t l = 0; l < m; ++l) weight += quadrature.B(row, at(l + 1)) * quadrature.G(at(l), at(j));
+                ex weight = nodes_are_unknowns ? quadrature.G(at(i), at(j)) : ex(0);
+                for (std::size_t l = 0; l < m && !nodes_are_unknowns; ++l)
+                    weight += quadrature.B(at(i), at(l + 1)) * quadrature.G(at(l), at(j));
                 stage_sum[i][k] += weight * interior[j][k];
             }
         }
@@ -202,7 +215,7 @@ std::vector<Check> check_written_out(const Derivation& derivation) {
     }
     for (ex& equation : reduced_form) equation = equation.subs(path, GiNaC::subs_options::no_pattern);
 
-    if (lobatto)
+    if (nodes_are_unknowns)
         add("full system combines these", d.full_system, combined, "F_L does not follow from the discrete action");
     add("reduced system combines these", reduced_form, reduced,
         "what the kernel solves does not follow from the discrete action");
@@ -221,14 +234,15 @@ std::vector<Check> check_written_out(const Derivation& derivation) {
     std::vector<GiNaC::symbol> interior_unknowns;
     for (std::size_t j = 1; j <= stages; ++j)
         interior_unknowns.insert(interior_unknowns.end(), d.Y[j].begin(), d.Y[j].end());
-    if (lobatto)
+    if (nodes_are_unknowns)
         add("dF_L is the derivative of F_L", derivatives(d.full_system, d.full_unknowns), entries_of(d.full_jacobian),
             "an entry of the full Jacobian is wrong");
-    const std::string title = lobatto ? "and so is the reduced Jacobian" : "reduced Jacobian is the derivative";
+    const std::string title =
+        nodes_are_unknowns ? "and so is the reduced Jacobian" : "reduced Jacobian is the derivative";
     if (stages > 0)
         add(title, derivatives(d.reduced_system, interior_unknowns), entries_of(d.reduced_jacobian),
             "an entry of the reduced Jacobian is wrong");
-    if (lobatto)
+    if (nodes_are_unknowns)
         checks.push_back(differences(derivation, "dF_L against central differences", d.full_system, d.full_unknowns,
                                      d.full_jacobian));
     if (stages > 0)

@@ -31,7 +31,8 @@ public:
         weights_ = formulas_(quadrature.weights);
         legendre_ = formulas_(quadrature.legendre);
         B_ = values_of(quadrature.B);
-        D_ = values_of(quadrature.D);
+        is_straight_ = quadrature.is_explicit();
+        if (!is_straight_) D_ = values_of(quadrature.D);
         lagrangian_ = formulas_.convert({system_.lagrangian});
         momentum_ = formulas_.convert(system_.momentum);
         force_ = formulas_.convert(system_.force);
@@ -163,25 +164,40 @@ private:
     }
     const cln::cl_R& B(std::size_t i, std::size_t j) const { return B_[i * control_.size() + j]; }
     const cln::cl_R& D(std::size_t i, std::size_t j) const { return D_[i * control_.size() + j]; }
-    // (D28)
+    // (D28); of straight paths positions alone.
     void set_node(std::size_t i, const Path& X, const Symbols& q, const Symbols& v) {
         formulas_.set(system_.t, t0_ + nodes_[i] * h_);
         for (std::size_t k = 0; k < q.size(); ++k) {
             cln::cl_R position = 0, rise = 0;
             for (std::size_t j = 0; j < X.size(); ++j) {
                 position = position + B(i, j) * X[j][k];
-                rise = rise + D(i, j) * X[j][k];
+                if (!is_straight_) rise = rise + D(i, j) * X[j][k];
             }
             formulas_.set(q[k], position);
             formulas_.set(v[k], rise / h_);
         }
     }
 
+    // Straight between control points j and j + 1 (D40); the position is that of the start.
+    void set_straight(std::size_t j, const Path& X) {
+        set(system_.q, X.front());
+        for (std::size_t k = 0; k < n_; ++k)
+            formulas_.set(system_.v[k], (X[j + 1][k] - X[j][k]) / ((control_[j + 1] - control_[j]) * h_));
+    }
+
+    // Of straight paths L(q, v) - L(q, 0) is the kinetic energy, L(q, 0) at the nodes -V.
     cln::cl_R action(const Path& X) {
         cln::cl_R sum = 0;
         for (std::size_t i = 0; i < nodes_.size(); ++i) {
             set_node(i, X, system_.q, system_.v);
             sum = sum + h_ * weights_[i] * formulas_.evaluate(lagrangian_)[0];
+        }
+        for (std::size_t j = 0; j + 1 < X.size() && is_straight_; ++j) {
+            formulas_.set(system_.t, t0_);
+            set_straight(j, X);
+            const cln::cl_R moving = formulas_.evaluate(lagrangian_)[0];
+            set(system_.v, Numbers(n_, cln::cl_R(0)));
+            sum = sum + h_ * (control_[j + 1] - control_[j]) * (moving - formulas_.evaluate(lagrangian_)[0]);
         }
         return sum;
     }
@@ -194,9 +210,17 @@ private:
             const Numbers p = formulas_.evaluate(momentum_), f = formulas_.evaluate(outer ? outer_force_ : force_);
             for (std::size_t j = 0; j < X.size(); ++j)
                 for (std::size_t k = 0; k < n_; ++k) {
-                    if (!outer) sums[j][k] = sums[j][k] + weights_[i] * D(i, j) * p[k];
+                    if (!outer && !is_straight_) sums[j][k] = sums[j][k] + weights_[i] * D(i, j) * p[k];
                     sums[j][k] = sums[j][k] + h_ * weights_[i] * B(i, j) * f[k];
                 }
+        }
+        for (std::size_t j = 0; j + 1 < X.size() && is_straight_ && !outer; ++j) {
+            set_straight(j, X);
+            const Numbers p = formulas_.evaluate(momentum_);
+            for (std::size_t k = 0; k < n_; ++k) {
+                sums[j][k] = sums[j][k] - p[k];
+                sums[j + 1][k] = sums[j + 1][k] + p[k];
+            }
         }
         return sums;
     }
@@ -396,7 +420,7 @@ private:
     }
 
     // (D12, D16) M times the stage equations is a sum of the slopes R_j = dL_d/dQ_j + delta_j0 p0:
-    // h sum_j C_ij R_j, C_i0 = -c_i, C_ij = (B G)_ij - c_i (1 - x_j).
+    // h sum_j C_ij R_j, C_i0 = -c_i, C_ij = (B G)_ij - c_i (1 - x_j), of straight paths G_ij - ...
     void stage_equations() {
         const Quadrature& quadrature = derivation_.quadrature;
         const bool lobatto = quadrature.method.family == Family::lobatto;
@@ -427,11 +451,15 @@ private:
         // Positions and grad V at the nodes of the list; those of no weight are not needed.
         Path Y(s), grad(s, Numbers(n_, cln::cl_R(0)));
         for (std::size_t i = 0; i < s; ++i) {
-            if (!lobatto && (i == 0 || i + 1 == s)) {
+            if (is_straight_) {
+                formulas_.set(system_.t, t0_ + c[i] * h_);
+                set(system_.q, X[i]);
+            } else if (!lobatto && (i == 0 || i + 1 == s)) {
                 Y[i] = i == 0 ? X.front() : X.back();
                 continue;
+            } else {
+                set_node(lobatto ? i : i - 1, X, system_.q, system_.v);
             }
-            set_node(lobatto ? i : i - 1, X, system_.q, system_.v);
             Y[i] = values_of(system_.q);
             grad[i] = formulas_.evaluate(gradient);
         }
@@ -448,7 +476,8 @@ private:
                 cln::cl_R sum = -c[i] * R[0][k];
                 for (std::size_t j = 1; j <= inner; ++j) {
                     cln::cl_R C = -c[i] * (1 - control_[j]);
-                    for (std::size_t l = 1; l <= inner && i + 1 < s; ++l)
+                    if (is_straight_ && i + 1 < s) C = C + G[(i - 1) * inner + j - 1];
+                    for (std::size_t l = 1; l <= inner && i + 1 < s && !is_straight_; ++l)
                         C = C + B(row, l) * G[(l - 1) * inner + j - 1];
                     sum = sum + C * R[j][k];
                 }
@@ -465,6 +494,7 @@ private:
     Formulas formulas_;
     NearStart start_;
     const std::size_t n_;
+    bool is_straight_ = false;  // the path, from node to node
     cln::cl_R t0_, h_;
     Numbers control_, nodes_, weights_, legendre_, B_, D_, q_, v_, P0_;
     std::vector<Id> lagrangian_, momentum_, force_, outer_force_;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Identities that a rule's tables must satisfy, by routes that quadrature.cpp does not take.
 #include <algorithm>
+#include <cmath>
 
 #include "generator/check.hpp"
+#include "generator/splitting.hpp"
+#include "generator/splitting_order.hpp"
 
 namespace lobatto {
 
@@ -59,6 +62,7 @@ public:
     explicit Identities(const Quadrature& quadrature)
         : q_(quadrature),
           lobatto_(quadrature.method.family == Family::lobatto),
+          is_straight_(quadrature.is_explicit()),
           controls_(quadrature.control.size()),
           r_(quadrature.nodes.size()),
           m_(quadrature.c.size() - 2),
@@ -70,6 +74,12 @@ public:
     }
 
     std::vector<Check> checks() {
+        if (is_straight_) {
+            straight_paths();
+            explicit_stages();
+            order_of_steps();
+            return std::move(checks_);
+        }
         moments();
         lagrange();
         rigidity();
@@ -139,8 +149,8 @@ private:
 
     // (D4). The rule is exact for products of slopes.
     void rigidity() {
-        const Rows K = rows_of(q_.K), G = rows_of(q_.G);
-        Expressions zeros, inverse;
+        const Rows K = rows_of(q_.K);
+        Expressions zeros;
         for (std::size_t i = 0; i < controls_; ++i) {
             ex row = 0;
             for (std::size_t j = 0; j < controls_; ++j) {
@@ -151,6 +161,11 @@ private:
             zeros.push_back(row);
         }
         claim("K integrates products of slopes", zeros, "K is not the rigidity matrix of the basis");
+        inverse_of_K();
+    }
+    void inverse_of_K() {
+        const Rows K = rows_of(q_.K), G = rows_of(q_.G);
+        Expressions inverse;
         for (std::size_t i = 0; i + 2 < controls_; ++i)
             for (std::size_t j = 0; j + 2 < controls_; ++j) {
                 ex product = i == j ? -1 : 0;
@@ -165,7 +180,7 @@ private:
     // that degree; k = 0 is the parabola.
     void forces() {
         const Expressions &c = q_.c, &b = q_.b;
-        Expressions zeros, symplectic;
+        Expressions zeros;
         for (std::size_t k = 0; k + 3 <= controls_; ++k)
             for (std::size_t i = 0; i < m_; ++i) {
                 ex moved =
@@ -177,6 +192,11 @@ private:
         for (std::size_t j = 0; j < c.size(); ++j) arrival += b[j] * (1 - c[j]);
         zeros.push_back(arrival);
         claim("forces bend paths as they must", zeros, "the stage matrix A is inconsistent");
+        symplecticity();
+    }
+    void symplecticity() {
+        const Expressions &c = q_.c, &b = q_.b;
+        Expressions symplectic;
         for (std::size_t i = 0; i < m_; ++i)
             for (std::size_t j = 0; j < i; ++j)
                 symplectic.push_back(b[i + 1] * A_[i][j] - b[j + 1] * A_[j][i] -
@@ -246,8 +266,59 @@ private:
         claim("momenta of cyclic coordinates are constant", zero, "Gauss' rule has no Legendre values");
     }
 
+    // (D40). A symmetric matrix with one diagonal beside the main one is known by what it makes of straight paths: of a
+    // constant nothing, of theta a pull at the ends.
+    void straight_paths() {
+        const Rows K = rows_of(q_.K);
+        Expressions zeros, moment{-1}, mirror;
+        for (std::size_t i = 0; i < controls_; ++i) {
+            ex row = 0, pull = i == 0 ? 1 : i + 1 == controls_ ? -1 : 0;
+            for (std::size_t j = 0; j < controls_; ++j) {
+                row += K[i][j];
+                pull += K[i][j] * q_.c[j];
+                zeros.push_back(K[i][j] - K[j][i]);
+                if (i + 1 < j) zeros.push_back(K[i][j]);
+            }
+            zeros.push_back(row);
+            zeros.push_back(pull);
+            moment[0] += q_.b[i];
+            mirror.push_back(q_.b[i] - q_.b[controls_ - 1 - i]);
+            mirror.push_back(q_.c[i] + q_.c[controls_ - 1 - i] - 1);
+        }
+        claim("K is that of paths straight from node to node", zeros, "K is not the rigidity matrix of the basis");
+        inverse_of_K();
+        claim("its weights sum to 1", moment, "constants are not integrated exactly");
+        claim("a step backwards undoes a step", mirror, "the coefficients are no palindrome");
+    }
+
+    // (D12). Node i follows from the nodes before it.
+    void explicit_stages() {
+        Expressions zeros;
+        for (std::size_t i = 0; i < m_; ++i)
+            for (std::size_t j = 0; j < m_; ++j)
+                zeros.push_back(A_[i][j] - (j < i ? q_.b[j + 1] * (q_.c[i + 1] - q_.c[j + 1]) : ex(0)));
+        claim("each node follows from those before it", zeros, "the stage map is not explicit");
+        symplecticity();
+    }
+
+    // A step of q'' = -grad V against the motion, both as power series in h. The potential is of no symmetry, so that
+    // no two conditions of order fall together.
+    void order_of_steps() {
+        const std::size_t order = static_cast<std::size_t>(q_.order());
+        Check check{"steps are those of the motion to h^" + std::to_string(order), false, false, 0, 0, ""};
+        check.bound = std::pow(10.0, -splitting_of(q_.method.points).digits + 2);
+        check.meaning = "the coefficients are not those of a method of this order";
+        check.measured = splitting_defect(q_, order);
+        check.holds = check.measured <= check.bound;
+        checks_.push_back(check);
+        // What the next power misses is no rounding.
+        const double beyond = splitting_defect(q_, order + 1);
+        checks_.push_back({"and not beyond h^" + std::to_string(order), beyond > 1e-9, false, beyond > 1e-9 ? 0.0 : 1.0,
+                           0, "the order is higher than stated"});
+    }
+
     const Quadrature& q_;
-    bool lobatto_;
+    bool lobatto_, is_straight_;
     std::size_t controls_, r_, m_;
     Rows A_, basis_, slopes_;
     std::vector<Check> checks_;

@@ -35,7 +35,8 @@ public:
           controls_(derivation.quadrature.control.size()),
           lobatto_(derivation.quadrature.method.family == Family::lobatto),
           general_(derivation.structure.form == Form::general),
-          written_out_(is_written_out(derivation.system, derivation.quadrature)),
+          written_out_(!derivation.quadrature.is_explicit() &&
+                       is_written_out(derivation.system, derivation.quadrature)),
           is_paper_scheme_(lobatto_ && s_ == 4 && n_ == 1 && !general_) {
         for (const Coordinate& coordinate : d_.scene.coordinates) {
             taken_.insert(coordinate.name);
@@ -176,6 +177,12 @@ private:
         if (!list.empty()) facts.emplace_back("Forces", list);
         if (d_.scene.has_time) facts.emplace_back("Time", d_.scene.time.get_name());
         facts.emplace_back("Method", fmt::format("{}: order {}", d_.scene.method.name(), d_.quadrature.order()));
+        if (d_.quadrature.is_explicit()) {
+            facts.emplace_back("Step",
+                               "u = M^-1 p and q move in turn: kick u -> u - h b_i W(q) at node i, drift q -> q + "
+                               "h a_i u to the next (D40); nothing is solved for");
+            return;
+        }
         if (!written_out_) {
             facts.emplace_back("Equations",
                                fmt::format("not written out: {} coordinates at {} points of a step are {} positions, "
@@ -198,6 +205,10 @@ private:
     void quadrature() {
         const Quadrature& q = d_.quadrature;
         const std::size_t r = q.nodes.size();
+        if (q.is_explicit()) {
+            straight_path();
+            return;
+        }
         section("Quadrature and interpolation on [0, 1]");
         vector("nodes", "D22", "eq:lobattoQuad", "nodes", numbered("c", r), q.nodes);
         vector("weights", "D22", "eq:lobattoQuad", "weights", numbered("b", r), q.weights);
@@ -217,6 +228,25 @@ private:
         if (s_ > 2)
             matrix("stage_map", lobatto_ ? "D19" : "D32", "",
                    lobatto_ ? "stage map over the interior nodes" : "stage map over the nodes", "A", q.A);
+    }
+
+    // As decimals, which the coefficients are.
+    void straight_path() {
+        const Quadrature& q = d_.quadrature;
+        const auto decimal_of = [](const ex& value) {
+            const auto exact = cln::the<cln::cl_R>(GiNaC::ex_to<GiNaC::numeric>(value).to_cl_N());
+            return GiNaC::numeric(cln::cl_float(exact, cln::float_format(60)));
+        };
+        std::vector<ex> nodes, kicks, drifts;
+        for (std::size_t i = 0; i < s_; ++i) {
+            nodes.push_back(decimal_of(q.c[i]));
+            kicks.push_back(decimal_of(q.b[i]));
+            if (i + 1 < s_) drifts.push_back(decimal_of(q.c[i + 1] - q.c[i]));
+        }
+        section("The path, straight from node to node");
+        vector("nodes", "D40", "", "nodes", numbered("c", s_), nodes);
+        vector("weights", "D40", "", "weights: lengths of the kicks", numbered("b", s_), kicks);
+        vector("drifts", "D40", "", "and of the drifts, c_i+1 - c_i", numbered("a", s_ - 1), drifts);
     }
 
     void separable_system() {

@@ -37,7 +37,7 @@ public:
             general_action();
         if (system_.separable) {
             inverse_mass_ = system_.mass.dense().inverse();
-            if (quadrature_.method.family == Family::lobatto) full_system();
+            if (quadrature_.method.family != Family::gauss) full_system();
             reduced_system();
         }
         return std::move(d_);
@@ -78,10 +78,10 @@ private:
             ex position = 0, rise = 0;
             for (std::size_t j = 0; j < controls_; ++j) {
                 position += quadrature_.B(at(i), at(j)) * Q[j][k];
-                rise += quadrature_.D(at(i), at(j)) * Q[j][k];
+                if (!system_.separable) rise += quadrature_.D(at(i), at(j)) * Q[j][k];
             }
             move[system_.q[k]] = position;
-            move[system_.v[k]] = rise / d_.h;
+            if (!system_.separable) move[system_.v[k]] = rise / d_.h;
         }
         return move;
     }

@@ -17,7 +17,7 @@ struct Discretisation {
     GiNaC::symbol h{"h"};
     GiNaC::symbol t0{"t0"};  // time at the left end of the step; in no formula of an autonomous system
     std::vector<std::vector<GiNaC::symbol>> Q;  // m x n: positions at the control points; Q[0] = left end, Q[m-1] =
-                                                // right end of the step. Lobatto: m = s, at the nodes
+                                                // right end of the step. Lobatto, splitting: m = s, at the nodes
     std::vector<GiNaC::symbol> p0, p1;          // n each: momenta at the ends
 
     GiNaC::ex L_d;  // discrete Lagrangian L_d(Q_0 ... Q_{m-1})      (paper: eq:discreteLagrangianNL)
@@ -33,16 +33,15 @@ struct Discretisation {
 
     // Separable systems. The full system F_L(Q_1 ... Q_{s-2}, p1, q1) = 0 in solved form (paper: eq:internesNL,
     // eq:discreteDynamics), n s equations, and its Jacobian dF_L, (n s) x (n s), columns in the order of the unknowns
-    // Q_1 ... Q_{s-2}, p1, Q_{s-1}. Of Lobatto's family only.
+    // Q_1 ... Q_{s-2}, p1, Q_{s-1}. Not of Gauss' family.
     std::vector<GiNaC::ex> full_system;
     std::vector<GiNaC::symbol> full_unknowns;
     GiNaC::matrix full_jacobian;
 
     // Separable systems. The reduced form, interior unknowns only (numerics: Y_i = q0 + h c_i v - h^2 sum A_ij M^-1
     // grad V(Y_j)), n (s-2) equations and Jacobian, s the nodes with both ends of the step.
-    std::vector<std::vector<GiNaC::symbol>>
-        Y;                                  // s x n: positions at the nodes. Lobatto: Q. Gauss: Y_i = sum_j B_ij Q_j
-    std::vector<GiNaC::ex> drift_velocity;  // n: v = M^-1 (p0 - h b_0 grad V(q0))
+    std::vector<std::vector<GiNaC::symbol>> Y;  // s x n: positions at the nodes. Gauss: Y_i = sum_j B_ij Q_j; else Q
+    std::vector<GiNaC::ex> drift_velocity;      // n: v = M^-1 (p0 - h b_0 grad V(q0))
     std::vector<GiNaC::ex> reduced_system;
     GiNaC::matrix reduced_jacobian;
     std::vector<GiNaC::ex> arrival_position;  // n: q1, explicit in the Y_j

@@ -147,6 +147,8 @@ bool is_member_name(const std::string& name) {
                                                   "unrolled",
                                                   "absorbed",
                                                   "clean",
+                                                  "is_explicit",
+                                                  "drift_length",
                                                   "any_number",
                                                   "costly",
                                                   "diagonal_part",

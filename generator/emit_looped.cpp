@@ -185,7 +185,8 @@ std::vector<RowFunction> LoopedText::row_functions() const {
             if (output.target.ends_with("-="))
                 takes += fmt::format("        rows.takes[{}] = true;\n", variable_of(output));
         }
-        const std::string inside = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines() + takes;
+        const std::string inside =
+            FunctionText(p_, list, names_, precision_, Stage::step_size, true, true).lines() + takes;
         std::string begin;
         for (std::size_t j = 0; j < element.x.size(); ++j)
             if (const std::string value = fmt::format("x{}", j); mentions(inside, value))

@@ -36,6 +36,8 @@ std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
 std::string separable_shapes(const Structure& structure, int nodes, Precision precision) {
     std::string text;
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
+    line(text, fmt::format("bool is_explicit = {}", structure.is_explicit),
+         structure.is_explicit ? "kicks and drifts in turn" : "the inner nodes are solved for");
     if (structure.form == Form::separable) {
         line(text, fmt::format("bool unrolled = {}", structure.unrolled),
              structure.unrolled ? "every node and coordinate is written out" : "loops over nodes and coordinates");
@@ -109,13 +111,14 @@ std::string vector_text(const std::string& name, const std::vector<GiNaC::ex>& v
 
 class Tables {
 public:
-    explicit Tables(Precision precision) : precision_(precision) {}
+    Tables(Precision precision, bool shows_exact) : precision_(precision), shows_exact_(shows_exact) {}
 
     std::string vector(const char* name, const std::vector<GiNaC::ex>& values, const std::string& comment) const {
         std::string exact;
         const std::string text = vector_text(name, values, precision_, exact);
-        return wrapped("    // " + comment + (exact.size() < 1000 && !exact.empty() ? ": " + exact : ""),
-                       "    //     ") +
+        return wrapped(
+                   "    // " + comment + (shows_exact_ && exact.size() < 1000 && !exact.empty() ? ": " + exact : ""),
+                   "    //     ") +
                text;
     }
     std::string matrix(const char* name, const GiNaC::matrix& values, const std::string& comment) const {
@@ -127,6 +130,7 @@ public:
 
 private:
     Precision precision_;
+    bool shows_exact_;
 };
 
 }  // namespace
@@ -163,7 +167,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     static constexpr const char* forms[] = {"linear_map", "separable", "general"};
     const int controls = static_cast<int>(d.quadrature.control.size());
     const bool multiplier = d.scene.method.family == Family::lobatto;
-    const int unknowns = structure.form == Form::linear_map ? 0
+    const int unknowns = structure.form == Form::linear_map || structure.is_explicit ? 0
                          : structure.form == Form::separable
                              ? d.system.n * (d.quadrature.points - 2)
                              : static_cast<int>(structure.routhian.active.size()) * (controls - 1) +
@@ -192,7 +196,8 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     text += integer_table("event_direction", directions);
     if (structure.form == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.quadrature.points, precision);
-    return structure.form == Form::separable && !structure.unrolled ? text + order_of_unknowns(structure) : text;
+    const bool solves = structure.form == Form::separable && !structure.unrolled && !structure.is_explicit;
+    return solves ? text + order_of_unknowns(structure) : text;
 }
 
 bool has_lanes(Precision precision) {
@@ -205,7 +210,14 @@ bool has_tangent(const Derivation& d) {
 
 std::string tables(const Derivation& d, Precision precision) {
     const Quadrature& rule = d.quadrature;
-    const Tables table(precision);
+    const Tables table(precision, !rule.is_explicit());  // of published decimals: their fractions tell nothing
+    if (rule.is_explicit()) {
+        std::vector<GiNaC::ex> drifts;
+        for (std::size_t i = 0; i + 1 < rule.c.size(); ++i) drifts.push_back(rule.c[i + 1] - rule.c[i]);
+        return "\n" + table.vector("c", rule.c, "nodes, in units of the step") +
+               table.vector("b", rule.b, "kicks at the nodes") +
+               table.vector("drift_length", drifts, "between neighbouring nodes");
+    }
     if (d.structure.form != Form::general) {
         std::string text = "\n" + table.vector("c", rule.c, "nodes on [0, 1]") +
                            table.vector("b", rule.b, "their weights") +

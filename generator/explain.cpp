@@ -37,6 +37,7 @@ bool has_linear_terms(const System& system) {
 
 // Points of a step where positions are unknown: of a general step all control points but the first.
 int unknown_points(const Derivation& d) {
+    if (d.structure.is_explicit) return 0;
     if (d.structure.form != Form::general) return d.quadrature.points - 2;
     return d.scene.method.family == Family::lobatto ? d.scene.method.points - 1 : d.scene.method.points;
 }

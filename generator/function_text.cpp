@@ -84,7 +84,7 @@ Hoisted::Hoisted(const Programs& programs) {
 }
 
 FunctionText::FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                           Precision precision, Stage given, bool any_number) {
+                           Precision precision, Stage given, bool any_number, bool fuses) {
     const Graph& graph = programs.graph;
     const char* const type = any_number ? "auto" : "real";
     std::vector<Id> roots;
@@ -148,7 +148,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     };
     const auto text_of = [&](Id id) {
         const std::string name = naming(id);
-        return name.empty() ? formula(graph, id, Notation::cpp, naming, precision) : name;
+        return name.empty() ? formula(graph, id, Notation::cpp, naming, precision, fuses) : name;
     };
 
     const auto assign = [&](const Statement& statement) {
@@ -204,7 +204,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
             const auto wish = suggested.find(id);
             const std::string name = fresh(wish == suggested.end() ? "" : wish->second);
             text_ += wrapped(fmt::format("        const {} {} = {};", type, name,
-                                         formula(graph, id, Notation::cpp, naming, precision)),
+                                         formula(graph, id, Notation::cpp, naming, precision, fuses)),
                              "            ");
             local[id] = name;
         }

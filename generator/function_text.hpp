@@ -29,10 +29,11 @@ struct Statement {
 // Assignments as C++ lines, indented by 8. `external` names what the function is given (inputs, fields of k); a value
 // of a stage up to `given` that has no such name is a mistake of ours. Values used more than once become locals t1, t2,
 // ... or bear the name the derivation gave them; in a template on the type of numbers (`any_number`) they are `auto`.
+// Products are added by fused() where it `fuses`.
 class FunctionText {
 public:
     FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                 Precision precision, Stage given, bool any_number = false);
+                 Precision precision, Stage given, bool any_number = false, bool fuses = false);
     const std::string& lines() const { return text_; }
 
 private:

@@ -65,8 +65,8 @@ std::string_view function_name(Op op) {
 
 class Printer {
 public:
-    Printer(const Graph& graph, Notation notation, const Naming& naming, Precision precision)
-        : graph_(graph), notation_(notation), naming_(naming), precision_(precision) {}
+    Printer(const Graph& graph, Notation notation, const Naming& naming, Precision precision, bool fuses)
+        : graph_(graph), notation_(notation), naming_(naming), precision_(precision), fuses_(fuses) {}
 
     Printed print(Id id, bool at_root = false) const {
         if (naming_ && !at_root) {
@@ -165,12 +165,31 @@ private:
         return {c.label, c.label.find_first_of("+- ") == std::string::npos ? power : sum};
     }
 
+    // Whether a sum can take in this product with one rounding: two factors or more, no quotient, and no change of
+    // sign, which would be an operation of its own.
+    bool can_fuse(Id term) const {
+        const Node& node = graph_[term];
+        return fuses_ && node.op == Op::multiply && (!naming_ || naming_(term).empty()) &&
+               std::none_of(node.operands.begin(), node.operands.end(), [this](Id factor) {
+                   return graph_.is_number(factor, -1) || (graph_[factor].op == Op::power && graph_[factor].index < 0);
+               });
+    }
+
     Printed addition(const Node& node) const {
         std::vector<Id> terms = node.operands;
         if (notation_ != Notation::cpp) {  // for people: a positive term first
             const auto first =
                 std::find_if(terms.begin(), terms.end(), [this](Id term) { return !graph_.is_negative(term); });
             if (first != terms.end()) std::rotate(terms.begin(), first, first + 1);
+        }
+        std::vector<Id> fused;
+        if (const auto plain = std::find_if(terms.begin(), terms.end(), [this](Id term) { return !can_fuse(term); });
+            fuses_ && terms.size() > 1) {
+            std::rotate(terms.begin(), plain == terms.end() ? terms.begin() : plain, terms.end());
+            const auto first =
+                std::stable_partition(terms.begin() + 1, terms.end(), [this](Id term) { return !can_fuse(term); });
+            fused.assign(first, terms.end());
+            terms.erase(first, terms.end());
         }
         std::string text;
         for (const Id term : terms) {
@@ -181,7 +200,13 @@ private:
             else
                 text += (text.empty() ? "" : " + ") + printed;
         }
-        return {text, sum};
+        for (const Id term : fused) {
+            std::vector<Id> factors = graph_[term].operands;
+            const std::string last = print(factors.back()).text;
+            factors.pop_back();
+            text = "fused(" + fraction(factors).text + ", " + last + ", " + text + ")";
+        }
+        return {text, fused.empty() ? sum : atom};
     }
 
     // Factors as numerator over denominator, with the sign in front.
@@ -248,6 +273,7 @@ private:
     Notation notation_;
     const Naming& naming_;
     Precision precision_;
+    bool fuses_;
 };
 
 void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::ex>& symbols) {
@@ -257,8 +283,9 @@ void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::ex>& symbo
 
 }  // namespace
 
-std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming, Precision precision) {
-    return Printer(graph, notation, naming, precision).print(id, true).text;
+std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming, Precision precision,
+                    bool fuses) {
+    return Printer(graph, notation, naming, precision, fuses).print(id, true).text;
 }
 
 std::string decimal(const cln::cl_R& value, int digits) {

@@ -16,9 +16,9 @@ enum class Precision { single, double_, extended, quadruple };  // float, double
 using Naming = std::function<std::string(Id)>;
 
 // The formula of a node. C++ literals are shortest round-trip for double, and 9, 21, 36 digits with suffix f, L, Q
-// otherwise.
+// otherwise. Where it `fuses`, C++ adds products by fused(a, b, c) = a b + c of kernel_pack.hpp.
 std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming = {},
-                    Precision precision = Precision::double_);
+                    Precision precision = Precision::double_, bool fuses = false);
 
 // A number in scientific or plain decimal notation, rounded once to the given count of significant digits.
 std::string decimal(const cln::cl_R& value, int digits);

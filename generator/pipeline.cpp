@@ -2,8 +2,11 @@
 // The one place that calls the stages in order.
 #include "generator/pipeline.hpp"
 
+#include <fmt/format.h>
+
 #include "generator/limits.hpp"
 #include "generator/programs.hpp"
+#include "generator/splitting.hpp"
 #include "generator/start.hpp"
 
 namespace lobatto {
@@ -17,8 +20,23 @@ const Discretisation& Derivation::discretisation() const {
 
 namespace {
 
-// Clean steps are steps of systems with a constant mass matrix and forces without velocities.
-void check_arithmetic(const Scene& scene, const System& system, bool general) {
+// Clean steps and those of splitting methods are steps of systems with a constant mass matrix and forces without
+// velocities.
+void check_method(const Scene& scene, const System& system, bool general) {
+    if (scene.method.family == Family::splitting) {
+        if (general)
+            throw InputError(scene.path +
+                             ": splitting methods have no general path; leave out --general, or choose "
+                             "another method (--points 4)");
+        if (scene.method.arithmetic == StepArithmetic::clean)
+            throw InputError(scene.path +
+                             ": splitting methods have no clean arithmetic; choose another method (--points 8), or "
+                             "plain arithmetic (--arithmetic plain)");
+        if (!system.separable)
+            scene.source.fail(scene.lagrangian_at,
+                              "splitting methods need a constant mass matrix and forces without velocities, but " +
+                                  system.not_separable + "; choose Lobatto (--points 4) or Gauss (--stages 3)");
+    }
     if (scene.method.arithmetic != StepArithmetic::clean) return;
     if (general)
         throw InputError(scene.path +
@@ -36,7 +54,7 @@ Derivation derive(const Scene& scene, bool general) {
     Derivation derivation;
     derivation.scene = scene;
     derivation.system = build_system(scene);
-    check_arithmetic(scene, derivation.system, general);
+    check_method(scene, derivation.system, general);
     check_start(scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     derivation.structure = find_structure(scene, derivation.system, derivation.quadrature, general);
@@ -48,7 +66,7 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
     other.scene = derivation.scene;
     other.scene.method = method;
     other.system = derivation.system;
-    check_arithmetic(other.scene, other.system, derivation.structure.general);
+    check_method(other.scene, other.system, derivation.structure.general);
     other.quadrature = quadrature_of(method);
     other.structure = find_structure(other.scene, other.system, other.quadrature, derivation.structure.general);
     return other;
@@ -56,6 +74,17 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
 
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
     const Scene& scene = derivation.scene;
+    if (derivation.structure.is_explicit) {
+        const int known = splitting_of(scene.method.points).digits,
+                  wanted = options.precision == Precision::extended    ? 19
+                           : options.precision == Precision::quadruple ? 32
+                                                                       : 0;
+        if (known < wanted)
+            throw InputError(
+                fmt::format("{}: the coefficients of {} are known to {} digits, too few for this number "
+                            "type; choose double, or Lobatto (--points 8)",
+                            scene.path, scene.method.name(), known));
+    }
     const Limits limits(scene.path);
     try {
         return emit_kernel(derivation, build_programs(derivation), options);

@@ -35,9 +35,30 @@ Fraction fraction(int r, const numeric& end, const ex& z) {
     return {denominator, below};
 }
 
+// Kicks and drifts are linear in turn, in q and (h/m) p: kick (h/m) p -= z b q, drift q += a (h/m) p.
+Propagation propagation_in_turn(const Quadrature& quadrature) {
+    Propagation result;
+    const ex z = result.z;
+    // Rows q and (h/m) p of the states that begin as (1, 0) and (0, 1).
+    ex q[2] = {1, 0}, p[2] = {0, 1};
+    for (std::size_t i = 0; i < quadrature.c.size(); ++i)
+        for (int k = 0; k < 2; ++k) {
+            p[k] = (p[k] - z * quadrature.b[i] * q[k]).expand();
+            if (i + 1 < quadrature.c.size()) q[k] = (q[k] + (quadrature.c[i + 1] - quadrature.c[i]) * p[k]).expand();
+        }
+    result.delta = 1;
+    result.a = q[0];
+    result.b = p[0];
+    result.c = q[1];
+    result.e_q = ((1 - result.a) / z).expand();
+    result.e_p = (-result.b / z).expand();
+    return result;
+}
+
 }  // namespace
 
 Propagation propagation(const Quadrature& quadrature) {
+    if (quadrature.is_explicit()) return propagation_in_turn(quadrature);
     const bool lobatto = quadrature.method.family == Family::lobatto;
     const int r = quadrature.method.points - (lobatto ? 1 : 0);  // degree of the path
     Propagation result;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "generator/long_real.hpp"
+#include "generator/splitting.hpp"
 #include "generator/surd.hpp"
 
 namespace lobatto {
@@ -260,9 +261,50 @@ Quadrature tables(const Method& method) {
     return result;
 }
 
+// Paths that are straight between the nodes: kinetic energies are those of the lengths of the drifts, and G is Green's
+// function of a string through the nodes, in the order they come (D40).
+Quadrature straight_tables(const Method& method) {
+    const Splitting splitting = splitting_of(method.points);
+    const std::size_t s = splitting.kicks.size();
+    std::vector<numeric> c(s);
+    for (std::size_t i = 0; i + 1 < s; ++i) c[i + 1] = c[i] + splitting.drifts[i];
+    Quadrature result;
+    result.method = method;
+    result.points = static_cast<int>(s);
+    result.c.assign(c.begin(), c.end());
+    result.b.assign(splitting.kicks.begin(), splitting.kicks.end());
+    result.control = result.c;
+    std::vector<std::size_t> weighted;
+    for (std::size_t i = 0; i < s; ++i)
+        if (!splitting.kicks[i].is_zero()) weighted.push_back(i);
+    const auto size = static_cast<unsigned>(s), inner = size - 2;
+    result.B = GiNaC::matrix(static_cast<unsigned>(weighted.size()), size);
+    for (unsigned i = 0; i < result.B.rows(); ++i) {
+        result.nodes.push_back(result.c[weighted[i]]);
+        result.weights.push_back(result.b[weighted[i]]);
+        result.B(i, static_cast<unsigned>(weighted[i])) = 1;
+    }
+    result.K = GiNaC::matrix(size, size);
+    for (unsigned i = 0; i + 1 < size; ++i) {
+        const numeric stiffness = splitting.drifts[i].inverse();
+        result.K(i, i) += stiffness;
+        result.K(i + 1, i + 1) += stiffness;
+        result.K(i, i + 1) = result.K(i + 1, i) = -stiffness;
+    }
+    result.G = GiNaC::matrix(inner, inner);
+    result.A = GiNaC::matrix(inner, inner);
+    for (unsigned i = 0; i < inner; ++i)
+        for (unsigned j = 0; j < inner; ++j) {
+            result.G(i, j) = c[std::min(i, j) + 1] * (1 - c[std::max(i, j) + 1]);
+            result.A(i, j) = splitting.kicks[j + 1] * (c[i + 1] * (1 - c[j + 1]) - result.G(i, j));
+        }
+    return result;
+}
+
 }  // namespace
 
 Quadrature quadrature_of(const Method& method) {
+    if (method.family == Family::splitting) return straight_tables(method);
     const bool lobatto = method.family == Family::lobatto;
     const int least = lobatto ? 2 : 1, most = lobatto ? 12 : 10;
     if (method.points < least || method.points > most)

@@ -5,13 +5,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
+#include <stdexcept>
 
 #include "generator/document.hpp"
 #include "generator/expression.hpp"
 #include "generator/real.hpp"
 #include "generator/scene_system.hpp"
+#include "generator/splitting.hpp"
 #include "generator/table.hpp"
 #include "generator/token.hpp"
 
@@ -70,6 +73,14 @@ private:
         return is_identifier(name) ? name : "scene_" + name;
     }
 
+    int splitting_stages_of(const Entry& entry) const {
+        const std::vector<int>& all = splitting_stages();
+        const std::string there_are = fmt::format("there are splitting methods with {} stages", fmt::join(all, ", "));
+        const auto stages = static_cast<int>(integer_of(source_, entry, all.front(), all.back(), there_are.c_str()));
+        if (std::find(all.begin(), all.end(), stages) == all.end()) fail(entry.value.at, there_are);
+        return stages;
+    }
+
     void read_method() {
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
@@ -79,18 +90,28 @@ private:
         if (family != nullptr) {
             const Value& value = family->value;
             const bool text = value.kind == Value::Kind::text;
-            if (!text || (value.text.value != "lobatto" && value.text.value != "gauss"))
-                fail(value.at, "unknown family; there are \"lobatto\" and \"gauss\"");
-            if (value.text.value == "gauss") scene_.method = {Family::gauss, 3};
+            try {
+                scene_.method.family = family_of(text ? value.text.value : "");
+            } catch (const std::invalid_argument&) {
+                fail(value.at, "unknown family; there are \"lobatto\", \"gauss\" and \"splitting\"");
+            }
+            if (scene_.method.family == Family::gauss) scene_.method.points = 3;
+            if (scene_.method.family == Family::splitting) scene_.method.points = 11;
         }
-        const bool gauss = scene_.method.family == Family::gauss;
-        if (gauss && points != nullptr) fail(points->at, "Gauss has stages, not points: write stages = 3");
-        if (!gauss && stages != nullptr)
-            fail(stages->at, "Lobatto has points, not stages: write points = 4, or add family = \"gauss\"");
+        const bool lobatto = scene_.method.family == Family::lobatto,
+                   splitting = scene_.method.family == Family::splitting;
+        if (!lobatto && points != nullptr)
+            fail(points->at, splitting ? "splitting methods have stages, not points: write stages = 11"
+                                       : "Gauss has stages, not points: write stages = 3");
+        if (lobatto && stages != nullptr)
+            fail(stages->at,
+                 "Lobatto has points, not stages: write points = 4, or add family = \"gauss\" or \"splitting\"");
         if (points != nullptr)
             scene_.method.points =
                 static_cast<int>(integer_of(source_, *points, 2, 12, "there is Lobatto with 2 to 12 points"));
-        if (stages != nullptr)
+        if (stages != nullptr && splitting)
+            scene_.method.points = splitting_stages_of(*stages);
+        else if (stages != nullptr)
             scene_.method.points =
                 static_cast<int>(integer_of(source_, *stages, 1, 10, "there is Gauss with 1 to 10 stages"));
         if (const Entry* tolerance = table.find("tolerance")) {
@@ -102,6 +123,8 @@ private:
                                                       "leave it out to iterate to rounding",
                                                       shown(value)));
         }
+        if (scene_.method.tolerance > 0 && splitting)
+            fail(table.find("tolerance")->at, "splitting methods iterate nothing; leave out the tolerance");
         if (const Entry* arithmetic = table.find("arithmetic")) {
             const Value& value = arithmetic->value;
             const bool text = value.kind == Value::Kind::text;
@@ -223,11 +246,43 @@ private:
 
 }  // namespace
 
+const char* word_of(Family family) {
+    return family == Family::lobatto ? "lobatto" : family == Family::gauss ? "gauss" : "splitting";
+}
+
+Family family_of(const std::string& word) {
+    for (const Family family : {Family::lobatto, Family::gauss, Family::splitting})
+        if (word == word_of(family)) return family;
+    throw std::invalid_argument(word + " is no family of methods");
+}
+
+const std::vector<int>& sizes_of(Family family) {
+    static const std::vector<int> lobatto = {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12},
+                                  gauss = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+    return family == Family::lobatto ? lobatto : family == Family::gauss ? gauss : splitting_stages();
+}
+
+int Method::order() const {
+    switch (family) {
+        case Family::lobatto:
+            return 2 * points - 2;
+        case Family::gauss:
+            return 2 * points;
+        default:
+            return splitting_order(points);
+    }
+}
+
 std::string Method::name() const {
     const std::string suffix = arithmetic == StepArithmetic::clean ? ", clean" : "";
-    return (family == Family::lobatto ? fmt::format("Lobatto, {} points", points)
-                                      : fmt::format("Gauss, {} {}", points, points == 1 ? "stage" : "stages")) +
-           suffix;
+    switch (family) {
+        case Family::lobatto:
+            return fmt::format("Lobatto, {} points{}", points, suffix);
+        case Family::gauss:
+            return fmt::format("Gauss, {} {}{}", points, points == 1 ? "stage" : "stages", suffix);
+        default:
+            return fmt::format("splitting, {} stages{}", points, suffix);
+    }
 }
 
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,

@@ -31,20 +31,24 @@ struct Parameter {
     std::string written = name;  // in formulas: m[3]
 };
 
-enum class Family { lobatto, gauss };
+enum class Family { lobatto, gauss, splitting };
+const char* word_of(Family family);               // as a scene has it: "lobatto", "gauss", "splitting"
+Family family_of(const std::string& word);        // std::invalid_argument where it is none of these
+const std::vector<int>& sizes_of(Family family);  // the points or stages there are, ascending
 
 // How a step is computed: as fast as possible, or so that what rounding leaves is random (kernel_clean.hpp).
 enum class StepArithmetic { plain, clean };
 
-// Quadrature points of one step: Lobatto with 2 to 12, Gauss with 1 to 10 (its stages).
+// Quadrature points of one step: Lobatto with 2 to 12, Gauss with 1 to 10 (its stages), explicit splitting methods with
+// 6, 11, 14, 17 or 35 (stages).
 struct Method {
     Family family = Family::lobatto;
     int points = 4;
     double tolerance = 0;  // of the last increment, relative to the displacement in a step; 0: to rounding
     StepArithmetic arithmetic = StepArithmetic::plain;
 
-    int order() const { return family == Family::lobatto ? 2 * points - 2 : 2 * points; }
-    std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage"
+    int order() const;
+    std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage", "splitting, 11 stages"
 };
 
 struct Run {

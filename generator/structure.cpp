@@ -108,6 +108,7 @@ public:
     }
 
     Structure run() {
+        result_.is_explicit = quadrature_.is_explicit();
         result_.clean = scene_.method.arithmetic == StepArithmetic::clean && !result_.general;
         result_.linear = system_.linear && !result_.general && !result_.clean;
         result_.closed_solution = closed_solution(system_);
@@ -151,7 +152,7 @@ private:
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         result_.diagonal_mass = system_.separable && diagonal;
-        result_.unrolled = interior_ <= unrolled_limit && !result_.clean;
+        result_.unrolled = interior_ <= unrolled_limit && !result_.clean && !result_.is_explicit;
         if (result_.clean) {
             find("round-off-clean arithmetic", true,
                  "asked for: every step is iterated until nothing changes and its increments are added without error, "
@@ -159,10 +160,15 @@ private:
             return;
         }
         const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
-        if (!system_.separable || (!result_.diagonal_mass && !result_.unrolled))
+        if (!system_.separable || (!result_.diagonal_mass && !result_.unrolled && !result_.is_explicit))
             result_.form = Form::general;
-        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted)
+        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted &&
+                 (result_.diagonal_mass || result_.unrolled))
             result_.form = Form::linear_map;
+        if (!result_.is_explicit) return;
+        result_.linear = result_.form == Form::linear_map;
+        find("explicit steps", true,
+             "asked for: positions and velocities move in turn, straight from node to node, and nothing is solved for");
     }
 
     void separable() {
@@ -213,7 +219,7 @@ private:
         repetition();
         absorption();
         neighbourhood();
-        if (result_.clean) return;
+        if (result_.clean || result_.is_explicit) return;
         find("small enough to write out", result_.unrolled,
              result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
                                             interior_, unrolled_limit)
@@ -293,7 +299,7 @@ private:
 
     // The quadratic part of V: worth taking out of the iteration when the rest bends the forces less at the start.
     void absorption() {
-        if (result_.linear || result_.clean || interior_ == 0 || !result_.diagonal_mass) return;
+        if (result_.linear || result_.clean || result_.is_explicit || interior_ == 0 || !result_.diagonal_mass) return;
         result_.constant_hessian = SparseMatrix(n_, n_);
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
@@ -388,8 +394,11 @@ private:
         std::string reason = "all forces are linear, so a step is one matrix: nothing is iterated";
         if (result_.linear && result_.form != Form::linear_map)
             reason = "all forces are linear, so one solve a step is exact, its matrix factored once for all steps";
-        if (!result_.linear) reason = curved();
-        find("linear system", result_.linear, reason);
+        if (result_.is_explicit && system_.linear && !result_.linear)
+            reason = "all forces are linear, of which explicit steps make no use";
+        else if (!result_.linear)
+            reason = curved();
+        find("linear system", system_.linear && (result_.linear || result_.is_explicit), reason);
     }
 
     // A second derivative that is not constant: "d2V/dadb = 2*a depends on the position".

@@ -55,6 +55,7 @@ struct Group {
 struct Structure {
     Form form = Form::separable;
     bool general = false;        // all that follows was switched off
+    bool is_explicit = false;    // separable: nothing is solved for (kernel_explicit.hpp)
     bool clean = false;          // separable: steps are round-off-clean (kernel_clean.hpp), in loops
     bool linear = false;         // constant second derivatives: one correction, its Jacobian factored once a step size
     bool diagonal_mass = false;  // of a separable system

@@ -7,6 +7,7 @@
 #include "kernel_contract.hpp"
 #include "kernel_ensemble.hpp"
 #include "kernel_events.hpp"
+#include "kernel_explicit.hpp"
 #include "kernel_functions.hpp"
 #include "kernel_galerkin.hpp"
 #include "kernel_general.hpp"

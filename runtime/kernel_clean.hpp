@@ -316,8 +316,8 @@ struct CleanSweeps {
 
 // The stepper of kernel_separable.hpp in loops, with clean steps in place of its own.
 template <class K>
-struct Stepper<K, Form::separable, true> : Stepper<K, Form::separable, false> {
-    using Plain = Stepper<K, Form::separable, false>;
+struct Stepper<K, Form::separable, Stepping::clean> : Stepper<K, Form::separable, Stepping::solved> {
+    using Plain = Stepper<K, Form::separable, Stepping::solved>;
     using real = typename K::real;
     using Plain::n, Plain::m, Plain::s, Plain::q, Plain::u, Plain::W, Plain::coefficients, Plain::q_before,
         Plain::u_before, Plain::has_history, Plain::iterations, Plain::increment;

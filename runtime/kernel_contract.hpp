@@ -8,6 +8,7 @@
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
 //   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
 //                for falling, 0 for both
+// Form::linear_map and Form::separable: is_explicit, of splitting methods: c, b, and drift_length[s - 1] between nodes.
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), acceleration(k, q, W),
 //   node(k, q, W, S), propagate(k, q, p, q1, p1).
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
@@ -114,13 +115,19 @@ struct Formulas {
 template <class Array>
 using element_of = std::decay_t<decltype(std::declval<const Array&>()[0])>;
 
-// Whether K's steps are those of kernel_clean.hpp.
+// How the steps of systems with constant mass are taken: the equations of inner nodes solved, round-off-clean
+// (kernel_clean.hpp), or kicks and drifts in turn (kernel_explicit.hpp).
+enum class Stepping { solved, clean, in_turn };
+template <class K>
+constexpr Stepping stepping_of() {
+    if constexpr (K::form == Form::separable)
+        return K::clean ? Stepping::clean : K::is_explicit ? Stepping::in_turn : Stepping::solved;
+    else
+        return Stepping::solved;
+}
 template <class K>
 constexpr bool is_clean() {
-    if constexpr (K::form == Form::separable)
-        return K::clean;
-    else
-        return false;
+    return stepping_of<K>() == Stepping::clean;
 }
 
 // What the steppers of all forms carry.
@@ -147,8 +154,42 @@ struct Motion {
 
 // One trajectory of kernel K. Usage: prepare, start, then step as often as wanted. Not thread-safe; copy freely. A step
 // that fails leaves the state of the last good one.
-template <class K, Form form = K::form, bool clean = is_clean<K>()>
+template <class K, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Stepper;
+
+// A system with constant mass, whose velocity is kept beside its position.
+template <class K>
+struct ConstantMass : Motion<K> {
+    using typename Motion<K>::real;
+    using Motion<K>::n, Motion<K>::coefficients;
+    real u[n]{};  // M^-1 p
+
+    void momentum(real* p) const { K::momentum(coefficients, u, p); }
+    Status energy(real time, const real* position, const real* momentum, real* value) const {
+        if constexpr (K::has_energy) {
+            *value = Formulas<K>::energy(coefficients, time, position, momentum);
+            return Status::ok;
+        } else {
+            (void)time, (void)position, (void)momentum, (void)value;
+            return Status::unsupported;
+        }
+    }
+    void momentum(real, const real*, const real* velocity, real* momentum) const {
+        K::momentum(coefficients, velocity, momentum);
+    }
+    Status velocity(real, const real*, const real* momentum, real* velocity) const {
+        K::velocity(coefficients, momentum, velocity);
+        return Status::ok;
+    }
+    // dL/dv = M v and dL/dq + F = -M W.
+    void slopes(real time, const real* position, const real* velocity, real* Lv, real* Lq) const {
+        real W[n];
+        Formulas<K>::acceleration(coefficients, time, position, +W);
+        for (int k = 0; k < n; ++k) W[k] = -W[k];
+        K::momentum(coefficients, velocity, Lv);
+        K::momentum(coefficients, static_cast<const real*>(W), Lq);
+    }
+};
 
 // When to try sweeps: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.
 struct Pause {

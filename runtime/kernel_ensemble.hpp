@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "kernel_contract.hpp"
+#include "kernel_explicit.hpp"
 #include "kernel_galerkin.hpp"
 #include "kernel_general.hpp"
 #include "kernel_linear.hpp"
@@ -35,11 +36,11 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
 
 // How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
 // going) moves the lanes that are going, and answers which have moved; momentum(single, lane, p) reads one.
-template <class K, class T, Form form = K::form>
+template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Lanes;
 
 template <class K, class T>
-struct Lanes<K, T, Form::linear_map> {
+struct Lanes<K, T, Form::linear_map, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
     static constexpr int n = K::coordinates;
@@ -77,7 +78,7 @@ struct Lanes<K, T, Form::linear_map> {
 };
 
 template <class K, class T>
-struct Lanes<K, T, Form::separable> {
+struct Lanes<K, T, Form::separable, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
     static constexpr int n = K::coordinates;
@@ -117,6 +118,53 @@ private:
     }
 };
 
+template <class K, class T>
+struct Lanes<K, T, Form::separable, Stepping::in_turn> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], u[n], W[n], evaluations = T(real(0));
+    Turns<K> turns;
+    real h;
+
+    void prepare(const Stepper<K>& single, int) {
+        turns = single.turns;
+        h = single.step_size;
+    }
+    void set_tolerance(real) {}
+    void start(const Stepper<K>& single, const real*, int lane) { follow(single, lane); }
+    void momentum(const Stepper<K>& single, int lane, real* momentum) const {
+        real velocity[n];
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
+        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        T q1[n], u1[n], W1[n], not_finite = T(real(0));
+        for (int c = 0; c < n; ++c) {
+            q1[c] = q[c];
+            u1[c] = u[c];
+            W1[c] = W[c];
+        }
+        step_in_turn<K>(turns, k, time, h, q1, u1, W1);
+        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
+        going = going & (not_finite == T(real(0)));
+        for (int c = 0; c < n; ++c) {
+            q[c] = select(going, q1[c], q[c]);
+            u[c] = select(going, u1[c], u[c]);
+            W[c] = select(going, W1[c], W[c]);
+        }
+        return going;
+    }
+    void follow(const Stepper<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(u[c], lane, single.u[c]);
+            set_lane(W[c], lane, single.W[c]);
+        }
+    }
+};
+
 // How many of `trajectories` stand side by side: a register of each value; two, which hide each other's latency, where
 // one or two coordinates leave room for them. None where the lanes serve a single step better.
 template <class K>
@@ -131,7 +179,7 @@ constexpr int ensemble_lanes(int trajectories) {
 }
 
 template <class K, class T>
-struct Lanes<K, T, Form::general> {
+struct Lanes<K, T, Form::general, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
     static constexpr int n = K::coordinates;

@@ -94,7 +94,7 @@ template <class K, Slot row, Slot column>
 constexpr NodeProducts<K, row, column> node_products{};
 
 template <class K>
-struct Stepper<K, Form::general, false> : Motion<K> {
+struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
     using typename Motion<K>::real;
     using Motion<K>::n, Motion<K>::coefficients, Motion<K>::step_size, Motion<K>::q, Motion<K>::iterations,
         Motion<K>::increment;

@@ -21,6 +21,30 @@ inline void expand_entries(const typename K::real* entries, typename K::real* S)
     for (int e = 0; e < K::entries; ++e) S[K::entry_row[e] * K::coordinates + K::entry_column[e]] = entries[e];
 }
 
+// What a kick u += length W(q) and a drift q += length u of explicit steps (D40) add to E, as in increment_of_step; W0
+// may be null.
+template <class K>
+inline void kick_increment(typename K::real length, const typename K::real* entries, const typename K::real* W0,
+                           typename K::real* E) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, columns = 2 * n + 1;
+    for (int e = 0; e < K::entries; ++e) {
+        const real* const from = E + K::entry_column[e] * columns;
+        real* const to = E + (n + K::entry_row[e]) * columns;
+        for (int c = 0; c < columns; ++c)
+            to[c] += length * (entries[e] * ((c == K::entry_column[e] ? real(1) : real(0)) + from[c]));
+    }
+    for (int k = 0; k < n && W0 != nullptr; ++k) E[(n + k) * columns + 2 * n] += length * W0[k];
+}
+template <class K>
+inline void drift_increment(typename K::real length, typename K::real* E) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, columns = 2 * n + 1;
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < columns; ++c)
+            E[k * columns + c] += length * ((c == n + k ? real(1) : real(0)) + E[(n + k) * columns + c]);
+}
+
 // What one step adds, in (q, u), from the S of the s nodes: E = T - I with T the tangent map (D24). E: 2n x (2n + 1);
 // its last column is the image of the constant acceleration W0 when S does not depend on q, that is, the shift of a
 // linear system with forces at q = 0. E is small for a small step and keeps its digits there, T would not.
@@ -143,10 +167,19 @@ inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
     using real = typename K::real;
     constexpr int n = K::coordinates, s = K::points;
     const real origin[n] = {};
-    real W0[n], entries[K::entries > 0 ? K::entries : 1], S[s * n * n];
+    real W0[n], entries[K::entries > 0 ? K::entries : 1];
     K::node(k, origin, W0, entries);
-    for (int i = 0; i < s; ++i) expand_entries<K>(entries, S + i * n * n);
-    if (!increment_of_step<K>(h, S, W0, k.Phi_minus_I)) return Status::singular_jacobian;
+    if constexpr (K::is_explicit) {
+        for (int i = 0; i < 2 * n * (2 * n + 1); ++i) k.Phi_minus_I[i] = real(0);
+        for (int i = 0; i < s; ++i) {
+            kick_increment<K>(-h * K::b[i], entries, W0, k.Phi_minus_I);
+            if (i < s - 1) drift_increment<K>(h * K::drift_length[i], k.Phi_minus_I);
+        }
+    } else {
+        real S[s * n * n];
+        for (int i = 0; i < s; ++i) expand_entries<K>(entries, S + i * n * n);
+        if (!increment_of_step<K>(h, S, W0, k.Phi_minus_I)) return Status::singular_jacobian;
+    }
     to_momentum<K>(k, k.Phi_minus_I);
     real sum = real(0);
     for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi_minus_I[i] - k.Phi_minus_I[i];
@@ -184,7 +217,7 @@ inline number discrete_energy(const given* E, const number* q, const number* p) 
 
 // The stepper of an affine map: the whole step is K::propagate.
 template <class K>
-struct Stepper<K, Form::linear_map, false> : Motion<K> {
+struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
     using typename Motion<K>::real;
     using Motion<K>::n, Motion<K>::coefficients, Motion<K>::q;
     static constexpr int N = 0;

@@ -199,10 +199,10 @@ constexpr bool along_coordinates() {
 }
 
 template <class K>
-struct Stepper<K, Form::separable, false> : Motion<K> {
-    using typename Motion<K>::real;
-    using Motion<K>::n, Motion<K>::coefficients, Motion<K>::step_size, Motion<K>::q, Motion<K>::iterations,
-        Motion<K>::increment;
+struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
+    using typename ConstantMass<K>::real;
+    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
+        ConstantMass<K>::u, ConstantMass<K>::iterations, ConstantMass<K>::increment;
     static constexpr int s = K::points, m = s - 2;
     static constexpr int N = K::unknowns;
     static constexpr int nodes = s;
@@ -232,7 +232,6 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
         Pause pause;
     };
 
-    real u[n]{};                        // M^-1 p
     real q_before[n]{}, u_before[n]{};  // before the last step
     real W[s * n]{};                    // M^-1 grad V at the nodes of the last step; the last n at q
     bool has_history{};                 // W holds a whole step
@@ -272,8 +271,6 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
         return is_finite(sum) ? Status::ok : Status::not_finite;
     }
 
-    void momentum(real* p) const { K::momentum(coefficients, u, p); }
-
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
         if constexpr (is_swept) {
@@ -297,32 +294,6 @@ struct Stepper<K, Form::separable, false> : Motion<K> {
             position[k] = start + moved;
             velocity[k] = rate / step_size;
         }
-    }
-
-    Status energy(real time, const real* position, const real* momentum, real* value) const {
-        if constexpr (K::has_energy) {
-            *value = Formulas<K>::energy(coefficients, time, position, momentum);
-            return Status::ok;
-        } else {
-            (void)time, (void)position, (void)momentum, (void)value;
-            return Status::unsupported;
-        }
-    }
-    void momentum(real, const real*, const real* velocity, real* momentum) const {
-        K::momentum(coefficients, velocity, momentum);
-    }
-    Status velocity(real, const real*, const real* momentum, real* velocity) const {
-        K::velocity(coefficients, momentum, velocity);
-        return Status::ok;
-    }
-    // dL/dv = M v and dL/dq + F = -M W.
-    void slopes(real time, const real* position, const real* velocity, real* Lv, real* Lq) const {
-        workspace.with([&](Arrays& arrays) {
-            Formulas<K>::acceleration(coefficients, time, position, arrays.W1);
-            for (int k = 0; k < n; ++k) arrays.W1[k] = -arrays.W1[k];
-            K::momentum(coefficients, velocity, Lv);
-            K::momentum(coefficients, arrays.W1, Lq);
-        });
     }
 
     // F at the interior positions X, node-major, N.

@@ -91,6 +91,17 @@ TEST_CASE("derive prints the same bytes in every process, in every notation") {
     }
 }
 
+TEST_CASE("of a splitting method the nodes, kicks and drifts are shown, and nothing is solved") {
+    const test::Finished shown = lobatto_program({"derive", tree + "/scenes/pendulum.toml", "--splitting", "6"});
+    REQUIRE(shown.exit_code == 0);
+    for (const char* const text : {"splitting, 6 stages: order 4", "kick u -> u - h b_i W(q) at node i",
+                                   "0.24529895718427", "0.08298440641740", "W = omega^2*sin(q)"}) {
+        INFO(text);
+        CHECK(shown.out.find(text) != std::string::npos);
+    }
+    CHECK(shown.out.find("F_1") == std::string::npos);
+}
+
 TEST_CASE("--json lists every formula with its shape, in a fixed order of keys") {
     const test::Finished shown = lobatto_program({"derive", tree + "/scenes/pendulum.toml", "--json", "--points", "3"});
     REQUIRE(shown.exit_code == 0);

@@ -172,6 +172,9 @@ TEST_CASE("the command line replaces values of the scene, with one kernel for al
     const test::Finished explicit_one = place.run({pendulum, "-o", place.file(), "--points", "2", "--until", "1"});
     CHECK(contains(explicit_one.out, "  iterations              none: the step is explicit\n"));
     CHECK(read_trajectory(place.file()).comments[2] == "method: Lobatto, 2 points, h = 0.05");
+    const test::Finished split = place.run({pendulum, "-o", place.file(), "--splitting", "14", "--until", "1"});
+    CHECK(contains(split.out, "  iterations              none: the step is explicit\n"));
+    CHECK(read_trajectory(place.file()).comments[2] == "method: splitting, 14 stages, h = 0.05");
 }
 
 TEST_CASE("an end that is no multiple of the step is said, not overrun") {
@@ -229,6 +232,38 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
           "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
     CHECK(contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
     CHECK(contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
+    CHECK(contains(refusal({"--splitting", "12"}), "lobatto: --splitting: 12 not in {6,11,14,17,35}"));
+    CHECK(contains(refusal({"--splitting", "11", "--points", "4"}), "excludes"));
+    CHECK(refusal({"--splitting", "11", "--tolerance", "1e-9"}) ==
+          pendulum + ": splitting methods iterate nothing; leave out --tolerance\n");
+    CHECK(refusal({"--splitting", "11", "--arithmetic", "clean"}) ==
+          pendulum +
+              ": splitting methods have no clean arithmetic; choose another method (--points 8), or plain arithmetic "
+              "(--arithmetic plain)\n");
+    CHECK(refusal({"--splitting", "11", "--general"}) ==
+          pendulum +
+              ": splitting methods have no general path; leave out --general, or choose another method (--points 4)\n");
+}
+
+TEST_CASE("a splitting method refuses masses that vary, and number types with more digits than its coefficients") {
+    const Place place;
+    const std::string folded = std::string(LOBATTO_SOURCE_DIR) + "/scenes/double_pendulum.toml";
+    const test::Finished refused = place.run({folded, "-o", place.file(), "--splitting", "11"});
+    CHECK(refused.exit_code == 2);
+    CHECK(contains(refused.err, "double_pendulum.toml:"));
+    CHECK(contains(refused.err, "splitting methods need a constant mass matrix and forces without velocities, but "));
+    CHECK(contains(refused.err, "; choose Lobatto (--points 4) or Gauss (--stages 3)"));
+    const auto emitted = [&](const char* stages, const char* precision) {
+        return test::run({LOBATTO_PROGRAM, "emit", pendulum, "--splitting", stages, "--precision", precision, "-o",
+                          place.file("emitted"), "--no-support"});
+    };
+    const test::Finished wide = emitted("11", "long-double");
+    CHECK(wide.exit_code == 2);
+    CHECK(contains(wide.err,
+                   "the coefficients of splitting, 11 stages are known to 15 digits, too few for this number "
+                   "type; choose double, or Lobatto (--points 8)"));
+    CHECK(emitted("17", "long-double").exit_code == 0);
+    CHECK(emitted("35", "quadruple").exit_code == 0);
 }
 
 TEST_CASE("a run that stops keeps what was computed, explains itself and returns 3") {

@@ -266,7 +266,7 @@ TEST_CASE("values of the wrong type are named") {
                 "every is 0; at least 1 and at most 9e15: states whose step is a multiple of it are kept");
     check_error(9, "until = 1\n[method]\npoints = 13", {11, 10}, "points is 13; there is Lobatto with 2 to 12 points");
     check_error(9, "until = 1\n[method]\nfamily = \"euler\"", {11, 10},
-                "unknown family; there are \"lobatto\" and \"gauss\"");
+                "unknown family; there are \"lobatto\", \"gauss\" and \"splitting\"");
     check_error(3, "q = { unit = \"a\\\\b\", position = 1, velocity = 0 }", {3, 14},
                 "unit must be one line without control characters, quotes and backslashes");
 }
@@ -584,11 +584,21 @@ TEST_CASE("the method is Lobatto's or Gauss's") {
     CHECK(name("family = \"gauss\"\nstages = 1") == "Gauss, 1 stage");
     check_error(9, "until = 1\n[method]\npoints = 1", {11, 10}, "points is 1; there is Lobatto with 2 to 12 points");
     check_error(9, "until = 1\n[method]\nstages = 3", {11, 1},
-                "Lobatto has points, not stages: write points = 4, or add family = \"gauss\"");
+                "Lobatto has points, not stages: write points = 4, or add family = \"gauss\" or \"splitting\"");
     check_error(9, "until = 1\n[method]\nfamily = \"gauss\"\npoints = 3", {12, 1},
                 "Gauss has stages, not points: write stages = 3");
     check_error(9, "until = 1\n[method]\nfamily = \"gauss\"\nstages = 11", {12, 10},
                 "stages is 11; there is Gauss with 1 to 10 stages");
+    CHECK(name("family = \"splitting\"") == "splitting, 11 stages");
+    CHECK(name("family = \"splitting\"\nstages = 35") == "splitting, 35 stages");
+    check_error(9, "until = 1\n[method]\nfamily = \"splitting\"\npoints = 4", {12, 1},
+                "splitting methods have stages, not points: write stages = 11");
+    check_error(9, "until = 1\n[method]\nfamily = \"splitting\"\nstages = 12", {12, 10},
+                "there are splitting methods with 6, 11, 14, 17, 35 stages");
+    check_error(9, "until = 1\n[method]\nfamily = \"splitting\"\nstages = 36", {12, 10},
+                "stages is 36; there are splitting methods with 6, 11, 14, 17, 35 stages");
+    check_error(9, "until = 1\n[method]\nfamily = \"splitting\"\ntolerance = 1e-9", {12, 1},
+                "splitting methods iterate nothing; leave out the tolerance");
 }
 
 TEST_CASE("a tolerance is above 0 and at most 0.001; without one the iteration goes to rounding") {

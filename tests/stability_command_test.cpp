@@ -268,4 +268,7 @@ TEST_CASE("mistakes on the command line are refused before anything is computed"
     CHECK(contains(refusal({"missing.toml"}), "missing.toml"));
     CHECK(contains(refusal({oscillator, "--step", "-1"}), "the step must be positive"));
     CHECK(contains(refusal({oscillator, "--points", "13"}), "--points"));
+    CHECK(contains(refusal({oscillator, "--splitting", "11"}), "lobatto stability --splitting 11"));
+    CHECK(refusal({"--splitting", "11", "--json"}) ==
+          "--json is of Lobatto and Gauss, whose limits are exact; leave it out\n");
 }

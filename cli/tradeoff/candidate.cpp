@@ -51,8 +51,11 @@ std::vector<Member> family_in(Precision precision) {
 }
 
 std::string Candidate::name() const {
-    return fmt::format("{} {}{}", member.family == Family::lobatto ? "Lobatto" : "Gauss", member.points,
-                       member.arithmetic == StepArithmetic::clean ? " clean" : "");
+    return fmt::format("{} {}{}",
+                       member.family == Family::lobatto ? "Lobatto"
+                       : member.family == Family::gauss ? "Gauss"
+                                                        : "Splitting",
+                       member.points, member.arithmetic == StepArithmetic::clean ? " clean" : "");
 }
 
 bool StepLadder::good(std::int64_t steps) const {

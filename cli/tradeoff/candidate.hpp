@@ -53,7 +53,7 @@ struct Candidate {
     double tolerance = 0;    // of the iteration; 0: to stagnation
 
     auto key() const { return std::tuple(member.key(), steps, tolerance); }
-    std::string name() const;  // "Lobatto 8", "Gauss 6 clean"
+    std::string name() const;  // "Lobatto 8", "Gauss 6 clean", "Splitting 11"
 };
 
 // Errors of states are relative to the amplitudes of the motion (Reference::scale), those of energies to its energy.

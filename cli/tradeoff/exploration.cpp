@@ -44,11 +44,14 @@ std::vector<Member> tour(bool is_separable) {
     add(Family::gauss, Precision::double_, {3, 1});
     add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::extended, {12});
-    if (is_separable)
+    if (is_separable) {
+        add(Family::splitting, Precision::double_, {11, 17});
         for (const int count : {8, 12})
             members.push_back({Family::lobatto, count, Precision::double_, StepArithmetic::clean});
+    }
     add(Family::lobatto, Precision::double_, {5, 3, 9, 7, 11});
     add(Family::gauss, Precision::double_, {8, 4, 2, 5, 7, 9});
+    if (is_separable) add(Family::splitting, Precision::double_, {6, 14, 35});
     add(Family::lobatto, Precision::single, {4, 8});
     add(Family::lobatto, Precision::extended, {9});
     return members;

@@ -38,7 +38,7 @@ const char* arithmetic_name(const Member& member) {
 
 nlohmann::ordered_json json_of(const Measurement& measurement) {
     const Candidate& candidate = measurement.candidate;
-    nlohmann::ordered_json json = {{"family", candidate.member.family == Family::lobatto ? "lobatto" : "gauss"},
+    nlohmann::ordered_json json = {{"family", word_of(candidate.member.family)},
                                    {"points", candidate.member.points},
                                    {"precision", precision_name(candidate.member.precision)},
                                    {"arithmetic", arithmetic_name(candidate.member)},
@@ -58,7 +58,7 @@ nlohmann::ordered_json json_of(const Measurement& measurement) {
 Measurement measurement_of(const nlohmann::json& json) {
     Measurement measurement;
     Candidate& candidate = measurement.candidate;
-    candidate.member.family = json.at("family") == "lobatto" ? Family::lobatto : Family::gauss;
+    candidate.member.family = family_of(json.at("family"));
     candidate.member.points = json.at("points");
     for (const Precision precision : precisions)
         if (json.at("precision") == precision_name(precision)) candidate.member.precision = precision;
@@ -80,11 +80,10 @@ std::string csv_header() {
 
 std::string csv_row(const Measurement& measurement, double until) {
     const Candidate& candidate = measurement.candidate;
-    std::string text = fmt::format(
-        "{},{},{},{},{},{},{},{}", candidate.member.family == Family::lobatto ? "lobatto" : "gauss",
-        candidate.member.points, precision_name(candidate.member.precision), arithmetic_name(candidate.member),
-        candidate.steps, exact_text(until / static_cast<double>(candidate.steps)), exact_text(candidate.tolerance),
-        measurement.complete ? 1 : 0);
+    std::string text = fmt::format("{},{},{},{},{},{},{},{}", word_of(candidate.member.family), candidate.member.points,
+                                   precision_name(candidate.member.precision), arithmetic_name(candidate.member),
+                                   candidate.steps, exact_text(until / static_cast<double>(candidate.steps)),
+                                   exact_text(candidate.tolerance), measurement.complete ? 1 : 0);
     for (const auto& [name, member] : columns)
 
         text += "," + (std::isfinite(measurement.*member) ? exact_text(measurement.*member) : std::string());

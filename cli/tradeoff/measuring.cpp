@@ -250,7 +250,7 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
     const std::pair kind(candidate.member.family, candidate.member.points);
     if (estimates_.count(kind) == 0) estimates_.emplace(kind, quadrature_of(candidate.member.method()));
     const ErrorEstimate& estimate = estimates_.at(kind);
-    const bool energy_tells = conserves_ && candidate.member.family == Family::lobatto;
+    const bool energy_tells = conserves_ && candidate.member.family != Family::gauss;
     Evidence evidence = evidence_of(
         run.stepper, states, run.start.parameters, run.h, reference_.scale, error_power(candidate.member.method()),
         conserves_ ? energies_of(run.stepper, states) : std::vector<double>(), energy_tells);

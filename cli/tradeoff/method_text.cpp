@@ -17,7 +17,7 @@ namespace {
 std::vector<std::string> method_lines(const Choice& choice) {
     const Candidate& candidate = choice.measurement.candidate;
     const bool lobatto = candidate.member.family == Family::lobatto;
-    std::vector<std::string> lines = {fmt::format("family = \"{}\"", lobatto ? "lobatto" : "gauss"),
+    std::vector<std::string> lines = {fmt::format("family = \"{}\"", word_of(candidate.member.family)),
                                       fmt::format("{} = {}", lobatto ? "points" : "stages", candidate.member.points)};
     if (candidate.member.arithmetic == StepArithmetic::clean) lines.push_back("arithmetic = \"clean\"");
     if (candidate.tolerance > 0) lines.push_back("tolerance = " + exact_text(candidate.tolerance));

@@ -67,9 +67,9 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
     std::sort(best.begin(), best.end(), [](const auto* a, const auto* b) { return a->seconds < b->seconds; });
     int number = 0;
     for (const Member* member : shown) {
-        const bool gauss = member->family == Family::gauss;
+        const int dashes = member->family == Family::lobatto ? 1 : member->family == Family::gauss ? 2 : 3;
         add(members.at(*member),
-            fmt::format("with linespoints lc rgb \"{}\" lw 1.5 dt {} pt {} ps 0.6", colours[number % 6], gauss ? 2 : 1,
+            fmt::format("with linespoints lc rgb \"{}\" lw 1.5 dt {} pt {} ps 0.6", colours[number % 6], dashes,
                         4 + (number + number / 6) % 6),  // no colour has the same points twice
             name_of(*member));
         ++number;

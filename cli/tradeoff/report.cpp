@@ -93,7 +93,7 @@ std::string json_of(const Laboratory& laboratory) {
     for (const Measurement& m : pareto_front(laboratory)) front.push_back(json_of(m));
     nlohmann::ordered_json calibration = nlohmann::ordered_json::array();
     for (const Calibration::Law& law : calibration_of(laboratory).laws)
-        calibration.push_back({{"family", law.member.family == Family::lobatto ? "lobatto" : "gauss"},
+        calibration.push_back({{"family", word_of(law.member.family)},
                                {"points", law.member.points},
                                {"factor", law.factor},
                                {"power", law.power},

@@ -26,7 +26,8 @@ double fitting_tolerance(double goal, double digits) {
 }
 
 bool has_tolerance(Laboratory& laboratory, const Member& member) {
-    return laboratory.workshop().kernel(member)->linear == 0 && member.arithmetic != StepArithmetic::clean;
+    return laboratory.workshop().kernel(member)->linear == 0 && member.arithmetic != StepArithmetic::clean &&
+           member.family != Family::splitting;
 }
 
 }  // namespace
@@ -151,7 +152,8 @@ namespace {
 std::vector<Member> cleaner(const std::map<Member, Crossing>& tried) {
     std::vector<std::pair<double, Member>> nearest;
     for (const auto& [member, crossing] : tried)
-        if (member.arithmetic == StepArithmetic::plain) nearest.emplace_back(crossing.least_error, member);
+        if (member.arithmetic == StepArithmetic::plain && member.family != Family::splitting)
+            nearest.emplace_back(crossing.least_error, member);
     std::sort(nearest.begin(), nearest.end());
     std::vector<Member> members;
     for (auto& [error, member] : nearest) {
@@ -178,13 +180,17 @@ namespace {
 // The numbers of points whose nodes fill vector registers of 4 or 8; they may win though both their neighbours lose.
 std::vector<int> full_registers(Family family, bool is_separable) {
     if (family == Family::gauss) return {4, 8};
+    if (family == Family::splitting) return {};
     return is_separable ? std::vector{6, 10} : std::vector{4, 8, 12};  // the inner nodes, or all
 }
 
 // Members next to the best of each family that were not tried; the nearest to the best first.
 std::vector<Member> neighbours(const std::map<Member, Crossing>& tried, double best_cost, bool is_separable) {
     std::vector<std::pair<double, Member>> wishes;
-    for (const Family family : {Family::lobatto, Family::gauss}) {
+    for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {
+        if (family == Family::splitting && !is_separable) continue;
+        const std::vector<int>& sizes = sizes_of(family);
+        const int last = static_cast<int>(sizes.size()) - 1;
         std::optional<Member> top;
         double top_cost = infinity;
         int tried_here = 0;
@@ -193,22 +199,24 @@ std::vector<Member> neighbours(const std::map<Member, Crossing>& tried, double b
             ++tried_here;
             if (crossing.seconds < top_cost) top = member, top_cost = crossing.seconds;
         }
-        const int least = family == Family::lobatto ? 2 : 1, most = family == Family::lobatto ? 12 : 10;
+        const auto size_at = [&](int place) { return sizes[static_cast<std::size_t>(place)]; };
         if (!top) {  // none reaches the goal: orders between
-            for (const int points : {most, (least + most) / 2, most - 2})
-                if (tried.count({family, points}) == 0) wishes.push_back({1e3, {family, points}});
+            for (const int place : {last, (last + 1) / 2, last - 2})
+                if (tried.count({family, size_at(place)}) == 0) wishes.push_back({1e3, {family, size_at(place)}});
             continue;
         }
+        const int here = static_cast<int>(std::find(sizes.begin(), sizes.end(), top->points) - sizes.begin());
         if (top_cost > hopeless * best_cost && tried_here >= 3) continue;
         for (const int distance : {1, 2})
-            for (const int points : {top->points + distance, top->points - distance}) {
+            for (const int place : {here + distance, here - distance}) {
+                if (place < 0 || place > last) continue;
                 Member next = *top;  // in its arithmetic
-                next.points = points;
-                if (points < least || points > most || tried.count(next) != 0) continue;
+                next.points = size_at(place);
+                if (tried.count(next) != 0) continue;
                 // Beyond a neighbour that is clearly slower nothing is expected.
                 if (distance == 2) {
                     Member middle = *top;
-                    middle.points = (points + top->points) / 2;
+                    middle.points = size_at((place + here) / 2);
                     const auto between = tried.find(middle);
                     if (between == tried.end() || between->second.seconds > 1.15 * top_cost) continue;
                 }
@@ -235,6 +243,7 @@ Search search(Laboratory& laboratory, double goal) {
     result.least_error = infinity;
     std::map<Member, Crossing> tried;
     std::vector<Member> queue = first_guess(goal, 4);
+    if (is_separable) queue.push_back({Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35});
     const double reserve = 0.2 * laboratory.request().seconds;  // for polishing
     bool tried_clean = false;                                   // only where rounding stands in the way
     for (const Member& member : queue) workshop.order(member);

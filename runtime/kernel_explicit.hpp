@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: MIT
+// Steps of explicit splitting methods: kicks u -= h b_i W(q_i) and drifts q += h a_i u in turn (D40).
+//
+// Nothing is solved for, so that a step costs its gradients and no step can fail to converge. From one gradient to the
+// next leads q + h a_i (u - h b_i W), of which q + h a_i u is known before W is: one operation after W, not two. One
+// trajectory goes by itself, its neighbouring coordinates in the lanes of Packs where formulas join these; or several
+// side by side.
+#ifndef LOBATTO_KERNEL_EXPLICIT_HPP
+#define LOBATTO_KERNEL_EXPLICIT_HPP
+
+#include <cstdint>
+#include <type_traits>
+
+#include "kernel_contract.hpp"
+#include "kernel_linear.hpp"
+#include "kernel_numbers.hpp"
+#include "kernel_pack.hpp"
+#include "kernel_rows.hpp"
+
+namespace lobatto {
+
+// The lengths of a step's kicks and drifts.
+template <class K>
+struct Turns {
+    using real = typename K::real;
+    static constexpr int s = K::points;
+    static constexpr bool kicks_ends = K::b[0] != real(0);  // else a step begins and ends with a drift
+
+    real kick[s];       // -h b
+    real drift[s - 1];  // h a
+    real bend[s - 1];   // their products, of a drift and the kick before it
+
+    void prepare(real h) {
+        for (int i = 0; i < s; ++i) kick[i] = -h * K::b[i];
+        for (int i = 0; i < s - 1; ++i) {
+            drift[i] = h * K::drift_length[i];
+            bend[i] = drift[i] * kick[i];
+        }
+    }
+};
+
+// One step of q and u; W is that at their positions, before and after, where ends are kicked. T: a number or a Pack.
+template <class K, class T, class Given>
+LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h, T* q,
+                                 T* u, T* W) {
+    constexpr int n = K::coordinates, s = K::points;
+    T ahead[n];
+    const auto look_ahead = [&](int i) LOBATTO_FORMULA {
+        for (int c = 0; c < n; ++c) ahead[c] = fused(T(turns.drift[i]), u[c], q[c]);
+    };
+    const auto kick_and_drift = [&](int i) LOBATTO_FORMULA {
+        for (int c = 0; c < n; ++c) {
+            q[c] = fused(T(turns.bend[i]), W[c], ahead[c]);
+            u[c] = fused(T(turns.kick[i]), W[c], u[c]);
+        }
+    };
+    look_ahead(0);
+    if constexpr (Turns<K>::kicks_ends)
+        kick_and_drift(0);
+    else
+        for (int c = 0; c < n; ++c) q[c] = ahead[c];
+    for (int i = 1; i < s - 1; ++i) {
+        look_ahead(i);
+        Formulas<K>::acceleration(k, T(time + K::c[i] * h), static_cast<const T*>(q), W);
+        kick_and_drift(i);
+    }
+    if constexpr (Turns<K>::kicks_ends) {
+        Formulas<K>::acceleration(k, T(time + h), static_cast<const T*>(q), W);
+        for (int c = 0; c < n; ++c) u[c] = fused(T(turns.kick[s - 1]), W[c], u[c]);
+    }
+}
+
+// Whether positions and velocities, accelerations, and what is under way fit the 32 registers of AVX-512.
+template <class K>
+constexpr bool turns_fit_registers() {
+    using real = typename K::real;
+    constexpr int width = native_lanes<real>, parts = (K::coordinates + width - 1) / width;
+    return width * sizeof(real) == 64 && parts <= 5 && K::row_reach >= 0 && K::row_reach <= width;
+}
+
+// Positions, velocities and accelerations of neighbouring coordinates, on the way in registers or in memory; to the
+// same bits.
+template <class K, bool in_registers = turns_fit_registers<K>()>
+struct NeighbourTurns {
+    using real = typename K::real;
+    static constexpr int n = K::coordinates, s = K::points;
+    static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
+    using V = Pack<real, width>;
+
+    int now{};                                                 // the present; 1 - now: before the last step
+    alignas(V) real q[2][room]{}, u[2][room]{}, W[2][room]{};  // where ends are kicked
+    alignas(V) real ahead[room]{};                             // on the way
+
+    void begin(const real* position, const real* velocity, const real* acceleration) {
+        for (int c = 0; c < n; ++c) {
+            q[now][c] = position[c];
+            u[now][c] = velocity[c];
+            W[now][c] = acceleration[c];
+        }
+    }
+    // False, and nothing has moved, where the end is not finite.
+    bool step(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h) {
+        if constexpr (in_registers) {
+            V position[parts], velocity[parts], slope[parts], next[parts];
+            return step_in(turns, k, time, h, Registers<V, parts>{position}, Registers<V, parts>{velocity},
+                           Registers<V, parts>{slope}, Registers<V, parts>{next});
+        } else {
+            return step_in(turns, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now], +ahead);
+        }
+    }
+
+private:
+    template <class Row, class F>
+    LOBATTO_INLINE static void over_parts(const F& f) {
+        if constexpr (are_registers<Row>)
+            written_out<width>(parts * width, f);
+        else
+            for (int at = 0; at < parts * width; at += width) f(at);
+    }
+    template <class Row>
+    LOBATTO_INLINE static void accelerate(const typename K::Coefficients& k, real time, Row position, Row slope) {
+        using How = std::conditional_t<are_registers<Row>, WrittenOut, SideBySide>;
+        if constexpr (K::autonomous)
+            K::template acceleration<How>(k, position, slope);
+        else
+            K::template acceleration<How>(k, time, position, slope);
+    }
+    template <class Row>
+    LOBATTO_INLINE bool step_in(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h,
+                                Row position, Row velocity, Row slope, Row next) {
+        over_parts<Row>([&](int at) LOBATTO_FORMULA {
+            const V start = V::load(W[now] + at);
+            V first = V::load(u[now] + at), moved = fused(V(turns.drift[0]), first, V::load(q[now] + at));
+            if constexpr (Turns<K>::kicks_ends) {
+                moved = fused(V(turns.bend[0]), start, moved);
+                first = fused(V(turns.kick[0]), start, first);
+            }
+            store_to(slope, at, start);
+            store_to(velocity, at, first);
+            store_to(position, at, moved);
+        });
+        for (int i = 1; i < s - 1; ++i) {
+            over_parts<Row>([&](int at) LOBATTO_FORMULA {
+                store_to(next, at, fused(V(turns.drift[i]), load_from<V>(velocity, at), load_from<V>(position, at)));
+            });
+            accelerate(k, time + K::c[i] * h, position, slope);
+            over_parts<Row>([&](int at) LOBATTO_FORMULA {
+                const V W_here = load_from<V>(slope, at);
+                store_to(position, at, fused(V(turns.bend[i]), W_here, load_from<V>(next, at)));
+                store_to(velocity, at, fused(V(turns.kick[i]), W_here, load_from<V>(velocity, at)));
+            });
+        }
+        if constexpr (Turns<K>::kicks_ends) accelerate(k, time + h, position, slope);
+        V not_finite = V(real(0));
+        over_parts<Row>([&](int at) LOBATTO_FORMULA {
+            V last = load_from<V>(velocity, at);
+            const V there = load_from<V>(position, at), bent = load_from<V>(slope, at);
+            if constexpr (Turns<K>::kicks_ends) last = fused(V(turns.kick[s - 1]), bent, last);
+            not_finite = fused(V(real(0)), last + there, not_finite);
+            there.store(q[1 - now] + at);
+            last.store(u[1 - now] + at);
+            bent.store(W[1 - now] + at);
+        });
+        if (any(not_finite != V(real(0)))) return false;
+        now = 1 - now;
+        return true;
+    }
+};
+
+template <class K, bool along_neighbours>
+struct KindOfTurns {
+    using type = NeighbourTurns<K>;
+};
+template <class K>
+struct KindOfTurns<K, false> {
+    struct type {};
+};
+
+template <class K>
+struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
+    using typename ConstantMass<K>::real;
+    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
+        ConstantMass<K>::u;
+    static constexpr int s = K::points, nodes = s;
+    static constexpr int N = 0;
+
+    // The ends of the last step, for what lies between them.
+    struct Ends {
+        std::int64_t of{-1};  // this many steps since start; -1: not computed
+        real W[2][n]{};
+    };
+    using Nothing = typename KindOfTurns<K, false>::type;
+
+    Turns<K> turns{};
+    real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
+    real q_before[n]{}, u_before[n]{};  // before the last step; likewise
+    bool has_history{};                 // there is a last step
+    mutable Ends ends{};
+    typename KindOfTurns<K, K::neighbours>::type neighbours{};
+
+    Status prepare(const typename K::Parameters& parameters, real h) {
+        step_size = h;
+        has_history = false;
+        turns.prepare(h);
+        return K::prepare(parameters, h, coefficients);
+    }
+
+    Status start(real time, const real* position, const real* momentum) {
+        this->start_time = time;
+        this->steps = 0;
+        has_history = false;
+        ends.of = -1;
+        real sum = time + not_finite_part(momentum, n);
+        for (int k = 0; k < n; ++k) {
+            q[k] = position[k];
+            sum += position[k] - position[k];
+        }
+        K::velocity(coefficients, momentum, u);
+        Formulas<K>::acceleration(coefficients, time, static_cast<const real*>(q), +W);
+        sum += not_finite_part(W, n);
+        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
+        if constexpr (K::neighbours) neighbours.begin(q, u, W);
+        return is_finite(sum) ? Status::ok : Status::not_finite;
+    }
+
+    Status step() {
+        if (this->time_stands_still()) return Status::time_stands_still;
+        if (!move(neighbours)) return Status::not_finite;
+        has_history = true;
+        ++this->steps;
+        return Status::ok;
+    }
+
+    // The polynomial of degree 5 that has the positions, velocities and accelerations at both ends of the last step, at
+    // t + theta h.
+    void polynomial(real theta, real* position, real* velocity) const {
+        look_at_ends();
+        const real t = theta, t2 = t * t, t3 = t2 * t, h = step_size;
+        const real rise = t3 * (real(10) + t * (real(6) * t - real(15))),
+                   rise_slope = t2 * (real(30) + t * (real(30) * t - real(60)));
+        const real u0 = t + t3 * (t * (real(8) - real(3) * t) - real(6)),
+                   u0_slope = real(1) + t2 * (t * (real(32) - real(15) * t) - real(18));
+        const real u1 = t3 * (t * (real(7) - real(3) * t) - real(4)),
+                   u1_slope = t2 * (t * (real(28) - real(15) * t) - real(12));
+        const real a0 = real(0.5) * t2 * (real(1) + t * (t * (real(3) - t) - real(3))),
+                   a0_slope = real(0.5) * t * (real(2) + t * (t * (real(12) - real(5) * t) - real(9)));
+        const real a1 = real(0.5) * t3 * (real(1) + t * (t - real(2))),
+                   a1_slope = real(0.5) * t2 * (real(3) + t * (real(5) * t - real(8)));
+        for (int k = 0; k < n; ++k) {
+            const real begin = position_before(k), moved = q[k] - begin, from = h * velocity_before(k), to = h * u[k];
+            const real start = h * (h * ends.W[0][k]), end = h * (h * ends.W[1][k]);
+            position[k] = begin + (rise * moved + u0 * from + u1 * to - a0 * start - a1 * end);
+            velocity[k] =
+                (rise_slope * moved + u0_slope * from + u1_slope * to - a0_slope * start - a1_slope * end) / h;
+        }
+    }
+
+    // There are no equations.
+    Status residual(real, const real*, const real*, const real*, real*) const { return Status::ok; }
+    Status jacobian(real, const real*, const real*, const real*, real*) const { return Status::ok; }
+
+    // One step from (q, p) at `time` and d(q1, p1)/d(q, p) (D24), 2n x 2n.
+    Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
+        if constexpr (K::has_tangent) {
+            Stepper local = *this;
+            Status status = local.start(time, position, momentum);
+            if (status != Status::ok) return status;
+            constexpr int columns = 2 * n + 1;
+            real full[2 * n * columns] = {}, at[n], rate[n], slope[n], entries[K::entries > 0 ? K::entries : 1];
+            for (int k = 0; k < n; ++k) {
+                at[k] = local.q[k];
+                rate[k] = local.u[k];
+            }
+            for (int i = 0; i < s; ++i) {
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +slope,
+                                  +entries);
+                for (int k = 0; k < n; ++k) rate[k] = fused(turns.kick[i], slope[k], rate[k]);
+                kick_increment<K>(turns.kick[i], entries, static_cast<const real*>(nullptr), full);
+                if (i == s - 1) break;
+                for (int k = 0; k < n; ++k) at[k] = fused(turns.drift[i], rate[k], at[k]);
+                drift_increment<K>(turns.drift[i], full);
+            }
+            status = local.step();
+            if (status != Status::ok) return status;
+            for (int k = 0; k < n; ++k) q1[k] = local.q[k];
+            local.momentum(p1);
+            to_momentum<K>(coefficients, full);
+            for (int r = 0; r < 2 * n; ++r)
+                for (int c = 0; c < 2 * n; ++c) T[r * 2 * n + c] = (r == c ? real(1) : real(0)) + full[r * columns + c];
+            return Status::ok;
+        } else {
+            (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;
+            return Status::unsupported;
+        }
+    }
+
+private:
+    bool move(Nothing&) {
+        real q1[n], u1[n], W1[n], sum = real(0);
+        for (int k = 0; k < n; ++k) {
+            q1[k] = q[k];
+            u1[k] = u[k];
+            W1[k] = W[k];
+        }
+        step_in_turn<K>(turns, coefficients, this->time(), step_size, q1, u1, W1);
+        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (u1[k] - u1[k]);
+        if (!(sum == real(0))) return false;
+        for (int k = 0; k < n; ++k) {
+            q_before[k] = q[k];
+            u_before[k] = u[k];
+            q[k] = q1[k];
+            u[k] = u1[k];
+            W[k] = W1[k];
+        }
+        return true;
+    }
+    template <class Neighbours>
+    bool move(Neighbours& all) {
+        if (!all.step(turns, coefficients, this->time(), step_size)) return false;
+        copy_lanes<n>(all.q[all.now], q);
+        copy_lanes<n>(all.u[all.now], u);
+        return true;
+    }
+
+    real position_before(int k) const {
+        if constexpr (K::neighbours)
+            return neighbours.q[1 - neighbours.now][k];
+        else
+            return q_before[k];
+    }
+    real velocity_before(int k) const {
+        if constexpr (K::neighbours)
+            return neighbours.u[1 - neighbours.now][k];
+        else
+            return u_before[k];
+    }
+    void look_at_ends() const {
+        if (ends.of == this->steps) return;
+        ends.of = this->steps;
+        real begin[n];
+        for (int k = 0; k < n; ++k) begin[k] = position_before(k);
+        Formulas<K>::acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size,
+                                  static_cast<const real*>(begin), +ends.W[0]);
+        Formulas<K>::acceleration(coefficients, this->time(), static_cast<const real*>(q), +ends.W[1]);
+    }
+};
+
+}  // namespace lobatto
+
+#endif
