@@ -86,7 +86,8 @@ void measure_all(Laboratory& laboratory) {
     };
     std::vector<std::pair<Member, std::vector<double>>> wishes;
     const std::vector<double> all(std::begin(targets), std::end(targets));
-    for (const Member& member : family_in(Precision::double_)) wishes.emplace_back(member, all);
+    for (const Member& member : family_in(Precision::double_, laboratory.derivation().system.separable))
+        wishes.emplace_back(member, all);
     for (const int points : {4, 6, 8, 9})
         wishes.push_back({{Family::lobatto, points, Precision::single}, {1e-3, 1e-9}});
     for (const int points : {9, 12}) wishes.push_back({{Family::lobatto, points, Precision::extended}, {1e-12, 1e-17}});
@@ -136,9 +137,10 @@ void measure(const Example& example, const std::string& kept, bool draws, Tables
     LaboratoryRequest request;
     request.seconds = reference_seconds;
     request.notebook = fmt::format("{}/{}.jsonl", kept, example.scene);
-    request.first = family_in(Precision::double_);
+    const Derivation derivation = derive(scene);
+    request.first = family_in(Precision::double_, derivation.system.separable);
     request.say = [&](const std::string& what) { fmt::print(stderr, "{}: {}\n", scene.name, what); };
-    Laboratory laboratory(derive(scene), scene, request);
+    Laboratory laboratory(derivation, scene, request);
     measure_all(laboratory);
     if (std::string(example.scene) == "stiff_fput") tables.stiff = stiff_rows(laboratory);
     const double until = laboratory.until(), omega = laboratory.reference().frequency;

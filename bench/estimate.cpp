@@ -32,10 +32,12 @@ constexpr double least = 1e-11;         // smaller errors are rounding's
 constexpr double fewest_radians = 4;    // h omega of the coarsest steps
 constexpr double parts[] = {0.05, 0.1, 0.5, 0.9, 0.95};
 
-std::vector<Member> members() {
+std::vector<Member> members(bool is_separable) {
     std::vector<Member> list;
     for (const int points : {2, 3, 4, 6, 8, 10, 12}) list.push_back({Family::lobatto, points});
     for (const int stages : {1, 2, 4, 6, 8, 10}) list.push_back({Family::gauss, stages});
+    for (const int stages : sizes_of(Family::splitting))
+        if (is_separable) list.push_back({Family::splitting, stages});
     return list;
 }
 
@@ -52,13 +54,15 @@ void measure(const std::string& path, const std::string& file) {
     LaboratoryRequest wish;
     wish.seconds = seconds_a_scene;
     wish.wanted = 1e-12;
-    wish.first = members();
-    Laboratory laboratory(derive(scene), scene, wish);
+    const Derivation derivation = derive(scene);
+    const std::vector<Member> list = members(derivation.system.separable);
+    wish.first = list;
+    Laboratory laboratory(derivation, scene, wish);
     const StepLadder ladder(laboratory.reference().samples, 1.35);
     const double until = laboratory.until(), uncertainty = laboratory.reference().disagreement.back();
     std::string rows;
     int count = 0;
-    for (const Member& member : members()) {
+    for (const Member& member : list) {
         double best = std::numeric_limits<double>::infinity();
         int no_better = 0;
         const double coarsest = until * laboratory.reference().frequency / fewest_radians;
@@ -68,9 +72,8 @@ void measure(const std::string& path, const std::string& file) {
             no_better = m.complete && m.error < 0.7 * best ? 0 : no_better + 1;
             if (m.complete) best = std::min(best, m.error);
             if (m.complete && m.error > 100 * uncertainty && m.error < 0.1) {
-                rows += fmt::format("{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g}\n", scene.name,
-                                    member.family == Family::lobatto ? "Lobatto" : "Gauss", member.points, steps,
-                                    m.error, m.jump, m.growth, m.estimate);
+                rows += fmt::format("{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g}\n", scene.name, word_of(member.family),
+                                    member.points, steps, m.error, m.jump, m.growth, m.estimate);
                 ++count;
             }
             if (m.seconds > longest_run || best < least || (no_better >= 4 && best < 1e-6)) break;
@@ -92,7 +95,7 @@ std::map<std::string, std::vector<Measurement>> read(const std::string& path) {
         std::vector<Measurement>& list = result[cells[0]];
         if (cells.size() < 8) continue;
         Measurement m;
-        m.candidate.member = {cells[1] == "Gauss" ? Family::gauss : Family::lobatto, std::atoi(cells[2].c_str())};
+        m.candidate.member = {family_of(cells[1]), std::atoi(cells[2].c_str())};
         m.candidate.steps = std::atoll(cells[3].c_str());
         m.complete = true;
         m.error = std::strtod(cells[4].c_str(), nullptr);

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "bench/reference.hpp"
+#include "cli/gradients.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/stability_limit.hpp"
 #include "generator/pipeline.hpp"
@@ -40,14 +41,9 @@ std::vector<Method> methods_in_race(bool few, bool separable) {
     return methods;
 }
 
-// Gradients of V, or of L, that a run took.
 long evaluations_of(const lobatto_kernel& kernel, const lobatto_advance& call) {
-    if (kernel.form == LOBATTO_SEPARABLE && kernel.unknowns == 0)  // explicit
-        return static_cast<long>(call.steps_done) * (kernel.nodes - 1);
-    const bool lobatto_nodes = std::string(kernel.method).starts_with("Lobatto");
-    const bool ends_apart = kernel.form == LOBATTO_SEPARABLE && lobatto_nodes;
-    return static_cast<long>(call.iterations) * (kernel.nodes - (ends_apart ? 2 : 0)) +
-           (ends_apart ? static_cast<long>(call.steps_done) : 0);
+    return static_cast<long>(
+        gradients_of(kernel, static_cast<double>(call.iterations), static_cast<double>(call.steps_done)));
 }
 
 Effort run_one(LoadedStepper<double>& stepper, std::int64_t steps, double tolerance, Trajectory& trajectory) {
@@ -116,11 +112,14 @@ bool endures(const Problem& problem, LoadedStepper<double>& stepper, std::int64_
         return std::fabs(energy_of(problem, trajectory) / H0 - 1);
     };
     double largest = rounding;
-    for (std::int64_t look = 0; look < looks; ++look)
-        largest = std::fmax(largest, error_after((look + 1) * steps / looks - look * steps / looks));
-    for (std::int64_t time = 1; time < times && largest < 1; ++time)
+    for (std::int64_t look = 0; look < looks; ++look) {
+        const double error = error_after((look + 1) * steps / looks - look * steps / looks);
+        if (!(error < 1)) return false;
+        largest = std::fmax(largest, error);
+    }
+    for (std::int64_t time = 1; time < times; ++time)
         if (!(error_after(steps) <= 10 * largest)) return false;
-    return largest < 1;
+    return true;
 }
 
 Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel) {

@@ -153,11 +153,13 @@ std::vector<Measurement> brute_force(Laboratory& laboratory, Cost& cost, double 
         const auto next = front.upper_bound(error);
         return next == front.begin() ? infinity : std::prev(next)->second;
     };
-    for (const Member& member : family_in(Precision::double_)) laboratory.workshop().order(member);
+    const std::vector<Member> members = family_in(Precision::double_, laboratory.derivation().system.separable);
+    for (const Member& member : members) laboratory.workshop().order(member);
     const StepLadder ladder(laboratory.reference().samples, 1.1);
-    for (const Member& member : family_in(Precision::double_)) {
+    for (const Member& member : members) {
         const Kernel kernel = laboratory.workshop().kernel(member);
         for (const double tolerance : {0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4}) {
+            if (tolerance > 0 && !member.iterates()) break;
             int dear = 0, no_better = 0;
             double least = infinity;
             const double fewest = laboratory.until() * laboratory.reference().frequency / 4;
@@ -257,7 +259,7 @@ std::optional<Promise> promise_for(const Scene& scene, double target, double bud
         const std::vector<std::string> cells = cells_of(line);
         if (!line.starts_with(begin) || cells.size() < 8) continue;
         const auto number = [&](std::size_t i) { return std::strtod(cells[i].c_str(), nullptr); };
-        const Member member{cells[2] == "gauss" ? Family::gauss : Family::lobatto, static_cast<int>(number(3))};
+        const Member member{family_of(cells[2]), static_cast<int>(number(3))};
         return Promise{target, number(6), number(7), {member, static_cast<std::int64_t>(number(4)), number(5)}};
     }
     ChoiceRequest request;
@@ -266,9 +268,8 @@ std::optional<Promise> promise_for(const Scene& scene, double target, double bud
     try {
         const Choice choice = choose(derive(scene), scene, request);
         const Candidate& c = choice.measurement.candidate;
-        append(choices,
-               fmt::format("{}{},{},{},{},{},{:.1f}", begin, c.member.family == Family::gauss ? "gauss" : "lobatto",
-                           c.member.points, c.steps, c.tolerance, choice.measurement.error, choice.seconds));
+        append(choices, fmt::format("{}{},{},{},{},{},{:.1f}", begin, word_of(c.member.family), c.member.points,
+                                    c.steps, c.tolerance, choice.measurement.error, choice.seconds));
         return Promise{target, choice.measurement.error, choice.seconds, c};
     } catch (const ComputationError& refusal) {
         std::string why = refusal.what();

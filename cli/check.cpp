@@ -56,7 +56,9 @@ std::vector<Output> outputs_of(const Derivation& derivation, long operations) {
     return {{"energy", asked.energy, "H at every kept state",
              cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
             {"momenta", asked.momenta, "columns p_... of the trajectory", 0},
-            {"tangent", asked.tangent, "the derivative of a step, from the matrix of its equations",
+            {"tangent", asked.tangent,
+             derivation.structure.is_explicit ? "the derivative of a step, kick by kick and drift by drift"
+                                              : "the derivative of a step, from the matrix of its equations",
              cost(asked.tangent, [](Outputs& outputs) { outputs.tangent = false; })},
             {"dense", asked.dense > 0,
              fmt::format("{} states between two steps, on the step's polynomial", asked.dense), 0},
@@ -127,8 +129,9 @@ void print(const Checked& checked) {
               (unknowns == 0 ? "none" : std::to_string(unknowns)) + compared(unknowns, unknowns_of(checked.without)));
     if (const std::string solver = solver_text(derivation); !solver.empty()) print_row("solved", solver);
     const long elimination = elimination_of(derivation);
-    print_row("elimination", fmt::format("some {} multiplications{}", elimination,
-                                         compared(elimination, elimination_of(checked.without))));
+    if (!derivation.structure.is_explicit)
+        print_row("elimination", fmt::format("some {} multiplications{}", elimination,
+                                             compared(elimination, elimination_of(checked.without))));
 
     fmt::print(std::cout, "\nThe kernel\n");
     for (const Output& output : checked.outputs)

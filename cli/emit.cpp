@@ -17,6 +17,7 @@
 #include "cli/output_path.hpp"
 #include "cli/support_text.hpp"
 #include "generator/pipeline.hpp"
+#include "generator/splitting.hpp"
 #include "runtime/compiler.hpp"
 #include "runtime/error.hpp"
 
@@ -92,9 +93,23 @@ void print_use(const KernelSource& source, const EmitCommand& options) {
                quadruple ? " -lquadmath" : "");
 }
 
+// The decimals of a splitting method must be enough for the number type.
+void check_digits(const Scene& scene, Precision precision) {
+    if (scene.method.family != Family::splitting) return;
+    const int known = splitting_of(scene.method.points).digits, wanted = precision == Precision::extended    ? 19
+                                                                         : precision == Precision::quadruple ? 32
+                                                                                                             : 0;
+    if (known < wanted)
+        throw InputError(fmt::format(
+            "{}: the coefficients of {} are known to {} digits, too few for this number type; choose double, "
+            "or Lobatto (--points 8)",
+            scene.path, scene.method.name(), known));
+}
+
 void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    check_digits(scene, options.precision);
     const KernelSource source =
         emit(derive(scene, options.general), {options.precision, options.standalone ? kernel_hpp_text : std::string()});
 

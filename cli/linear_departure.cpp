@@ -44,12 +44,13 @@ std::string linear_departure(const Derivation& derivation, const Scene& scene, c
     return fmt::format(
         "the run is wrong from about step {:.0f} on, and at its end, t = {:.6g}, q = {}, p = {}: a step multiplies the "
         "motion by {:.4g}, and by itself it grows by {:.4g} in that time. The step is {}. Try a smaller step, such as "
-        "h = {:.6g}; `lobatto stability` tells the limits.",
+        "h = {:.6g}; `lobatto stability{}` tells the limits.",
         std::ceil(std::log(times_too_large) / excess), result.time, list_text(result.q), list_text(result.p),
         std::exp(*measured), std::exp(own),
         derivation.quadrature.method.family == Family::gauss ? "so long for this motion that rounding swamps it"
                                                              : "beyond the stability of the method",
-        request.step / 2);
+        request.step / 2,
+        derivation.quadrature.is_explicit() ? fmt::format(" --splitting {}", derivation.quadrature.method.points) : "");
 }
 
 }  // namespace lobatto

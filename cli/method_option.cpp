@@ -14,16 +14,16 @@ void MethodOption::add_members_to(CLI::App& command) {
     CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
     lobatto->check(CLI::Range(2, 12));
     gauss->check(CLI::Range(1, 10))->excludes(lobatto);
-    command
-        .add_option("--splitting", splitting,
-                    "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
-        ->check(CLI::IsMember(splitting_stages()))
-        ->excludes(lobatto)
-        ->excludes(gauss);
 }
 
 void MethodOption::add_to(CLI::App& command) {
     add_members_to(command);
+    command
+        .add_option("--splitting", splitting,
+                    "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
+        ->check(CLI::IsMember(splitting_stages()))
+        ->excludes(command.get_option("--points"))
+        ->excludes(command.get_option("--stages"));
     command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
         ->check([](const std::string& text) {
             const double value = std::strtod(text.c_str(), nullptr);

@@ -17,7 +17,7 @@ struct MethodOption {
     std::optional<std::string> arithmetic;
 
     void add_to(CLI::App& command);
-    void add_members_to(CLI::App& command);  // --points, --stages and --splitting alone
+    void add_members_to(CLI::App& command);  // --points and --stages alone
     void apply(Scene& scene) const;
     std::optional<Method> member() const;  // nothing where none is named
 };

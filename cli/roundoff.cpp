@@ -93,6 +93,10 @@ void print(const RoundoffResult& result) {
 void roundoff(const RoundoffCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    if (scene.method.family == Family::splitting)
+        throw InputError(scene.path +
+                         ": `lobatto roundoff` compares plain arithmetic with clean, which splitting methods "
+                         "do not have; choose Lobatto (--points 8) or Gauss (--stages 4)");
     apply(options.overrides, scene);
     scene.method.arithmetic = StepArithmetic::clean;
     scene.method.tolerance = 0;

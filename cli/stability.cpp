@@ -56,7 +56,7 @@ std::string text_of_splitting(const Method& method) {
     for (const UnstableSteps& steps : unstable_steps(quadrature_of(method))) {
         text += fmt::format("  stable   to {:.10f}\n", steps.from);
         if (std::isfinite(steps.to))
-            text += fmt::format("  unstable to {:.10f}; growth a step: at most 1 + {:.2g}\n", steps.to,
+            text += fmt::format("  unstable to {:.10f}; growth a step: up to about 1 + {:.2g}\n", steps.to,
                                 std::expm1(steps.rate));
         else
             text += "  unstable beyond, as far as is looked\n";

@@ -176,7 +176,7 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
         conserves ? energies_along(derivation, stepper, states, request.parameters) : std::vector<double>();
     Evidence evidence =
         evidence_of(stepper, states, request.parameters, request.step, scale, error_power(derivation.quadrature.method),
-                    energies, conserves && derivation.quadrature.method.family != Family::gauss);
+                    energies, conserves && derivation.quadrature.method.family == Family::lobatto);
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     std::vector<double> moving = scale;
     bool any_moves = false;

@@ -11,6 +11,7 @@
 #include "cli/kernel_of.hpp"
 #include "cli/method_option.hpp"
 #include "generator/check.hpp"
+#include "generator/splitting.hpp"
 #include "runtime/convergence.hpp"
 #include "runtime/diagnostics.hpp"
 #include "runtime/error.hpp"
@@ -237,7 +238,9 @@ void verify(const VerifyOptions& options) {
     } else {
         rows.push_back({"symplectic step, reversal", "left out", fmt::format("n > {}", tangent_limit), true, ""});
     }
-    const Convergence convergence = measure_order(exact_kernel, quadruple_start, start.step);
+    const double of_decimals =
+        scene.method.family == Family::splitting ? 100 * std::pow(10.0, -splitting_of(scene.method.points).digits) : 0;
+    const Convergence convergence = measure_order(exact_kernel, quadruple_start, start.step, of_decimals);
     rows.push_back(order(convergence, exact_kernel));
     momenta(rows, kernel, start, scene);
     const std::string energy_claim = "H in double against quadruple";

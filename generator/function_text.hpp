@@ -29,7 +29,7 @@ struct Statement {
 // Assignments as C++ lines, indented by 8. `external` names what the function is given (inputs, fields of k); a value
 // of a stage up to `given` that has no such name is a mistake of ours. Values used more than once become locals t1, t2,
 // ... or bear the name the derivation gave them; in a template on the type of numbers (`any_number`) they are `auto`.
-// Products are added by fused() where it `fuses`.
+// Products are added by fused_sum() where it `fuses`.
 class FunctionText {
 public:
     FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,

@@ -204,7 +204,7 @@ private:
             std::vector<Id> factors = graph_[term].operands;
             const std::string last = print(factors.back()).text;
             factors.pop_back();
-            text = "fused(" + fraction(factors).text + ", " + last + ", " + text + ")";
+            text = "lobatto::fused_sum(" + fraction(factors).text + ", " + last + ", " + text + ")";
         }
         return {text, fused.empty() ? sum : atom};
     }

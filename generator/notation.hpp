@@ -16,7 +16,7 @@ enum class Precision { single, double_, extended, quadruple };  // float, double
 using Naming = std::function<std::string(Id)>;
 
 // The formula of a node. C++ literals are shortest round-trip for double, and 9, 21, 36 digits with suffix f, L, Q
-// otherwise. Where it `fuses`, C++ adds products by fused(a, b, c) = a b + c of kernel_pack.hpp.
+// otherwise. Where it `fuses`, C++ adds products by lobatto::fused_sum(a, b, c) = a b + c of kernel_pack.hpp.
 std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming = {},
                     Precision precision = Precision::double_, bool fuses = false);
 

@@ -2,11 +2,8 @@
 // The one place that calls the stages in order.
 #include "generator/pipeline.hpp"
 
-#include <fmt/format.h>
-
 #include "generator/limits.hpp"
 #include "generator/programs.hpp"
-#include "generator/splitting.hpp"
 #include "generator/start.hpp"
 
 namespace lobatto {
@@ -74,17 +71,6 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
 
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
     const Scene& scene = derivation.scene;
-    if (derivation.structure.is_explicit) {
-        const int known = splitting_of(scene.method.points).digits,
-                  wanted = options.precision == Precision::extended    ? 19
-                           : options.precision == Precision::quadruple ? 32
-                                                                       : 0;
-        if (known < wanted)
-            throw InputError(
-                fmt::format("{}: the coefficients of {} are known to {} digits, too few for this number "
-                            "type; choose double, or Lobatto (--points 8)",
-                            scene.path, scene.method.name(), known));
-    }
     const Limits limits(scene.path);
     try {
         return emit_kernel(derivation, build_programs(derivation), options);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "generator/splitting_stability.hpp"
 
+#include <cln/cln.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -18,8 +20,11 @@ struct Entries {
 class Oscillator {
 public:
     explicit Oscillator(const Quadrature& quadrature) {
-        const auto number = [](const GiNaC::ex& value) {
-            return static_cast<long double>(GiNaC::ex_to<GiNaC::numeric>(value).to_double());
+        const auto number = [](const GiNaC::ex& value) {  // as the sum of two doubles
+            const auto exact = cln::the<cln::cl_R>(GiNaC::ex_to<GiNaC::numeric>(value).to_cl_N());
+            const double first = cln::double_approx(exact);
+            const cln::cl_R rest = exact - cln::rational(cln::cl_DF(first));
+            return first + static_cast<long double>(cln::double_approx(rest));
         };
         for (const GiNaC::ex& b : quadrature.b) kicks_.push_back(number(b));
         for (std::size_t i = 0; i + 1 < quadrature.c.size(); ++i)

@@ -8,7 +8,8 @@
 
 namespace lobatto {
 
-// In `from` < h omega < `to` states grow by a factor exp(rate) a step at most: |trace| = 2 cosh(rate) > 2.
+// In `from` < h omega < `to` states grow by a factor of up to exp(rate) a step, the largest of 63 places: |trace| = 2
+// cosh(rate) > 2.
 struct UnstableSteps {
     double from = 0, to = 0, rate = 0;
 };

@@ -214,7 +214,7 @@ private:
         Couplings couplings(static_cast<std::size_t>(n_));
         for (const auto& [row, column] : result_.entries) couplings.add(row, column);
         result_.groups = couplings.groups();
-        describe_groups();
+        if (!result_.is_explicit) describe_groups();
         if (result_.form == Form::linear_map) return;
         repetition();
         absorption();
@@ -394,11 +394,9 @@ private:
         std::string reason = "all forces are linear, so a step is one matrix: nothing is iterated";
         if (result_.linear && result_.form != Form::linear_map)
             reason = "all forces are linear, so one solve a step is exact, its matrix factored once for all steps";
-        if (result_.is_explicit && system_.linear && !result_.linear)
-            reason = "all forces are linear, of which explicit steps make no use";
-        else if (!result_.linear)
-            reason = curved();
-        find("linear system", system_.linear && (result_.linear || result_.is_explicit), reason);
+        if (result_.is_explicit && system_.linear && !result_.linear) return;  // of no use
+        if (!result_.linear) reason = curved();
+        find("linear system", result_.linear, reason);
     }
 
     // A second derivative that is not constant: "d2V/dadb = 2*a depends on the position".

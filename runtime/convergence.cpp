@@ -95,7 +95,7 @@ double rounding_error(const States& reference, const QuadrupleStart& start, int 
 
 }  // namespace
 
-Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step) {
+Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step, double least) {
     LoadedStepper<Quadruple> stepper(kernel);
     const auto& ladder = kernel->order > high_order ? near_ones : halvings;
     const int reference_ratio = ladder.back() * finest_ratio;
@@ -109,7 +109,7 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
             coarse /= 2;
             continue;
         }
-        const double rounding = rounding_error(*reference, start, reference_ratio);
+        const double rounding = std::fmax(least, rounding_error(*reference, start, reference_ratio));
         Convergence measured;
         measured.duration = static_cast<double>(coarse_steps * coarse);
         bool too_coarse = false;

@@ -8,7 +8,8 @@
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
 //   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
 //                for falling, 0 for both
-// Form::linear_map and Form::separable: is_explicit, of splitting methods: c, b, and drift_length[s - 1] between nodes.
+// Form::linear_map and Form::separable: is_explicit; of splitting methods they have c, b and drift_length[s - 1], the
+//   way between nodes, and neither A nor E nor what orders unknowns.
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), acceleration(k, q, W),
 //   node(k, q, W, S), propagate(k, q, p, q1, p1).
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Steps of explicit splitting methods: kicks u -= h b_i W(q_i) and drifts q += h a_i u in turn (D40).
 //
-// Nothing is solved for, so that a step costs its gradients and no step can fail to converge. From one gradient to the
-// next leads q + h a_i (u - h b_i W), of which q + h a_i u is known before W is: one operation after W, not two. One
-// trajectory goes by itself, its neighbouring coordinates in the lanes of Packs where formulas join these; or several
-// side by side.
+// Nothing is solved for, so that a step costs its gradients and no step can fail to converge. However their lengths are
+// rounded, a kick and a drift are symplectic. One trajectory goes by itself, its neighbouring coordinates in the lanes
+// of Packs where formulas join these; or several side by side.
 #ifndef LOBATTO_KERNEL_EXPLICIT_HPP
 #define LOBATTO_KERNEL_EXPLICIT_HPP
 
@@ -26,16 +25,12 @@ struct Turns {
     static constexpr int s = K::points;
     static constexpr bool kicks_ends = K::b[0] != real(0);  // else a step begins and ends with a drift
 
-    real kick[s];       // -h b
-    real drift[s - 1];  // h a
-    real bend[s - 1];   // their products, of a drift and the kick before it
+    real kick[s];  // -h b
+    real drift[s - 1];
 
     void prepare(real h) {
         for (int i = 0; i < s; ++i) kick[i] = -h * K::b[i];
-        for (int i = 0; i < s - 1; ++i) {
-            drift[i] = h * K::drift_length[i];
-            bend[i] = drift[i] * kick[i];
-        }
+        for (int i = 0; i < s - 1; ++i) drift[i] = h * K::drift_length[i];
     }
 };
 
@@ -44,29 +39,22 @@ template <class K, class T, class Given>
 LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h, T* q,
                                  T* u, T* W) {
     constexpr int n = K::coordinates, s = K::points;
-    T ahead[n];
-    const auto look_ahead = [&](int i) LOBATTO_FORMULA {
-        for (int c = 0; c < n; ++c) ahead[c] = fused(T(turns.drift[i]), u[c], q[c]);
+    const auto kick = [&](int i) LOBATTO_FORMULA {
+        for (int c = 0; c < n; ++c) u[c] = fused(T(turns.kick[i]), W[c], u[c]);
     };
-    const auto kick_and_drift = [&](int i) LOBATTO_FORMULA {
-        for (int c = 0; c < n; ++c) {
-            q[c] = fused(T(turns.bend[i]), W[c], ahead[c]);
-            u[c] = fused(T(turns.kick[i]), W[c], u[c]);
-        }
+    const auto drift = [&](int i) LOBATTO_FORMULA {
+        for (int c = 0; c < n; ++c) q[c] = fused(T(turns.drift[i]), u[c], q[c]);
     };
-    look_ahead(0);
-    if constexpr (Turns<K>::kicks_ends)
-        kick_and_drift(0);
-    else
-        for (int c = 0; c < n; ++c) q[c] = ahead[c];
+    if constexpr (Turns<K>::kicks_ends) kick(0);
+    drift(0);
     for (int i = 1; i < s - 1; ++i) {
-        look_ahead(i);
         Formulas<K>::acceleration(k, T(time + K::c[i] * h), static_cast<const T*>(q), W);
-        kick_and_drift(i);
+        kick(i);
+        drift(i);
     }
     if constexpr (Turns<K>::kicks_ends) {
         Formulas<K>::acceleration(k, T(time + h), static_cast<const T*>(q), W);
-        for (int c = 0; c < n; ++c) u[c] = fused(T(turns.kick[s - 1]), W[c], u[c]);
+        kick(s - 1);
     }
 }
 
@@ -89,7 +77,6 @@ struct NeighbourTurns {
 
     int now{};                                                 // the present; 1 - now: before the last step
     alignas(V) real q[2][room]{}, u[2][room]{}, W[2][room]{};  // where ends are kicked
-    alignas(V) real ahead[room]{};                             // on the way
 
     void begin(const real* position, const real* velocity, const real* acceleration) {
         for (int c = 0; c < n; ++c) {
@@ -101,11 +88,11 @@ struct NeighbourTurns {
     // False, and nothing has moved, where the end is not finite.
     bool step(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h) {
         if constexpr (in_registers) {
-            V position[parts], velocity[parts], slope[parts], next[parts];
+            V position[parts], velocity[parts], slope[parts];
             return step_in(turns, k, time, h, Registers<V, parts>{position}, Registers<V, parts>{velocity},
-                           Registers<V, parts>{slope}, Registers<V, parts>{next});
+                           Registers<V, parts>{slope});
         } else {
-            return step_in(turns, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now], +ahead);
+            return step_in(turns, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now]);
         }
     }
 
@@ -127,27 +114,21 @@ private:
     }
     template <class Row>
     LOBATTO_INLINE bool step_in(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h,
-                                Row position, Row velocity, Row slope, Row next) {
+                                Row position, Row velocity, Row slope) {
         over_parts<Row>([&](int at) LOBATTO_FORMULA {
             const V start = V::load(W[now] + at);
-            V first = V::load(u[now] + at), moved = fused(V(turns.drift[0]), first, V::load(q[now] + at));
-            if constexpr (Turns<K>::kicks_ends) {
-                moved = fused(V(turns.bend[0]), start, moved);
-                first = fused(V(turns.kick[0]), start, first);
-            }
+            V first = V::load(u[now] + at);
+            if constexpr (Turns<K>::kicks_ends) first = fused(V(turns.kick[0]), start, first);
             store_to(slope, at, start);
             store_to(velocity, at, first);
-            store_to(position, at, moved);
+            store_to(position, at, fused(V(turns.drift[0]), first, V::load(q[now] + at)));
         });
         for (int i = 1; i < s - 1; ++i) {
-            over_parts<Row>([&](int at) LOBATTO_FORMULA {
-                store_to(next, at, fused(V(turns.drift[i]), load_from<V>(velocity, at), load_from<V>(position, at)));
-            });
             accelerate(k, time + K::c[i] * h, position, slope);
             over_parts<Row>([&](int at) LOBATTO_FORMULA {
-                const V W_here = load_from<V>(slope, at);
-                store_to(position, at, fused(V(turns.bend[i]), W_here, load_from<V>(next, at)));
-                store_to(velocity, at, fused(V(turns.kick[i]), W_here, load_from<V>(velocity, at)));
+                const V moved = fused(V(turns.kick[i]), load_from<V>(slope, at), load_from<V>(velocity, at));
+                store_to(velocity, at, moved);
+                store_to(position, at, fused(V(turns.drift[i]), moved, load_from<V>(position, at)));
             });
         }
         if constexpr (Turns<K>::kicks_ends) accelerate(k, time + h, position, slope);
@@ -181,7 +162,8 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
     using typename ConstantMass<K>::real;
     using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
         ConstantMass<K>::u;
-    static constexpr int s = K::points, nodes = s;
+    static constexpr int s = K::points;
+    static constexpr int nodes = s - (Turns<K>::kicks_ends ? 1 : 2);  // gradients of a step
     static constexpr int N = 0;
 
     // The ends of the last step, for what lies between them.

@@ -588,6 +588,12 @@ LOBATTO_INLINE Pack<real, width> rough_inverse(const Pack<real, width>& x) {
     return from_bits(Bits<real, width>(line) - bits(x));
 }
 
+// a b + c of plain numbers, of Packs, or of both: for emitted formulas, whose kernel may bear any name.
+template <class A, class B, class C>
+LOBATTO_INLINE auto fused_sum(const A& a, const B& b, const C& c) {
+    return fused(a, b, c);
+}
+
 // How many lanes a type has, and of which number.
 template <class T>
 constexpr int lanes_of = 1;

@@ -229,6 +229,18 @@ TEST_CASE("steps that visit the same phases again and again gain no energy stead
     CHECK(std::fabs(result.clean.rows.back().energy_mean) < 1e-14);  // 1.1e-15 measured
 }
 
+TEST_CASE("roundoff has nothing to compare for splitting methods, and says so") {
+    const TemporaryFolder folder;
+    write_text(folder / "swing.toml",
+               "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\n"
+               "family = \"splitting\"\n[run]\nstep = 0.1\nuntil = 1\n");
+    const Finished refused = run({LOBATTO_PROGRAM, "roundoff", folder / "swing.toml", "-o", folder / "out"});
+    CHECK(refused.exit_code == 2);
+    CHECK(refused.err == (folder / "swing.toml").string() +
+                             std::string(": `lobatto roundoff` compares plain arithmetic with clean, which splitting "
+                                         "methods do not have; choose Lobatto (--points 8) or Gauss (--stages 4)\n"));
+}
+
 TEST_CASE(
     "the table of roundoff appears as a whole, and a folder that refuses it is named before anything is measured") {
     const TemporaryFolder folder;

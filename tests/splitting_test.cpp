@@ -6,7 +6,9 @@
 #include <cstring>
 
 #include "bench/peers/splitting.hpp"
+#include "cli/gradients.hpp"
 #include "cli/stability_limit.hpp"
+#include "cli/tradeoff/candidate.hpp"
 #include "generator/check.hpp"
 #include "generator/propagation.hpp"
 #include "generator/splitting.hpp"
@@ -177,6 +179,22 @@ TEST_CASE("the equations of straight paths are those of their action, written ou
             }
         }
     }
+}
+
+TEST_CASE("what a step costs is counted, and nothing is iterated") {
+    for (const int stages : {11, 14}) {
+        const Kernel kernel = compiled(derivation_of(henon_heiles, splitting(stages)));
+        CHECK(gradients_of(kernel.table(), 0, 10) == 10 * stages);
+        CHECK(!Member{Family::splitting, stages}.iterates());
+    }
+    CHECK(gradients_of(compiled(derivation_of(henon_heiles, "points = 4")).table(), 30, 10) == 70);
+    CHECK(gradients_of(compiled(derivation_of(henon_heiles, "family = \"gauss\"\nstages = 2")).table(), 30, 10) == 120);
+    CHECK(Member{Family::gauss, 3}.iterates());
+    CHECK(family_in(Precision::double_, true).size() == family_in(Precision::double_, false).size() + 5);
+}
+
+TEST_CASE("sums of rows are fused, whatever the kernel is called") {
+    CHECK(emit(derivation_of(fput(40), "points = 4")).header.find("lobatto::fused_sum(0.3, ") != std::string::npos);
 }
 
 TEST_CASE("the step of an oscillator is a product of kicks and drifts, stable as Sturm's theorem says") {

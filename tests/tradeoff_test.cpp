@@ -243,6 +243,9 @@ TEST_CASE("a notebook keeps measurements, and leaves out a torn line and another
         CHECK(std::isnan(found->energy_error));
         CHECK(csv_row(*found, 7.7) == csv_row(measurement, 7.7));
     }
+    const std::string line = test::read_file(path);
+    test::write_text(path, std::regex_replace(line, std::regex("\"gauss\""), "\"euler\""));
+    CHECK(Notebook(path, "a subject").found() == 0);
     CHECK(Notebook(path, "another").found() == 0);
 }
 

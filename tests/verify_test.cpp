@@ -40,6 +40,16 @@ TEST_CASE("both scenes of the paper verify, with any number of points") {
         }
 }
 
+TEST_CASE("splitting methods verify, to the digits that their coefficients have") {
+    for (const auto& [stages, order] : {std::pair{"6", "4"}, {"11", "6"}, {"17", "8"}, {"35", "10"}}) {
+        INFO(stages);
+        const Finished result = verify({LOBATTO_SOURCE_DIR "/scenes/henon_heiles.toml", "--splitting", stages});
+        CHECK(result.exit_code == 0);
+        CHECK(result.out.find(std::string("steps are those of the motion to h^") + order) != std::string::npos);
+        CHECK(result.out.find(std::string("about ") + order + "  ok") != std::string::npos);
+    }
+}
+
 TEST_CASE("a scene with a symmetry has its momentum in the table") {
     const TemporaryFolder folder;
     write_text(folder / "pair.toml",

@@ -43,11 +43,13 @@ double rounding_of(Precision precision) {
     return 0;
 }
 
-std::vector<Member> family_in(Precision precision) {
-    std::vector<Member> family;
-    for (int points = 2; points <= 12; ++points) family.push_back({Family::lobatto, points, precision});
-    for (int points = 1; points <= 10; ++points) family.push_back({Family::gauss, points, precision});
-    return family;
+std::vector<Member> family_in(Precision precision, bool is_separable) {
+    std::vector<Member> members;
+    for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {
+        if (family == Family::splitting && !is_separable) continue;
+        for (const int points : sizes_of(family)) members.push_back({family, points, precision});
+    }
+    return members;
 }
 
 std::string Candidate::name() const {

@@ -21,6 +21,8 @@ struct Member {
 
     Method method(double tolerance = 0) const { return {family, points, tolerance, arithmetic}; }
     int order() const { return method().order(); }
+    // Whether its steps are iterated to a tolerance; of linear systems nothing is, whatever the member.
+    bool iterates() const { return family != Family::splitting && arithmetic == StepArithmetic::plain; }
     auto key() const { return std::tuple(family, points, precision, arithmetic); }
     friend bool operator==(const Member& a, const Member& b) { return a.key() == b.key(); }
     friend bool operator<(const Member& a, const Member& b) { return a.key() < b.key(); }
@@ -44,8 +46,8 @@ auto with_type_of(Precision precision, const Call& call) {
     }
 }
 
-// All of Lobatto 2 to 12 and Gauss 1 to 10 in one number type.
-std::vector<Member> family_in(Precision precision);
+// All of Lobatto 2 to 12 and Gauss 1 to 10 in one number type; and of splitting methods, which separable systems have.
+std::vector<Member> family_in(Precision precision, bool is_separable);
 
 struct Candidate {
     Member member;

@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "cli/gradients.hpp"
 #include "cli/hardest_steps.hpp"
 #include "runtime/diagnostics.hpp"
 #include "runtime/extrapolation.hpp"
@@ -31,13 +32,6 @@ double processor_seconds() {
     timespec now{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
     return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-// Evaluations of the gradient of V, or of L.
-double gradients_of(const lobatto_kernel& kernel, double iterations, double steps) {
-    if (kernel.form == LOBATTO_LINEAR_MAP) return 0;
-    const bool ends_apart = kernel.form == LOBATTO_SEPARABLE && std::string(kernel.method).starts_with("Lobatto");
-    return iterations * (kernel.nodes - (ends_apart ? 2 : 0)) + (ends_apart ? steps : 0);
 }
 
 // A run of the kernel with records at the samples, in blocks so that it can be interrupted.
@@ -250,7 +244,7 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
     const std::pair kind(candidate.member.family, candidate.member.points);
     if (estimates_.count(kind) == 0) estimates_.emplace(kind, quadrature_of(candidate.member.method()));
     const ErrorEstimate& estimate = estimates_.at(kind);
-    const bool energy_tells = conserves_ && candidate.member.family != Family::gauss;
+    const bool energy_tells = conserves_ && candidate.member.family == Family::lobatto;
     Evidence evidence = evidence_of(
         run.stepper, states, run.start.parameters, run.h, reference_.scale, error_power(candidate.member.method()),
         conserves_ ? energies_of(run.stepper, states) : std::vector<double>(), energy_tells);

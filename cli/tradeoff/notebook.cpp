@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "cli/tradeoff/measurement_json.hpp"
 #include "runtime/error.hpp"
@@ -29,6 +30,8 @@ Notebook::Notebook(const std::string& path, const std::string& subject) : path_(
                     measurements_[measurement.candidate.key()] = measurement;
                     kept += line + '\n';
                 } catch (const nlohmann::json::exception&) {
+                    break;
+                } catch (const std::invalid_argument&) {  // a family there is not
                     break;
                 }
             }

@@ -26,8 +26,7 @@ double fitting_tolerance(double goal, double digits) {
 }
 
 bool has_tolerance(Laboratory& laboratory, const Member& member) {
-    return laboratory.workshop().kernel(member)->linear == 0 && member.arithmetic != StepArithmetic::clean &&
-           member.family != Family::splitting;
+    return member.iterates() && laboratory.workshop().kernel(member)->linear == 0;
 }
 
 }  // namespace
@@ -201,7 +200,7 @@ std::vector<Member> neighbours(const std::map<Member, Crossing>& tried, double b
         }
         const auto size_at = [&](int place) { return sizes[static_cast<std::size_t>(place)]; };
         if (!top) {  // none reaches the goal: orders between
-            for (const int place : {last, (last + 1) / 2, last - 2})
+            for (const int place : {last, last / 2, last - 2})
                 if (tried.count({family, size_at(place)}) == 0) wishes.push_back({1e3, {family, size_at(place)}});
             continue;
         }
