@@ -75,8 +75,9 @@ struct NeighbourTurns {
     static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
     using V = Pack<real, width>;
 
-    int now{};                                                 // the present; 1 - now: before the last step
-    alignas(V) real q[2][room]{}, u[2][room]{}, W[2][room]{};  // where ends are kicked
+    int now{};  // the present; 1 - now: before the last step, and room for the next
+    // Positions, velocities, and where ends are kicked accelerations.
+    alignas(V) real q[2][room]{}, u[2][room]{}, W[2][room]{};
 
     void begin(const real* position, const real* velocity, const real* acceleration) {
         for (int c = 0; c < n; ++c) {
@@ -85,7 +86,7 @@ struct NeighbourTurns {
             W[now][c] = acceleration[c];
         }
     }
-    // False, and nothing has moved, where the end is not finite.
+    // False, and nothing has moved, where the end is not finite; what was before the last step is lost then.
     bool step(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h) {
         if constexpr (in_registers) {
             V position[parts], velocity[parts], slope[parts];
@@ -176,7 +177,7 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
     Turns<K> turns{};
     real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
     real q_before[n]{}, u_before[n]{};  // before the last step; likewise
-    bool has_history{};                 // there is a last step
+    bool has_history{};                 // what lies between the ends of the last step is known
     mutable Ends ends{};
     typename KindOfTurns<K, K::neighbours>::type neighbours{};
 
@@ -207,7 +208,10 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
 
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
-        if (!move(neighbours)) return Status::not_finite;
+        if (!move(neighbours)) {
+            has_history = has_history && !K::neighbours;
+            return Status::not_finite;
+        }
         has_history = true;
         ++this->steps;
         return Status::ok;
