@@ -315,6 +315,23 @@ int row_reach(const Elements& elements) {
     return reach;
 }
 
+bool covers(const Element& element, int count) {
+    const std::vector<RowRun> runs = runs_of(element);
+    const auto [least, most] = std::minmax_element(element.rows.front().begin(), element.rows.front().end());
+    return runs.size() == 1 && *least == 0 && *most <= 2 && *most + runs.front().count == count;
+}
+
+bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector<GiNaC::symbol>& q) {
+    const auto rests = [&](const ex& term) {
+        return std::none_of(q.begin(), q.end(), [&](const GiNaC::symbol& one) { return term.has(one); });
+    };
+    int formulas = 0;
+    for (const Element& element : elements.repeated)
+        if (!element.x.empty()) formulas += covers(element, static_cast<int>(q.size())) ? 1 : 2;
+    return formulas == 1 && row_reach(elements) <= 1 && elements.other_forces.empty() &&
+           std::all_of(walls.others.begin(), walls.others.end(), rests);
+}
+
 Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
     Walls walls;
     walls.others = elements.others;

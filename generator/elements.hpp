@@ -36,6 +36,8 @@ std::vector<RowRun> runs_of(const Element& element);
 bool are_neighbours(const Elements& elements);
 // How far the rows of long runs reach from the first coordinate, where all of them begin; -1 where some do not.
 int row_reach(const Elements& elements);
+// Whether the rows are one run, along all of `count` variables or all pairs or triples of neighbours.
+bool covers(const Element& element, int count);
 
 // Where the formula of all pairs of neighbours holds beyond the first coordinate, or the last, with zero for the one
 // that is not there: a chain between walls.
@@ -45,6 +47,8 @@ struct Walls {
     std::vector<GiNaC::ex> others;  // without what stands for the walls
 };
 Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q);
+// Whether the slope is that of one formula, of single coordinates or pairs of neighbours, which covers all of them.
+bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector<GiNaC::symbol>& q);
 
 // The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
 Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,

@@ -203,11 +203,6 @@ std::vector<RowFunction> LoopedText::row_functions() const {
 // W = M^-1 grad V along the rows, in the way `how`.
 std::string LoopedText::along_rows() const {
     const std::string time = d_.system.autonomous ? "" : "time, ";
-    const auto covers = [&](const Element& element) {
-        const std::vector<RowRun> runs = runs_of(element);
-        const auto [least, most] = std::minmax_element(element.rows.front().begin(), element.rows.front().end());
-        return runs.size() == 1 && *least == 0 && *most <= 2 && *most + runs.front().count == d_.system.n;
-    };
     const Walls& walls = d_.structure.walls;
     std::string text;
     bool is_first = true;
@@ -215,7 +210,7 @@ std::string LoopedText::along_rows() const {
         const Element& element = d_.structure.elements.repeated[number];
         if (element.x.empty()) continue;  // a constant that repeats: of the energy, not of the forces
         const std::string name = element_name(number);
-        const bool sets = is_first && covers(element);
+        const bool sets = is_first && covers(element, d_.system.n);
         std::string hung;
         if (number == walls.element) {
             if (walls.before) hung = ", lobatto::wall_before";
@@ -233,12 +228,7 @@ std::string LoopedText::along_rows() const {
         list.push_back(
             {"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W) +=", output.value});
     text += FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
-    const bool unit_masses = [&] {
-        for (int i = 0; i < d_.system.n; ++i)
-            if (!(d_.system.mass(i, i) - 1).is_zero()) return false;
-        return true;
-    }();
-    return unit_masses ? text : text + "        how::template scale<coordinates>(W, k.inverse_mass);\n";
+    return has_unit_masses(d_.system) ? text : text + "        how::template scale<coordinates>(W, k.inverse_mass);\n";
 }
 
 std::string LoopedText::body(const std::string& function) const {

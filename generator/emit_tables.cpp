@@ -33,7 +33,7 @@ std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
     return result;
 }
 
-std::string separable_shapes(const Structure& structure, int nodes, Precision precision) {
+std::string separable_shapes(const Structure& structure, const System& system, int nodes, Precision precision) {
     std::string text;
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
     line(text, fmt::format("bool is_explicit = {}", structure.is_explicit),
@@ -47,9 +47,16 @@ std::string separable_shapes(const Structure& structure, int nodes, Precision pr
         line(text, fmt::format("bool neighbours = {}", structure.neighbours && has_lanes(precision)),
              structure.neighbours ? "formulas go along neighbouring coordinates, which lie in lanes"
                                   : "coordinates are taken one by one");
-        if (structure.neighbours && has_lanes(precision))
+        if (structure.neighbours && has_lanes(precision)) {
             line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
                  "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
+            const bool in_passing = is_one_pass(structure.elements, structure.walls, system.q);
+            line(text, fmt::format("bool unit_masses = {}", has_unit_masses(system)),
+                 "acceleration need not divide by them");
+            line(text, fmt::format("bool in_passing = {}", in_passing),
+                 in_passing ? "coordinates may move one after another, each as soon as its force is known"
+                            : "coordinates move when all forces are known");
+        }
         line(text, fmt::format("bool clean = {}", structure.clean),
              structure.clean ? "round-off-clean steps" : "steps as fast as can be");
         line(text, fmt::format("bool absorbed = {}", structure.absorbed),
@@ -195,9 +202,15 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     for (const Event& event : outputs.events) directions.push_back(event.direction);
     text += integer_table("event_direction", directions);
     if (structure.form == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
-    text += separable_shapes(structure, d.quadrature.points, precision);
+    text += separable_shapes(structure, d.system, d.quadrature.points, precision);
     const bool solves = structure.form == Form::separable && !structure.unrolled && !structure.is_explicit;
     return solves ? text + order_of_unknowns(structure) : text;
+}
+
+bool has_unit_masses(const System& system) {
+    for (int i = 0; i < system.n; ++i)
+        if (!(system.mass(i, i) - 1).is_zero()) return false;
+    return true;
 }
 
 bool has_lanes(Precision precision) {

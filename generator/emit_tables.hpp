@@ -12,6 +12,7 @@
 namespace lobatto {
 
 struct Derivation;
+struct System;
 
 // Coordinates up to which a step's tangent map is worth its 4 n^2 numbers.
 constexpr int tangent_limit = 64;
@@ -19,6 +20,8 @@ bool has_tangent(const Derivation& derivation);
 
 // Whether vector registers know these numbers.
 bool has_lanes(Precision precision);
+// Whether all masses are 1, whatever the parameters.
+bool has_unit_masses(const System& system);
 
 std::string shapes(const Derivation& derivation, Precision precision, const std::string& name,
                    const std::string& digest);

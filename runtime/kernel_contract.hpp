@@ -16,8 +16,9 @@
 //   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of kernel_separable.hpp are the
 //   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of kernel_solve.hpp order the
 //   unknowns, `neighbours` that acceleration can go SideBySide (kernel_rows.hpp; with row_reach, how far its rows
-//   reach), and `absorbed` says that quadratic_part(k, S0) gives a constant part of S to iterate with; `clean` (in
-//   loops) that steps are those of kernel_clean.hpp. Gauss's nodes stand between two ends of weight zero.
+//   reach, in_passing, that it can go InPassing, and unit_masses), and `absorbed` says that quadratic_part(k, S0) gives
+//   a constant part of S to iterate with; `clean` (in loops) that steps are those of kernel_clean.hpp. Gauss's nodes
+//   stand between two ends of weight zero.
 // Form::general: see kernel_general.hpp.
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP

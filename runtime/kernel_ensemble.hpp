@@ -35,7 +35,7 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
 }
 
 // How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
-// going) moves the lanes that are going, and answers which have moved; momentum(single, lane, p) reads one.
+// going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Lanes;
 
@@ -45,6 +45,8 @@ struct Lanes<K, T, Form::linear_map, Stepping::solved> {
     using Going = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
+
+    const T& position(int c) const { return q[c]; }
 
     void prepare(const Stepper<K>&, int) {}
     void set_tolerance(real) {}
@@ -85,6 +87,7 @@ struct Lanes<K, T, Form::separable, Stepping::solved> {
     T q[n], u[n], evaluations = T(real(0));
     Sweeps<K, T> sweeps;
 
+    const T& position(int c) const { return q[c]; }
     void prepare(const Stepper<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
     void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
     void start(const Stepper<K>& single, const real*, int lane) {
@@ -123,10 +126,12 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
     using real = typename K::real;
     using Going = decltype(T() < T());
     static constexpr int n = K::coordinates;
-    T q[n], u[n], W[n], evaluations = T(real(0));
+    int now{};  // the present; 1 - now: room for the next
+    T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
     Turns<K> turns;
     real h;
 
+    const T& position(int c) const { return q[now][c]; }
     void prepare(const Stepper<K>& single, int) {
         turns = single.turns;
         h = single.step_size;
@@ -135,32 +140,46 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
     void start(const Stepper<K>& single, const real*, int lane) { follow(single, lane); }
     void momentum(const Stepper<K>& single, int lane, real* momentum) const {
         real velocity[n];
-        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
     template <class Given>
     Going step(const Given& k, real time, Going going) {
-        T q1[n], u1[n], W1[n], not_finite = T(real(0));
-        for (int c = 0; c < n; ++c) {
-            q1[c] = q[c];
-            u1[c] = u[c];
-            W1[c] = W[c];
+        const int next = 1 - now;
+        T not_finite = T(real(0));
+        if constexpr (K::neighbours) {
+            step_in_passing<K>(turns, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+            for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
+        } else {
+            T q1[n], u1[n], W1[n];
+            for (int c = 0; c < n; ++c) {
+                q1[c] = q[now][c];
+                u1[c] = u[now][c];
+                W1[c] = W[now][c];
+            }
+            step_in_turn<K>(turns, k, time, h, q1, u1, W1);
+            for (int c = 0; c < n; ++c) {
+                not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
+                q[next][c] = q1[c];
+                u[next][c] = u1[c];
+                W[next][c] = W1[c];
+            }
         }
-        step_in_turn<K>(turns, k, time, h, q1, u1, W1);
-        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
         going = going & (not_finite == T(real(0)));
-        for (int c = 0; c < n; ++c) {
-            q[c] = select(going, q1[c], q[c]);
-            u[c] = select(going, u1[c], u[c]);
-            W[c] = select(going, W1[c], W[c]);
-        }
+        if (!all(going))
+            for (int c = 0; c < n; ++c) {
+                q[next][c] = select(going, q[next][c], q[now][c]);
+                u[next][c] = select(going, u[next][c], u[now][c]);
+                W[next][c] = select(going, W[next][c], W[now][c]);
+            }
+        now = next;
         return going;
     }
     void follow(const Stepper<K>& single, int lane) {
         for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(u[c], lane, single.u[c]);
-            set_lane(W[c], lane, single.W[c]);
+            set_lane(q[now][c], lane, single.q[c]);
+            set_lane(u[now][c], lane, single.u[c]);
+            set_lane(W[now][c], lane, single.W[c]);
         }
     }
 };
@@ -172,7 +191,10 @@ constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
     if (native == 1 || !K::any_number || is_clean<K>()) return 0;
     if constexpr (K::form == Form::separable) {
-        if (K::neighbours) return 0;
+        if constexpr (K::neighbours) {
+            const bool moves_in_passing = stepping_of<K>() == Stepping::in_turn && K::in_passing;
+            return moves_in_passing && 2 * trajectories > native ? native : 0;
+        }
     }
     if (K::form == Form::general) return K::coordinates > most_full ? 0 : native;
     return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;
@@ -186,6 +208,7 @@ struct Lanes<K, T, Form::general, Stepping::solved> {
     T q[n], p[n], evaluations = T(real(0));
     GalerkinSweeps<K, T> sweeps;
 
+    const T& position(int c) const { return q[c]; }
     void prepare(const Stepper<K>& single, int) { sweeps.prepare(single.step_size); }
     void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
     void start(const Stepper<K>& single, const real*, int lane) {
@@ -317,7 +340,7 @@ private:
     // The state of a lane; `single` has its coefficients from then on.
     void state_of(int lane, real* q, real* p) const {
         single.coefficients = coefficients_of[lane];
-        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.q[c], lane);
+        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.position(c), lane);
         motion.momentum(single, lane, p);
     }
 

@@ -58,6 +58,47 @@ LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename
     }
 }
 
+// What moves each coordinate, by a kick and a drift, as soon as its acceleration is known; the last kick of a step
+// keeps accelerations instead.
+template <class K, class T, class Given, bool is_last>
+struct Moved {
+    T *q, *u, *W;
+    T kick, drift;
+    const Given& k;
+};
+template <class K, class T, class Given, bool is_last>
+LOBATTO_INLINE void store_to(const Moved<K, T, Given, is_last>& moved, int at, T slope) {
+    if constexpr (!K::unit_masses) slope *= moved.k.inverse_mass[at];
+    const T velocity = fused(moved.kick, slope, moved.u[at]);
+    moved.u[at] = velocity;
+    if constexpr (is_last)
+        moved.W[at] = slope;
+    else
+        moved.q[at] = fused(moved.drift, velocity, moved.q[at]);
+}
+
+// One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
+// coordinates for each kick.
+template <class K, class T, class Given>
+LOBATTO_INLINE void step_in_passing(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h,
+                                    const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
+    constexpr int n = K::coordinates, s = K::points;
+    const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
+        const Moved<K, T, Given, is_last()> moved{q1, u1, W1, T(turns.kick[i]), T(is_last ? 0 : turns.drift[i]), k};
+        const T* const position = q1;
+        if constexpr (K::autonomous)
+            K::template acceleration<InPassing>(k, position, moved);
+        else
+            K::template acceleration<InPassing>(k, T(time + K::c[i] * h), position, moved);
+    };
+    for (int c = 0; c < n; ++c) {
+        u1[c] = Turns<K>::kicks_ends ? fused(T(turns.kick[0]), W[c], u[c]) : u[c];
+        q1[c] = fused(T(turns.drift[0]), u1[c], q[c]);
+    }
+    for (int i = 1; i < s - 1; ++i) pass(i, std::false_type());
+    if constexpr (Turns<K>::kicks_ends) pass(s - 1, std::true_type());
+}
+
 // Whether positions and velocities, accelerations, and what is under way fit the 32 registers of AVX-512.
 template <class K>
 constexpr bool turns_fit_registers() {

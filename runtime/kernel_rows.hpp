@@ -114,6 +114,11 @@ struct RowLoop {
         return first - indices[0];
     }
     static constexpr int offset(int j) { return indices[j] - indices[0] - least(); }
+    static constexpr int reach() {
+        int farthest = 0;
+        for (int j = 0; j < variables; ++j) farthest = offset(j) > farthest ? offset(j) : farthest;
+        return farthest;
+    }
     static constexpr int farthest_within(int width) {
         int farthest = 0;
         for (int j = 0; j < variables; ++j)
@@ -153,7 +158,13 @@ struct RowLoop {
             rows.count = is_whole ? width : count - r;
             if constexpr (!overlaps) here = load_from<V>(q, at);
             V there = here;
-            if constexpr (overlaps) there = load_from<V>(q, at + width);
+            if constexpr (overlaps) {
+                // One by one, no zero stands behind the last coordinate.
+                if constexpr (in_lanes || is_whole || (walls & wall_behind) == 0)
+                    there = load_from<V>(q, at + width);
+                else
+                    there = V(number(0));
+            }
             each(every, [&](auto j) LOBATTO_FORMULA {
                 if constexpr (offset(j) > width)
                     rows.x[j] = load_from<V>(q, at + offset(j));
@@ -162,7 +173,8 @@ struct RowLoop {
             });
             here = there;
             formula(rows);
-            V sum = adds ? load_from<V>(W, at) : V(number(0));
+            V sum = V(number(0));
+            if constexpr (adds) sum = load_from<V>(W, at);
             each(every, [&](auto j) LOBATTO_FORMULA {
                 V& result = rows.result[j];
                 if constexpr (in_lanes) {
@@ -181,20 +193,22 @@ struct RowLoop {
             });
             store_to(W, at, sum);
         };
-        const int whole = count / width * width;
+        constexpr bool last_apart = !in_lanes && (walls & wall_behind) != 0;
+        const int whole = last_apart ? count - 1 : count / width * width;
         if constexpr (are_registers<Position>)
             written_out<width>(whole, [&](int r) LOBATTO_FORMULA { add(r, std::true_type()); });
         else
             for (int r = 0; r < whole; r += width) add(r, std::true_type());
         int behind = whole;
-        if constexpr (in_lanes) {
+        if constexpr (in_lanes || last_apart) {
             if (whole < count) {
                 add(whole, std::false_type());
                 behind += width;
             }
         }
         if ((walls & wall_behind) == 0 && behind < count + farthest_within(width)) {
-            V sum = adds ? load_from<V>(W, first + behind) : V(number(0));
+            V sum = V(number(0));
+            if constexpr (adds) sum = load_from<V>(W, first + behind);
             each(every, [&](auto j) LOBATTO_FORMULA {
                 if constexpr (offset(j) > 0 && offset(j) <= width)
                     sum = joined(sum, passed_on<width, offset(j)>(before[j], V(number(0))), takes[j]);
@@ -315,9 +329,25 @@ struct OneByOne {
     template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
               class Formula>
     LOBATTO_INLINE static void set_rows(const number* q, number* W, const Formula& formula) {
-        clear<count>(W);
-        add_rows<count, variables, indices, runs, walls>(q, W, formula);
+        if constexpr (RowLoop<variables, indices>::reach() <= 1) {
+            RowLoop<variables, indices, walls>::template entire<number, false, runs>(q, W, formula);
+        } else {
+            clear<count>(W);
+            add_rows<count, variables, indices, runs, walls>(q, W, formula);
+        }
     }
+};
+
+// or the same where each entry of W is given away as soon as it is known, with its coordinate no longer needed
+// (K::in_passing); masses are the receiver's,
+struct InPassing {
+    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
+              class Receiver, class Formula>
+    LOBATTO_INLINE static void set_rows(const number* q, Receiver W, const Formula& formula) {
+        RowLoop<variables, indices, walls>::template entire<number, false, runs>(q, W, formula);
+    }
+    template <int, class Receiver, class Factor>
+    LOBATTO_INLINE static void scale(Receiver, const Factor*) {}
 };
 
 // or those of a run side by side in a Pack, for plain numbers in arrays with room,

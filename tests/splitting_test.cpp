@@ -450,4 +450,101 @@ int main() {
         }
 }
 
+TEST_CASE("chains side by side move as each does alone, to the same bits, and one that ends leaves the others be") {
+    const TemporaryFolder folder;
+    write_text(folder / "side.cpp", R"(
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include "kernel.hpp"
+#include "motion.hpp"
+using namespace lobatto;
+using K = kernels::motion;
+constexpr int n = K::coordinates, lanes = 4, steps = 60;
+static_assert(!K::in_passing || 2 * ensemble_lanes<K>(8) >= native_lanes<double>);
+static_assert(K::in_passing == IN_PASSING && (IN_PASSING || ensemble_lanes<K>(8) == 0));
+#if IN_PASSING
+static Ensemble<K, lanes> together;
+#endif
+int main() {
+#if IN_PASSING
+    const double h = 0.3;
+    double parameters[lanes * (K::parameter_count + 1)], q[lanes * n], p[lanes * n];
+    for (int l = 0; l < lanes; ++l) {
+        K::Parameters given;
+        for (int i = 0; i < K::parameter_count; ++i)
+            parameters[l * K::parameter_count + i] = K::parameter(given, i) * (1 + 0.1 * l);
+        for (int i = 0; i < n; ++i) q[l * n + i] = std::sin(0.3 * i + l), p[l * n + i] = 0.1 * std::cos(i);
+    }
+    q[2 * n + 5] = 1e200;  // its cube is no number: the first step fails
+    p[1 * n + 3] = 1e20;   // a later one does, or none
+    Status status[lanes];
+    std::int64_t done[lanes], iterations[lanes];
+    together.prepare(parameters, h, status);
+    together.start(0.5, q, p, status);
+    together.advance(steps, 0, status, done, iterations);
+    double q1[lanes * n], p1[lanes * n];
+    together.state(q1, p1);
+    for (int l = 0; l < lanes; ++l) {
+        Stepper<K> alone;
+        K::Parameters given;
+        for (int i = 0; i < K::parameter_count; ++i)
+            K::parameter(given, i) = parameters[l * K::parameter_count + i];
+        Status one = alone.prepare(given, h);
+        if (one == Status::ok) one = alone.start(0.5, q + l * n, p + l * n);
+        std::int64_t taken = 0;
+        while (one == Status::ok && taken < steps && (one = alone.step()) == Status::ok) ++taken;
+        double momentum[n];
+        alone.momentum(momentum);
+        if (one != status[l] || taken != done[l] ||
+            (taken > 0 && (std::memcmp(alone.q, q1 + l * n, sizeof alone.q) != 0 ||
+                           std::memcmp(momentum, p1 + l * n, sizeof momentum) != 0)))
+            std::printf("lane %d: status %d and %d, %d and %d steps\n", l, int(one), int(status[l]), int(taken), int(done[l]));
+    }
+    if (status[0] != Status::ok || status[2] != Status::not_finite || status[3] != Status::ok || done[2] != 0)
+        std::printf("one that ends stops others, or goes on\n");
+#endif
+    std::printf("done\n");
+}
+)");
+    const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+    const auto replaced = [](std::string text, const std::string& from, const std::string& by) {
+        for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + by.size()))
+            text.replace(at, from.size(), by);
+        return text;
+    };
+    TestMotion driven = fput(21), hung = fput(17), ring = fput(24), free = fput(19);
+    driven.body =
+        "time = \"t\"\n" +
+        replaced(replaced(driven.body, "x[i]'^2/2", "(1 + i/8)*mass*x[i]'^2/2"), "0.3*", "stiffness*(1 + cos(t)/8)*") +
+        "[parameters]\nmass = 2\nstiffness = 0.3\n";
+    hung.body = replaced(hung.body, "- x[17]^2/2 - 0.3*x[17]^4/4", "");
+    free.body = replaced(replaced(free.body, "- x[19]^2/2 - 0.3*x[19]^4/4", ""), "- x[1]^2/2 - 0.3*x[1]^4/4", "");
+    ring.body = replaced(ring.body, "- x[1]^2/2 - 0.3*x[1]^4/4", "- (x[1] - x[24])^4");
+    for (const auto& [motion, in_passing] : {std::pair{driven, true}, {hung, true}, {free, true}, {ring, false}})
+        for (const int stages : {6, 14}) {
+            const Derivation derivation = derivation_of(motion, splitting(stages), "energy = false\ntangent = false");
+            REQUIRE(derivation.structure.neighbours);
+            write_text(folder / "motion.hpp", emit(derivation).header);
+            const std::string passing = in_passing ? "-DIN_PASSING=true" : "-DIN_PASSING=false";
+            const auto check = [&](const std::vector<std::string>& target) {
+                std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off", passing};
+                command.insert(command.end(), target.begin(), target.end());
+                for (const std::string& argument :
+                     {std::string("-I"), std::string(LOBATTO_SOURCE_DIR "/runtime"), (folder / "side.cpp").string(),
+                      std::string("-o"), (folder / "side").string()})
+                    command.push_back(argument);
+                const Finished built = run(command);
+                INFO(built.err);
+                REQUIRE(built.exit_code == 0);
+                const Finished side = run({"env", "ASAN_OPTIONS=detect_leaks=0", (folder / "side").string()});
+                CHECK(side.out == "done\n");
+                CHECK(side.err == "");
+            };
+            check({"-march=x86-64", "-O0", "-fsanitize=address,undefined"});
+            if (has_avx512) check({"-march=x86-64-v4", "-O1"});
+        }
+}
+
 TEST_SUITE_END();
