@@ -57,8 +57,8 @@ std::string first_line(const std::string& text) {
 }
 
 // As `lobatto run` compiles, but for a processor with AVX2 and without AVX-512, which valgrind 3.19 does not know.
-std::vector<std::string> portable_arguments(const Compiler& compiler) {
-    auto arguments = compile_arguments(compiler, "kernel.cpp", "kernel.so", false);
+std::vector<std::string> portable_arguments(const Compiler& compiler, const Translation& translation) {
+    auto arguments = compile_arguments(compiler, "kernel.cpp", "kernel.so", false, translation.short_loops);
     for (std::string& argument : arguments)
         if (argument == "-march=native") argument = "-march=haswell";
     return arguments;
@@ -86,7 +86,7 @@ Counted count_case(const Problem& problem) {
     std::string folder = (std::filesystem::temp_directory_path() / "lobatto-bench-XXXXXX").string();
     if (mkdtemp(folder.data()) == nullptr) throw MachineError("cannot create a folder in the temporary folder");
     write_file(folder + "/kernel.cpp", translation.text);
-    run_or_fail(portable_arguments(compiler), folder);
+    run_or_fail(portable_arguments(compiler, translation), folder);
     const auto [once, once_iterations] = count(problem, chosen.step, chosen.steps, folder);
     const auto [twice, twice_iterations] = count(problem, chosen.step, 2 * chosen.steps, folder);
     std::filesystem::remove_all(folder);

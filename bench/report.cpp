@@ -93,7 +93,7 @@ void print_machine() {
     const Compiler compiler = find_compiler(false);
     fmt::print("Processor: {}. Kernels: {}, with the flags of `lobatto run` ({}).\n",
                first_line_about("/proc/cpuinfo", "model name"), compiler.words.front(),
-               fmt::join(compile_arguments(compiler, "kernel.cpp", "kernel.so", false), " "));
+               fmt::join(compile_arguments(compiler, "kernel.cpp", "kernel.so", false, false), " "));
     fmt::print("Peers: " LOBATTO_BENCH_COMPILER ", " LOBATTO_BENCH_FLAGS ".\n");
 }
 

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "cli/support_text.hpp"
+#include "generator/structure.hpp"
 
 namespace lobatto {
 
@@ -38,6 +39,7 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     Translation translation;
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
+    translation.short_loops = source.form == Form::general;
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
     if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);

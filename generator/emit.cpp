@@ -360,6 +360,7 @@ private:
 
 KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options) {
     KernelSource source;
+    source.form = derivation.structure.form;
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
     source.report = optimise(programs);

@@ -11,6 +11,7 @@
 namespace lobatto {
 
 struct Derivation;
+enum class Form;
 
 struct EmitOptions {
     Precision precision = Precision::double_;
@@ -19,6 +20,7 @@ struct EmitOptions {
 };
 
 struct KernelSource {
+    Form form{};                     // of its steps (generator/structure.hpp)
     std::string name;                // struct lobatto::kernels::NAME, a C identifier
     std::string header;              // the whole text of NAME.hpp
     std::string digest;              // 16 hexadecimal digits of the header's formulas

@@ -50,7 +50,7 @@ Compiled compile(const Translation& translation) {
     const Compiler compiler = find_compiler(translation.quadruple);
     const std::string source = translation.name + ".cpp", object = translation.name + ".so";
     ProcessRequest request;
-    request.arguments = compile_arguments(compiler, source, object, translation.quadruple);
+    request.arguments = compile_arguments(compiler, source, object, translation.quadruple, translation.short_loops);
     const std::string command = shell_text(request.arguments);
 
     const CacheEntry entry(

@@ -9,10 +9,11 @@ namespace lobatto {
 
 // What is compiled: one self-contained translation unit.
 struct Translation {
-    std::string name;        // C identifier, for file names
-    std::string text;        // the whole C++ source: kernel_abi.h, kernel.hpp, the emitted header, kernel_export.hpp,
-                             // LOBATTO_EXPORT_KERNEL
-    bool quadruple = false;  // links libquadmath (g++ only)
+    std::string name;          // C identifier, for file names
+    std::string text;          // the whole C++ source: kernel_abi.h, kernel.hpp, the emitted header, kernel_export.hpp,
+                               // LOBATTO_EXPORT_KERNEL
+    bool quadruple = false;    // links libquadmath (g++ only)
+    bool short_loops = false;  // only loops of few instructions are written out: large texts compile in less time
 };
 
 struct Compiled {

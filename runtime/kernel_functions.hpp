@@ -116,9 +116,9 @@ LOBATTO_INLINE void sincos(const Doubles<width>& x, Doubles<width>& sine, Double
     const Doubles<width> c = select(swap, reduced.sine, reduced.cosine);
     const Where<width> holds = fabs(x) < reduced_below;
     sine = unless(holds, x, x, from_bits(bits(s) ^ sign_of(reduced.quadrant)),
-                  [](double a, double) { return std::sin(a); });
+                  [](double a, double) { return __builtin_sin(a); });
     cosine = unless(holds, x, x, from_bits(bits(c) ^ sign_of(reduced.quadrant + Words<width>(1))),
-                    [](double a, double) { return std::cos(a); });
+                    [](double a, double) { return __builtin_cos(a); });
 }
 // One alone has the bits it has in the pair.
 template <int width>
@@ -126,14 +126,14 @@ LOBATTO_INLINE Doubles<width> sin(const Doubles<width>& x) {
     const Reduced<width> reduced(x);
     const Doubles<width> sine = select(is_odd(reduced.quadrant), reduced.cosine, reduced.sine);
     return unless(fabs(x) < reduced_below, x, x, from_bits(bits(sine) ^ sign_of(reduced.quadrant)),
-                  [](double a, double) { return std::sin(a); });
+                  [](double a, double) { return __builtin_sin(a); });
 }
 template <int width>
 LOBATTO_INLINE Doubles<width> cos(const Doubles<width>& x) {
     const Reduced<width> reduced(x);
     const Doubles<width> cosine = select(is_odd(reduced.quadrant), reduced.sine, reduced.cosine);
     return unless(fabs(x) < reduced_below, x, x, from_bits(bits(cosine) ^ sign_of(reduced.quadrant + Words<width>(1))),
-                  [](double a, double) { return std::cos(a); });
+                  [](double a, double) { return __builtin_cos(a); });
 }
 template <int width>
 LOBATTO_INLINE Doubles<width> tan(const Doubles<width>& x) {
@@ -142,7 +142,7 @@ LOBATTO_INLINE Doubles<width> tan(const Doubles<width>& x) {
     const Doubles<width> quotient =
         select(swap, reduced.cosine, reduced.sine) / select(swap, reduced.sine, reduced.cosine);
     return unless(fabs(x) < reduced_below, x, x, from_bits(bits(quotient) ^ (reduced.quadrant << 63)),
-                  [](double a, double) { return std::tan(a); });
+                  [](double a, double) { return __builtin_tan(a); });
 }
 
 // x + low = k ln 2 + r with |r| <= ln(2)/2, and e^(x + low) = 2^k (1 + r + tail). The polynomial interpolates (e^r - 1
@@ -263,7 +263,7 @@ LOBATTO_INLINE Doubles<width> log(const Doubles<width>& x) {
                                 fused(z, P(2.222219843214978396e-01), P(2.857142874366239149e-01))),
                           fused(z, P(3.999999999940941908e-01), P(6.666666666666735130e-01)));
     const P value = fused(split.k, P(ln2_high), f - (half - fused(s, half + R, split.k * ln2_low)));
-    return unless(is_normal_positive(x), x, x, value, [](double a, double) { return std::log(a); });
+    return unless(is_normal_positive(x), x, x, value, [](double a, double) { return __builtin_log(a); });
 }
 
 // high + low = a b.
@@ -323,7 +323,7 @@ LOBATTO_INLINE Doubles<width> pow(const Doubles<width>& x, const Doubles<width>&
     exponent_low = fused(y, log_low, exponent_low);
     const Where<width> holds = is_normal_positive(x) & (fabs(y) < 0x1p+64) & (fabs(exponent) < 745.0);
     const Exponential<width> e(exponent, exponent_low);
-    return unless(holds, x, y, e.value(0.0), [](double a, double b) { return std::pow(a, b); });
+    return unless(holds, x, y, e.value(0.0), [](double a, double b) { return __builtin_pow(a, b); });
 }
 
 // atan |x| = atan c + atan((|x| - c) / (1 + c |x|)), c = 0, 1/2, 1, 3/2 or infinity; polynomial and constants as

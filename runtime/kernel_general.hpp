@@ -310,10 +310,17 @@ struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
         workspace.with([&](Arrays& a) {
             take_unknowns(position, X, a.Y);
             evaluate_nodes(time, position, momentum, a.Y, a);
-            for (int i = 0; i < N * N; ++i) J[i] = real(0);
+            a.matrix.clear();
+            assemble(a.H, entry_room, a.matrix);
             const auto index = [](int u, int j) { return u < active ? j * active + u : active * (m - 1) + u; };
-            assemble(a.H, entry_room,
-                     [&](int u, int j, int v, int k) -> real& { return J[index(u, j) * N + index(v, k)]; });
+            for (int i = 0; i < N * N; ++i) J[i] = real(0);
+            for (int e = 0; e < K::entries; ++e) {
+                const int u = Tables::block(K::entry_row[e]), v = Tables::block(K::entry_column[e]);
+                if ((u >= active || v >= active) && kappas == 0) continue;
+                for (int j = 0; j < (u < active ? m : 1); ++j)
+                    for (int k = 0; k < (v < active ? m : 1); ++k)
+                        J[index(u, j) * N + index(v, k)] = a.matrix(u, j, v, k);
+            }
         });
         return Status::ok;
     }

@@ -3,7 +3,6 @@
 #ifndef LOBATTO_KERNEL_NUMBERS_HPP
 #define LOBATTO_KERNEL_NUMBERS_HPP
 
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #ifdef LOBATTO_USE_FLOAT128
@@ -22,18 +21,40 @@ struct Limits {
                                                              : real(1.0 / 8589934592.0);  // 2^-33
 };
 
-using std::acos;
-using std::asin;
-using std::atan;
-using std::cosh;
-using std::exp;
-using std::fabs;
-using std::log;
-using std::pow;
-using std::sinh;
-using std::sqrt;
-using std::tan;
-using std::tanh;
+// The C library's functions by the names that the compiler knows them by: <cmath> would take longer to read than all of
+// this support. Sine and cosine of double are in kernel_functions.hpp.
+#define LOBATTO_FUNCTION(type, f, suffix) \
+    inline type f(type x) {               \
+        return __builtin_##f##suffix(x);  \
+    }
+#define LOBATTO_FUNCTIONS(type, suffix)                                                       \
+    LOBATTO_FUNCTION(type, acos, suffix)                                                      \
+    LOBATTO_FUNCTION(type, asin, suffix)                                                      \
+    LOBATTO_FUNCTION(type, atan, suffix)                                                      \
+    LOBATTO_FUNCTION(type, cosh, suffix)                                                      \
+    LOBATTO_FUNCTION(type, exp, suffix)                                                       \
+    LOBATTO_FUNCTION(type, fabs, suffix)                                                      \
+    LOBATTO_FUNCTION(type, log, suffix)                                                       \
+    LOBATTO_FUNCTION(type, sinh, suffix)                                                      \
+    LOBATTO_FUNCTION(type, sqrt, suffix)                                                      \
+    LOBATTO_FUNCTION(type, tan, suffix)                                                       \
+    LOBATTO_FUNCTION(type, tanh, suffix)                                                      \
+    inline type pow(type x, type y) {                                                         \
+        return __builtin_pow##suffix(x, y);                                                   \
+    }                                                                                         \
+    /* x y + z rounded once on every target, for error-free products; slow without an FMA. */ \
+    inline type rounded_once(type x, type y, type z) {                                        \
+        return __builtin_fma##suffix(x, y, z);                                                \
+    }
+LOBATTO_FUNCTIONS(float, f)
+LOBATTO_FUNCTIONS(double, )
+LOBATTO_FUNCTIONS(long double, l)
+LOBATTO_FUNCTION(float, sin, f)
+LOBATTO_FUNCTION(float, cos, f)
+LOBATTO_FUNCTION(long double, sin, l)
+LOBATTO_FUNCTION(long double, cos, l)
+#undef LOBATTO_FUNCTIONS
+#undef LOBATTO_FUNCTION
 
 #ifdef LOBATTO_USE_FLOAT128
 template <>
@@ -87,19 +108,6 @@ inline __float128 tanh(__float128 x) {
 }
 #endif
 
-inline float sin(float x) {
-    return std::sin(x);
-}
-inline float cos(float x) {
-    return std::cos(x);
-}
-inline long double sin(long double x) {
-    return std::sin(x);
-}
-inline long double cos(long double x) {
-    return std::cos(x);
-}
-
 // Sine and cosine of one argument together. Those of double are in kernel_functions.hpp.
 template <class real>
 inline void sincos(real x, real& sine, real& cosine) {
@@ -112,16 +120,6 @@ inline bool is_finite(reals... x) {
     return ((x - x == reals(0)) && ...);
 }
 
-// a b + c rounded once on every target, for error-free products; slow where the target has no FMA.
-inline float rounded_once(float a, float b, float c) {
-    return std::fma(a, b, c);
-}
-inline double rounded_once(double a, double b, double c) {
-    return std::fma(a, b, c);
-}
-inline long double rounded_once(long double a, long double b, long double c) {
-    return std::fma(a, b, c);
-}
 #ifdef LOBATTO_USE_FLOAT128
 inline __float128 rounded_once(__float128 a, __float128 b, __float128 c) {
     return fmaq(a, b, c);

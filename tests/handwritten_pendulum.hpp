@@ -11,6 +11,8 @@
 // The test "one step of the hand-written kernel satisfies the paper's equations" checks this elimination.
 #pragma once
 
+#include <cmath>
+
 #include "runtime/kernel.hpp"
 
 namespace lobatto {
