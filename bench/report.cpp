@@ -91,9 +91,11 @@ void write_line(std::ofstream& file, const Race& race, const Lane& lane, const M
 
 void print_machine() {
     const Compiler compiler = find_compiler(false);
-    fmt::print("Processor: {}. Kernels: {}, with the flags of `lobatto run` ({}).\n",
-               first_line_about("/proc/cpuinfo", "model name"), compiler.words.front(),
-               fmt::join(compile_arguments(compiler, "kernel.cpp", "kernel.so", false, false), " "));
+    fmt::print(
+        "Processor: {}. Kernels: {}, with the flags of `lobatto run` ({}; P3's kernels with --param "
+        "max-completely-peeled-insns=60 besides).\n",
+        first_line_about("/proc/cpuinfo", "model name"), compiler.words.front(),
+        fmt::join(compile_arguments(compiler, "kernel.cpp", "kernel.so", false, false), " "));
     fmt::print("Peers: " LOBATTO_BENCH_COMPILER ", " LOBATTO_BENCH_FLAGS ".\n");
 }
 

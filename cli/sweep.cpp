@@ -249,9 +249,11 @@ void sweep(const SweepOptions& options) {
     request.tolerance = scene.method.tolerance;
     request.every = options.overrides.every.value_or(0);
     request.threads = options.threads;
-    const bool fills_registers = scene.coordinates.size() > 2;  // there is one kernel then (ensemble_lanes)
-    const Kernel kernel = ensemble_kernel_of(source, Precision::double_,
-                                             fills_registers ? 1 : request.count / thread_count(options.threads));
+    // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
+    // number of them changes what a trajectory becomes.
+    const std::int64_t together =
+        scene.coordinates.size() > 2 ? request.count : request.count / thread_count(options.threads);
+    const Kernel kernel = ensemble_kernel_of(source, Precision::double_, together);
     refuse_too_much(grid, kernel, request);
 
     const SweepTable::Format format = format_of(options);

@@ -51,8 +51,9 @@ std::string separable_shapes(const Structure& structure, const System& system, i
             line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
                  "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
             const bool in_passing = is_one_pass(structure.elements, structure.walls, system.q);
-            line(text, fmt::format("bool unit_masses = {}", has_unit_masses(system)),
-                 "acceleration need not divide by them");
+            const bool unit_masses = has_unit_masses(system);
+            line(text, fmt::format("bool unit_masses = {}", unit_masses),
+                 unit_masses ? "forces are accelerations" : "forces are divided by them");
             line(text, fmt::format("bool in_passing = {}", in_passing),
                  in_passing ? "coordinates may move one after another, each as soon as its force is known"
                             : "coordinates move when all forces are known");

@@ -64,6 +64,8 @@ Hoisted::Hoisted(const Programs& programs) {
     std::vector<Id> all = graph.topological(roots);
     std::stable_partition(all.begin(), all.end(), [&graph](Id id) { return graph[id].op == Op::input; });
     std::set<std::string> taken{"Phi_minus_I"};
+    for (const Program& program : programs.programs)
+        if (is_prepared(program)) taken.insert(program.name);  // arrays among the fields
     std::map<Id, std::string> suggested;
     for (const auto& [id, name] : programs.names) suggested.emplace(id, name);
     int counter = 0;

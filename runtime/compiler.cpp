@@ -111,8 +111,8 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     // -ffast-math is never among the flags: it would let the compiler simplify x - x, and so the checks for finite
     // numbers, away.
     // -fpeel-loops: loops over the nodes and coordinates of small systems are written out, as with -O3, which takes
-    // half as long again. clang++ does so anyway. The general form (kernel_general.hpp) compiles in a sixth less time, to
-    // the same speed, where only loops of up to 60 instructions are, not 200.
+    // half as long again. clang++ does so anyway. The general form (kernel_general.hpp) compiles in a sixth less time,
+    // to the same speed, where only loops of up to 60 instructions are, not 200.
     arguments.push_back("-O2");
     if (!is_clang(*find_program(compiler.words.front()))) {
         arguments.push_back("-fpeel-loops");

@@ -147,7 +147,7 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
     Going step(const Given& k, real time, Going going) {
         const int next = 1 - now;
         T not_finite = T(real(0));
-        if constexpr (K::neighbours) {
+        if constexpr (moves_in_passing<K>()) {
             step_in_passing<K>(turns, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {
@@ -170,7 +170,7 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
             for (int c = 0; c < n; ++c) {
                 q[next][c] = select(going, q[next][c], q[now][c]);
                 u[next][c] = select(going, u[next][c], u[now][c]);
-                W[next][c] = select(going, W[next][c], W[now][c]);
+                if constexpr (Turns<K>::kicks_ends) W[next][c] = select(going, W[next][c], W[now][c]);
             }
         now = next;
         return going;
@@ -179,7 +179,7 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
         for (int c = 0; c < n; ++c) {
             set_lane(q[now][c], lane, single.q[c]);
             set_lane(u[now][c], lane, single.u[c]);
-            set_lane(W[now][c], lane, single.W[c]);
+            set_lane(W[now][c], lane, single.acceleration(c));
         }
     }
 };
@@ -191,10 +191,7 @@ constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
     if (native == 1 || !K::any_number || is_clean<K>()) return 0;
     if constexpr (K::form == Form::separable) {
-        if constexpr (K::neighbours) {
-            const bool moves_in_passing = stepping_of<K>() == Stepping::in_turn && K::in_passing;
-            return moves_in_passing && 2 * trajectories > native ? native : 0;
-        }
+        if (K::neighbours) return moves_in_passing<K>() && trajectories >= native ? native : 0;
     }
     if (K::form == Form::general) return K::coordinates > most_full ? 0 : native;
     return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;

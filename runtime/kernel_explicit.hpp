@@ -58,6 +58,15 @@ LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename
     }
 }
 
+// Whether a coordinate may move as soon as its acceleration is known.
+template <class K>
+constexpr bool moves_in_passing() {
+    if constexpr (K::neighbours && stepping_of<K>() == Stepping::in_turn)
+        return K::in_passing;
+    else
+        return false;
+}
+
 // What moves each coordinate, by a kick and a drift, as soon as its acceleration is known; the last kick of a step
 // keeps accelerations instead.
 template <class K, class T, class Given, bool is_last>
@@ -280,6 +289,14 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
             velocity[k] =
                 (rise_slope * moved + u0_slope * from + u1_slope * to - a0_slope * start - a1_slope * end) / h;
         }
+    }
+
+    // M^-1 grad V where the motion is, of coordinate c; where ends are kicked.
+    real acceleration(int c) const {
+        if constexpr (K::neighbours)
+            return neighbours.W[neighbours.now][c];
+        else
+            return W[c];
     }
 
     // There are no equations.

@@ -498,10 +498,12 @@ LOBATTO_INLINE Pack<real, width> pow(real_of<Pack<real, width>> x, const Pack<re
 }
 
 // Sine and cosine of one double: a pack of one lane, so that a lone trajectory and a lane of many have the same bits.
-inline double sin(double x) {
+template <class real>
+inline Only<real, double> sin(real x) {
     return sin(Pack<double, 1>(x))[0];
 }
-inline double cos(double x) {
+template <class real>
+inline Only<real, double> cos(real x) {
     return cos(Pack<double, 1>(x))[0];
 }
 inline void sincos(double x, double& sine, double& cosine) {

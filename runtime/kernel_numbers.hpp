@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 #ifdef LOBATTO_USE_FLOAT128
 #include <quadmath.h>
 #endif
@@ -22,9 +23,13 @@ struct Limits {
 };
 
 // The C library's functions by the names that the compiler knows them by: <cmath> would take longer to read than all of
-// this support. Sine and cosine of double are in kernel_functions.hpp.
+// this support. Templates of one type, so that the library's own functions come first where both are in sight. Sine and
+// cosine of double are in kernel_functions.hpp.
+template <class real, class type>
+using Only = std::enable_if_t<std::is_same_v<real, type>, real>;
 #define LOBATTO_FUNCTION(type, f, suffix) \
-    inline type f(type x) {               \
+    template <class real>                 \
+    inline Only<real, type> f(real x) {   \
         return __builtin_##f##suffix(x);  \
     }
 #define LOBATTO_FUNCTIONS(type, suffix)                                                       \
@@ -39,7 +44,8 @@ struct Limits {
     LOBATTO_FUNCTION(type, sqrt, suffix)                                                      \
     LOBATTO_FUNCTION(type, tan, suffix)                                                       \
     LOBATTO_FUNCTION(type, tanh, suffix)                                                      \
-    inline type pow(type x, type y) {                                                         \
+    template <class real>                                                                     \
+    inline Only<real, type> pow(real x, Only<real, type> y) {                                 \
         return __builtin_pow##suffix(x, y);                                                   \
     }                                                                                         \
     /* x y + z rounded once on every target, for error-free products; slow without an FMA. */ \

@@ -2,8 +2,8 @@
 // Going through the rows of a repeated formula: one after another, or those of neighbouring coordinates side by side in
 // the lanes of Packs, in memory or in registers.
 //
-// Arrays of coordinates have room for room_of<K> numbers: whole Packs and two to spare, where formulas may read what
-// does not matter and write zeros.
+// In lanes arrays of coordinates have room for room_of<K> numbers: whole Packs and two to spare, where formulas may
+// read what does not matter and write zeros.
 #ifndef LOBATTO_KERNEL_ROWS_HPP
 #define LOBATTO_KERNEL_ROWS_HPP
 
@@ -344,6 +344,7 @@ struct InPassing {
     template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
               class Receiver, class Formula>
     LOBATTO_INLINE static void set_rows(const number* q, Receiver W, const Formula& formula) {
+        static_assert(RowLoop<variables, indices>::reach() <= 1);
         RowLoop<variables, indices, walls>::template entire<number, false, runs>(q, W, formula);
     }
     template <int, class Receiver, class Factor>
