@@ -251,8 +251,8 @@ void sweep(const SweepOptions& options) {
     request.threads = options.threads;
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
     // number of them changes what a trajectory becomes.
-    const std::int64_t together =
-        scene.coordinates.size() > 2 ? request.count : request.count / thread_count(options.threads);
+    const std::int64_t together = scene.coordinates.size() > 2 ? std::min<std::int64_t>(request.count, 8)
+                                                               : request.count / thread_count(options.threads);
     const Kernel kernel = ensemble_kernel_of(source, Precision::double_, together);
     refuse_too_much(grid, kernel, request);
 

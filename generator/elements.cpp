@@ -325,11 +325,11 @@ bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector
     const auto rests = [&](const ex& term) {
         return std::none_of(q.begin(), q.end(), [&](const GiNaC::symbol& one) { return term.has(one); });
     };
-    int formulas = 0;
+    std::vector<const Element*> formulas;
     for (const Element& element : elements.repeated)
-        if (!element.x.empty()) formulas += covers(element, static_cast<int>(q.size())) ? 1 : 2;
-    return formulas == 1 && row_reach(elements) <= 1 && elements.other_forces.empty() &&
-           std::all_of(walls.others.begin(), walls.others.end(), rests);
+        if (!element.x.empty()) formulas.push_back(&element);
+    return formulas.size() == 1 && covers(*formulas.front(), static_cast<int>(q.size())) && row_reach(elements) <= 1 &&
+           elements.other_forces.empty() && std::all_of(walls.others.begin(), walls.others.end(), rests);
 }
 
 Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {

@@ -55,6 +55,14 @@ struct Formulas {
         else
             K::node(k, time, rest...);
     }
+    // Along rows of coordinates, in the way How (kernel_rows.hpp).
+    template <class How, class Given, class Time, class Position, class Slope>
+    [[gnu::always_inline]] static inline void along_rows(const Given& k, Time time, Position position, Slope slope) {
+        if constexpr (K::autonomous)
+            K::template acceleration<How>(k, position, slope);
+        else
+            K::template acceleration<How>(k, time, position, slope);
+    }
     template <class Given, class Time, class... Rest>
     static void acceleration(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)

@@ -67,23 +67,23 @@ constexpr bool moves_in_passing() {
         return false;
 }
 
-// What moves each coordinate, by a kick and a drift, as soon as its acceleration is known; the last kick of a step
+// Takes the acceleration of a coordinate as soon as it is known, which is kicked and drifts; the last kick of a step
 // keeps accelerations instead.
 template <class K, class T, class Given, bool is_last>
-struct Moved {
+struct KickAndDrift {
     T *q, *u, *W;
     T kick, drift;
     const Given& k;
 };
 template <class K, class T, class Given, bool is_last>
-LOBATTO_INLINE void store_to(const Moved<K, T, Given, is_last>& moved, int at, T slope) {
-    if constexpr (!K::unit_masses) slope *= moved.k.inverse_mass[at];
-    const T velocity = fused(moved.kick, slope, moved.u[at]);
-    moved.u[at] = velocity;
+LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& turn, int at, T slope) {
+    if constexpr (!K::unit_masses) slope *= turn.k.inverse_mass[at];
+    const T velocity = fused(turn.kick, slope, turn.u[at]);
+    turn.u[at] = velocity;
     if constexpr (is_last)
-        moved.W[at] = slope;
+        turn.W[at] = slope;
     else
-        moved.q[at] = fused(moved.drift, velocity, moved.q[at]);
+        turn.q[at] = fused(turn.drift, velocity, turn.q[at]);
 }
 
 // One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
@@ -93,12 +93,10 @@ LOBATTO_INLINE void step_in_passing(const Turns<K>& turns, const Given& k, typen
                                     const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
     constexpr int n = K::coordinates, s = K::points;
     const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
-        const Moved<K, T, Given, is_last()> moved{q1, u1, W1, T(turns.kick[i]), T(is_last ? 0 : turns.drift[i]), k};
+        const KickAndDrift<K, T, Given, is_last()> turn{q1, u1, W1, T(turns.kick[i]), T(is_last ? 0 : turns.drift[i]),
+                                                        k};
         const T* const position = q1;
-        if constexpr (K::autonomous)
-            K::template acceleration<InPassing>(k, position, moved);
-        else
-            K::template acceleration<InPassing>(k, T(time + K::c[i] * h), position, moved);
+        Formulas<K>::template along_rows<InPassing>(k, T(time + K::c[i] * h), position, turn);
     };
     for (int c = 0; c < n; ++c) {
         u1[c] = Turns<K>::kicks_ends ? fused(T(turns.kick[0]), W[c], u[c]) : u[c];
@@ -158,10 +156,7 @@ private:
     template <class Row>
     LOBATTO_INLINE static void accelerate(const typename K::Coefficients& k, real time, Row position, Row slope) {
         using How = std::conditional_t<are_registers<Row>, WrittenOut, SideBySide>;
-        if constexpr (K::autonomous)
-            K::template acceleration<How>(k, position, slope);
-        else
-            K::template acceleration<How>(k, time, position, slope);
+        Formulas<K>::template along_rows<How>(k, time, position, slope);
     }
     template <class Row>
     LOBATTO_INLINE bool step_in(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h,

@@ -186,10 +186,7 @@ private:
 
     template <class How, class Row>
     LOBATTO_INLINE static void accelerate_here(const typename K::Coefficients& k, real time, Row position, Row W) {
-        if constexpr (K::autonomous)
-            K::template acceleration<How>(k, position, W);
-        else
-            K::template acceleration<How>(k, time, position, W);
+        Formulas<K>::template along_rows<How>(k, time, position, W);
     }
     // In memory one copy of the formulas serves all nodes.
     static void accelerate(const typename K::Coefficients& k, real time, real* position, real* W) {

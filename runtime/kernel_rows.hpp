@@ -7,6 +7,7 @@
 #ifndef LOBATTO_KERNEL_ROWS_HPP
 #define LOBATTO_KERNEL_ROWS_HPP
 
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -114,17 +115,14 @@ struct RowLoop {
         return first - indices[0];
     }
     static constexpr int offset(int j) { return indices[j] - indices[0] - least(); }
-    static constexpr int reach() {
-        int farthest = 0;
-        for (int j = 0; j < variables; ++j) farthest = offset(j) > farthest ? offset(j) : farthest;
-        return farthest;
-    }
     static constexpr int farthest_within(int width) {
         int farthest = 0;
         for (int j = 0; j < variables; ++j)
             if (offset(j) <= width && offset(j) > farthest) farthest = offset(j);
         return farthest;
     }
+
+    static constexpr int reach() { return farthest_within(std::numeric_limits<int>::max()); }
 
     // Adds to W (or sets it) what `count` rows from `begin` on give, as many at a time as V has lanes for them. What
     // variable j receives belongs offset(j) places behind what the first receives: those lanes move on from one V to

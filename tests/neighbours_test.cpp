@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "tests/built_and_run.hpp"
 #include "tests/motions.hpp"
 #include "tests/support.hpp"
 
@@ -186,19 +187,10 @@ TEST_CASE("a step along neighbours has the same bits in registers and in memory,
             write_text(folder / "motion.hpp", header);
             const auto check = [&](const std::vector<std::string>& target, bool runs_here) {
                 INFO(target.front());
-                std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off"};
-                command.insert(command.end(), target.begin(), target.end());
-                for (const std::string& argument :
-                     {std::string("-I"), std::string(LOBATTO_SOURCE_DIR "/runtime"), (folder / "both.cpp").string(),
-                      std::string("-o"), (folder / "both").string()})
-                    command.push_back(argument);
-                const Finished built = run(command);
-                INFO(built.err);
-                REQUIRE(built.exit_code == 0);
-                if (!runs_here) return;
-                const Finished both = run({"env", "ASAN_OPTIONS=detect_leaks=0", (folder / "both").string()});
-                CHECK(both.out == "240 steps, 2 failed, solved\n");
-                CHECK(both.err == "");
+                const std::optional<Finished> both = built_and_run(folder, "both", target, runs_here);
+                if (!both) return;
+                CHECK(both->out == "240 steps, 2 failed, solved\n");
+                CHECK(both->err == "");
             };
             check({"-march=x86-64", "-O0", "-DIN_REGISTERS=false", "-fsanitize=address"}, true);
             check({"-march=haswell", "-O1", "-DIN_REGISTERS=true"}, has_avx2);

@@ -17,6 +17,7 @@
 #include "generator/stability.hpp"
 #include "runtime/convergence.hpp"
 #include "runtime/diagnostics.hpp"
+#include "tests/built_and_run.hpp"
 #include "tests/motions.hpp"
 #include "tests/support.hpp"
 
@@ -430,19 +431,10 @@ int main() {
             write_text(folder / "motion.hpp", emit(derivation).header);
             const auto check = [&](const std::vector<std::string>& target, bool runs_here) {
                 INFO(target.front());
-                std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off"};
-                command.insert(command.end(), target.begin(), target.end());
-                for (const std::string& argument :
-                     {std::string("-I"), std::string(LOBATTO_SOURCE_DIR "/runtime"), (folder / "both.cpp").string(),
-                      std::string("-o"), (folder / "both").string()})
-                    command.push_back(argument);
-                const Finished built = run(command);
-                INFO(built.err);
-                REQUIRE(built.exit_code == 0);
-                if (!runs_here) return;
-                const Finished both = run({"env", "ASAN_OPTIONS=detect_leaks=0", (folder / "both").string()});
-                CHECK(both.out == "done\n");
-                CHECK(both.err == "");
+                const std::optional<Finished> both = built_and_run(folder, "both", target, runs_here);
+                if (!both) return;
+                CHECK(both->out == "done\n");
+                CHECK(both->err == "");
             };
             check({"-march=x86-64", "-O0", "-DIN_REGISTERS=false", "-fsanitize=address"}, true);
             check({"-march=haswell", "-O1", "-DIN_REGISTERS=true"}, has_avx2);
@@ -543,21 +535,13 @@ int main() {
             write_text(folder / "motion.hpp", emit(derivation).header);
             const std::string passing = in_passing ? "-DIN_PASSING=true" : "-DIN_PASSING=false";
             const auto check = [&](const std::vector<std::string>& target) {
-                std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off", passing};
-                command.insert(command.end(), target.begin(), target.end());
-                for (const std::string& argument :
-                     {std::string("-I"), std::string(LOBATTO_SOURCE_DIR "/runtime"), (folder / "side.cpp").string(),
-                      std::string("-o"), (folder / "side").string()})
-                    command.push_back(argument);
-                const Finished built = run(command);
-                INFO(built.err);
-                REQUIRE(built.exit_code == 0);
-                const Finished side = run({"env", "ASAN_OPTIONS=detect_leaks=0", (folder / "side").string()});
-                CHECK(side.out == "done\n");
-                CHECK(side.err == "");
+                const std::optional<Finished> side = built_and_run(folder, "side", target);
+                REQUIRE(side);
+                CHECK(side->out == "done\n");
+                CHECK(side->err == "");
             };
-            check({"-march=x86-64", "-O0", "-fsanitize=address,undefined"});
-            if (has_avx512) check({"-march=x86-64-v4", "-O1"});
+            check({passing, "-march=x86-64", "-O0", "-fsanitize=address,undefined"});
+            if (has_avx512) check({passing, "-march=x86-64-v4", "-O1"});
         }
 }
 
