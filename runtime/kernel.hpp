@@ -6,6 +6,7 @@
 #include "kernel_clean.hpp"
 #include "kernel_contract.hpp"
 #include "kernel_ensemble.hpp"
+#include "kernel_ensemble_sweeps.hpp"
 #include "kernel_events.hpp"
 #include "kernel_explicit.hpp"
 #include "kernel_functions.hpp"
@@ -18,6 +19,7 @@
 #include "kernel_rows.hpp"
 #include "kernel_separable.hpp"
 #include "kernel_solve.hpp"
+#include "kernel_stage_map.hpp"
 #include "kernel_sweeps.hpp"
 
 #endif

@@ -24,7 +24,7 @@
 #include "kernel_numbers.hpp"
 #include "kernel_pack.hpp"
 #include "kernel_separable.hpp"
-#include "kernel_sweeps.hpp"
+#include "kernel_stage_map.hpp"
 
 namespace lobatto {
 

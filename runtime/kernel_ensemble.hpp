@@ -10,13 +10,13 @@
 #include <type_traits>
 
 #include "kernel_contract.hpp"
+#include "kernel_ensemble_sweeps.hpp"
 #include "kernel_explicit.hpp"
 #include "kernel_galerkin.hpp"
 #include "kernel_general.hpp"
 #include "kernel_linear.hpp"
 #include "kernel_pack.hpp"
 #include "kernel_separable.hpp"
-#include "kernel_sweeps.hpp"
 
 namespace lobatto {
 
@@ -85,14 +85,14 @@ struct Lanes<K, T, Form::separable, Stepping::solved> {
     using Going = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], u[n], evaluations = T(real(0));
-    Sweeps<K, T> sweeps;
+    EnsembleSweeps<K, T> sweeps;
 
     const T& position(int c) const { return q[c]; }
     void prepare(const Stepper<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
-    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
+    void set_tolerance(real tolerance) { sweeps.set_tolerance(tolerance); }
     void start(const Stepper<K>& single, const real*, int lane) {
         follow_state(single, lane);
-        sweeps.begin(single.q, single.W + (K::points - 1) * n, lane);
+        sweeps.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
     }
     void momentum(const Stepper<K>& single, int lane, real* momentum) const {
         real velocity[n];
@@ -108,8 +108,9 @@ struct Lanes<K, T, Form::separable, Stepping::solved> {
     // Takes over the state and the memory of the step that `single` has taken.
     void follow(const Stepper<K>& single, int lane) {
         follow_state(single, lane);
-        sweeps.recall([&](int i, int c) { return single.node_acceleration(i, c); },
-                      [&](int i, int c) { return single.node_position(i, c); }, lane);
+        sweeps.recall(
+            single.u, [&](int i, int c) { return single.node_acceleration(i, c); },
+            [&](int i, int c) { return single.node_position(i, c); }, lane);
     }
 
 private:

@@ -17,7 +17,7 @@
 #include "kernel_functions.hpp"
 #include "kernel_numbers.hpp"
 #include "kernel_pack.hpp"
-#include "kernel_sweeps.hpp"
+#include "kernel_stage_map.hpp"
 
 namespace lobatto {
 

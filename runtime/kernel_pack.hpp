@@ -148,6 +148,13 @@ LOBATTO_INLINE bool any(Truths truths) {
     return result;
 }
 
+template <class Truths>
+LOBATTO_INLINE bool all(Truths truths) {
+    bool result = true;
+    for (unsigned i = 0; i < sizeof(Truths) / sizeof(truths[0]); ++i) result &= truths[i] != 0;
+    return result;
+}
+
 // x86: g++ does not find these instructions in the loops above.
 #ifdef __SSE2__
 using Double2 = Register<double, 2>::Values;
@@ -161,8 +168,14 @@ LOBATTO_INLINE Float4 square_root(Float4 a) {
 LOBATTO_INLINE bool any(Register<double, 2>::Truths truths) {
     return __builtin_ia32_movmskpd((Double2)truths) != 0;
 }
+LOBATTO_INLINE bool all(Register<double, 2>::Truths truths) {
+    return __builtin_ia32_movmskpd((Double2)truths) == 3;
+}
 LOBATTO_INLINE bool any(Register<float, 4>::Truths truths) {
     return __builtin_ia32_movmskps((Float4)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<float, 4>::Truths truths) {
+    return __builtin_ia32_movmskps((Float4)truths) == 15;
 }
 #endif
 #ifdef __AVX__
@@ -177,8 +190,14 @@ LOBATTO_INLINE Float8 square_root(Float8 a) {
 LOBATTO_INLINE bool any(Register<double, 4>::Truths truths) {
     return __builtin_ia32_movmskpd256((Double4)truths) != 0;
 }
+LOBATTO_INLINE bool all(Register<double, 4>::Truths truths) {
+    return __builtin_ia32_movmskpd256((Double4)truths) == 15;
+}
 LOBATTO_INLINE bool any(Register<float, 8>::Truths truths) {
     return __builtin_ia32_movmskps256((Float8)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<float, 8>::Truths truths) {
+    return __builtin_ia32_movmskps256((Float8)truths) == 255;
 }
 #endif
 #if defined(__FMA__) && defined(__SSE2__)
@@ -239,8 +258,14 @@ LOBATTO_INLINE Float16 moved_on(Float16 before, Float16 values) {
 LOBATTO_INLINE bool any(Register<double, 8>::Truths truths) {
     return __builtin_ia32_cvtq2mask512((Long8)truths) != 0;
 }
+LOBATTO_INLINE bool all(Register<double, 8>::Truths truths) {
+    return __builtin_ia32_cvtq2mask512((Long8)truths) == 255;
+}
 LOBATTO_INLINE bool any(Register<float, 16>::Truths truths) {
     return __builtin_ia32_cvtd2mask512(truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<float, 16>::Truths truths) {
+    return __builtin_ia32_cvtd2mask512(truths) == 65535;
 }
 #endif
 
@@ -474,7 +499,13 @@ struct Mask {
         else
             return registers::any(joined);
     }
-    LOBATTO_INLINE friend bool all(const Mask& a) { return !any(!a); }
+    LOBATTO_INLINE friend bool all(const Mask& a) {
+        const Part common = a.common(Each{});
+        if constexpr (lanes == 1)
+            return common;
+        else
+            return registers::all(common);
+    }
 
     // a where the mask holds, b elsewhere.
     LOBATTO_INLINE friend Pack<real, width> select(const Mask& mask, const Pack<real, width>& a,
@@ -492,6 +523,10 @@ private:
     template <int... i>
     LOBATTO_INLINE Part joined(std::integer_sequence<int, i...>) const {
         return Part((part[i] | ...));
+    }
+    template <int... i>
+    LOBATTO_INLINE Part common(std::integer_sequence<int, i...>) const {
+        return Part((part[i] & ...));
     }
 };
 

@@ -228,7 +228,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     };
 
     struct Swept {
-        std::conditional_t<along_coordinates, NeighbourSweeps<K>, Sweeps<K, real>> sweeps;
+        std::conditional_t<along_coordinates, NeighbourSweeps<K>, Sweeps<K>> sweeps;
         Pause pause;
     };
 
@@ -466,7 +466,7 @@ private:
                 q1[k] = q[k];
                 u1[k] = u[k];
             }
-            if (!sweeps.step(coefficients, this->time(), q1, u1, true)) return false;
+            if (!sweeps.step(coefficients, this->time(), q1, u1)) return false;
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];
                 u_before[k] = u[k];
