@@ -166,11 +166,12 @@ std::vector<PassReport> optimise(Programs& programs) {
         Programs (*run)(const Programs&);
         bool only_if_cheaper;
     };
-    constexpr std::array<Pass, 6> passes = {{{"fold constants", fold_constants, false},
+    constexpr std::array<Pass, 7> passes = {{{"fold constants", fold_constants, false},
                                              {"factor sums (Horner)", factor_sums, true},
                                              {"powers by multiplication", multiply_powers, false},
                                              {"group by stage", group_by_stage, false},
                                              {"share common parts", share_pairs, true},
+                                             {"sums of angles", add_angles, false},
                                              {"pair sines and cosines", pair_sines, false}}};
     // Sample points at which everything is real: the first two of 180 seeds.
     std::vector<std::pair<std::uint64_t, std::vector<Sampled>>> expected;

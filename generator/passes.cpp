@@ -16,25 +16,38 @@ namespace lobatto {
 
 namespace {
 
-// A new graph in which every node is what `rule` makes of it, given its operands already rewritten.
+std::vector<Id> roots_of(const Program& program) {
+    std::vector<Id> roots;
+    for (const Output& output : program.outputs) roots.push_back(output.value);
+    return roots;
+}
+
+// What `rule` makes of a node, given its operands already rewritten.
 using Rule = std::function<Id(Graph& result, const Graph& before, Id id, std::vector<Id> operands)>;
 
-Programs rewrite(const Programs& before, const Rule& rule) {
-    Programs after;
-    for (const Input& input : before.graph.inputs()) after.graph.input(input);
-    std::vector<Id> image(static_cast<std::size_t>(before.graph.size()), -1);
-    for (const Id id : before.graph.topological(roots_of(before))) {
-        const Node& node = before.graph[id];
+// What `rule` makes of the nodes that `roots` ask for.
+std::vector<Id> images(Graph& after, const Graph& before, const std::vector<Id>& roots, const Rule& rule) {
+    std::vector<Id> image(static_cast<std::size_t>(before.size()), -1);
+    for (const Id id : before.topological(roots)) {
+        const Node& node = before[id];
         std::vector<Id> operands;
         for (const Id operand : node.operands) operands.push_back(image[static_cast<std::size_t>(operand)]);
         Id& result = image[static_cast<std::size_t>(id)];
         if (node.op == Op::constant)
-            result = after.graph.constant(before.graph.constant_of(id).value, before.graph.constant_of(id).label);
+            result = after.constant(before.constant_of(id).value, before.constant_of(id).label);
         else if (node.op == Op::input)
-            result = after.graph.input(before.graph.input_of(id));
+            result = after.input(before.input_of(id));
         else
-            result = rule(after.graph, before.graph, id, std::move(operands));
+            result = rule(after, before, id, std::move(operands));
     }
+    return image;
+}
+
+// The programs in a new graph, and what has a name.
+Programs rewrite(const Programs& before, const Rule& rule) {
+    Programs after;
+    for (const Input& input : before.graph.inputs()) after.graph.input(input);
+    const std::vector<Id> image = images(after.graph, before.graph, roots_of(before), rule);
     after.programs = before.programs;
     after.solves = before.solves;
     for (Program& program : after.programs)
@@ -314,6 +327,80 @@ Programs share_pairs(const Programs& programs) {
         for (Output& output : program.outputs) output.value = build(output.value);
     for (const auto& [id, name] : work.names) result.names.emplace_back(build(id), name);
     return result;
+}
+
+// ---- sines and cosines of a sum of two angles from those of the two
+
+namespace {
+
+bool is_trigonometric(Op op) {
+    return op == Op::sin || op == Op::cos;
+}
+
+// x of a term x or -x.
+Id angle_of(const Graph& graph, Id term, bool& is_negative) {
+    const Node& node = graph[term];
+    is_negative = node.op == Op::multiply && node.operands.size() == 2 && graph.is_number(node.operands[0], -1);
+    return is_negative ? node.operands[1] : term;
+}
+
+// The sums of two angles, both plus or minus, whose sines or cosines a program takes besides those of both angles.
+std::set<Id> sums_of_known_angles(const Graph& graph, const Program& program) {
+    std::set<Id> arguments;
+    for (const Id id : graph.topological(roots_of(program)))
+        if (is_trigonometric(graph[id].op)) arguments.insert(graph[id].operands[0]);
+    std::set<Id> sums;
+    for (const Id sum : arguments) {
+        if (graph[sum].op != Op::add || graph[sum].operands.size() != 2) continue;
+        bool ignored = false;
+        const auto is_known = [&](Id term) {
+            const Id angle = angle_of(graph, term, ignored);
+            return graph[angle].op != Op::add && arguments.contains(angle);
+        };
+        if (is_known(graph[sum].operands[0]) && is_known(graph[sum].operands[1])) sums.insert(sum);
+    }
+    return sums;
+}
+
+Id sine_or_cosine_of_sum(Graph& graph, Op op, const std::vector<Id>& terms) {
+    std::array<Id, 2> sine{}, cosine{};
+    std::array<bool, 2> minus{};
+    for (std::size_t i = 0; i < 2; ++i) {
+        const Id angle = angle_of(graph, terms[i], minus[i]);
+        sine[i] = graph.raw(Op::sin, {angle});
+        cosine[i] = graph.raw(Op::cos, {angle});
+    }
+    const auto product = [&](Id a, Id b, bool is_negative) {
+        const Id value = graph.raw(Op::multiply, {a, b});
+        return is_negative ? graph.raw(Op::multiply, {graph.constant(-1, ""), value}) : value;
+    };
+    if (op == Op::sin)
+        return graph.raw(Op::add, {product(sine[0], cosine[1], minus[0]), product(cosine[0], sine[1], minus[1])});
+    return graph.raw(Op::add, {product(cosine[0], cosine[1], false), product(sine[0], sine[1], minus[0] == minus[1])});
+}
+
+}  // namespace
+
+Programs add_angles(const Programs& programs) {
+    // Each program by itself: another may take the sum's sine alone.
+    Programs after = rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        return same(graph, before[id], std::move(operands));
+    });
+    for (std::size_t p = 0; p < programs.programs.size(); ++p) {
+        const std::set<Id> sums = sums_of_known_angles(programs.graph, programs.programs[p]);
+        if (sums.empty()) continue;
+        const std::vector<Id> image =
+            images(after.graph, programs.graph, roots_of(programs.programs[p]),
+                   [&sums](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+                       const Node& node = before[id];
+                       if (!is_trigonometric(node.op) || !sums.contains(node.operands[0]))
+                           return same(graph, node, std::move(operands));
+                       return sine_or_cosine_of_sum(graph, node.op, std::vector<Id>(graph[operands[0]].operands));
+                   });
+        for (std::size_t i = 0; i < programs.programs[p].outputs.size(); ++i)
+            after.programs[p].outputs[i].value = image[static_cast<std::size_t>(programs.programs[p].outputs[i].value)];
+    }
+    return after;
 }
 
 // ---- sine and cosine of one argument as a pair

@@ -46,6 +46,7 @@ Programs factor_sums(const Programs& programs);      // Horner
 Programs multiply_powers(const Programs& programs);  // integer powers by multiplication
 Programs group_by_stage(const Programs& programs);   // what is known first is combined first
 Programs share_pairs(const Programs& programs);      // common parts of sums and products
+Programs add_angles(const Programs& programs);       // sin(a - b) from those of a and b, where these are there
 Programs pair_sines(const Programs& programs);       // sine and cosine of one argument together
 
 }  // namespace lobatto

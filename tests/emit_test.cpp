@@ -99,7 +99,7 @@ const SceneText coupled{
 
 TEST_CASE("every pass keeps operations to count, and the report begins with the programs as derived") {
     const KernelSource source = kernel(coupled);
-    REQUIRE(source.report.size() == 7);
+    REQUIRE(source.report.size() == 8);
     CHECK(source.report.front().pass == "as derived");
     for (const PassReport& row : source.report) {
         INFO(row.pass);

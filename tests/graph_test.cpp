@@ -140,7 +140,7 @@ TEST_CASE("the passes keep every value to 40 digits and lose operations") {
     const auto reports = optimise(programs);
     const auto after = values(programs);
     for (std::size_t i = 0; i < before.size(); ++i) CHECK(cln::double_approx(cln::abs(before[i] - after[i])) < 1e-40);
-    CHECK(reports.size() == 7);
+    CHECK(reports.size() == 8);
     CHECK(reports.back().after.total() < reports.front().after.total());
 }
 
@@ -176,6 +176,33 @@ TEST_CASE("sine and cosine of one argument are one evaluation") {
     const auto reports = optimise(programs);
     CHECK(reports.front().after.functions == 2);
     CHECK(reports.back().after.functions == 1);
+}
+
+TEST_CASE("sines and cosines of a sum of two angles come from those of both, in programs that take these anyway") {
+    Inputs g;
+    const auto sum = [&](bool minus_x, bool minus_y) {
+        return g.graph.add({minus_x ? g.graph.negate(g.x) : g.x, minus_y ? g.graph.negate(g.y) : g.y});
+    };
+    const auto sine = [&](Id angle) { return g.graph.function(Op::sin, angle); };
+    const auto cosine = [&](Id angle) { return g.graph.function(Op::cos, angle); };
+    const auto functions_of = [](Programs programs) {
+        const auto reports = optimise(programs);  // which compares all values
+        return std::pair(reports.front().after.functions, reports.back().after.functions);
+    };
+    // All signs: of both angles and of their sums two functions remain.
+    std::vector<Id> all{sine(g.x), cosine(g.y)};
+    for (const bool minus_x : {false, true})
+        for (const bool minus_y : {false, true})
+            all.insert(all.end(), {sine(sum(minus_x, minus_y)), cosine(sum(minus_x, minus_y))});
+    CHECK(functions_of(g.program(all)) == std::pair(10L, 2L));
+    // One angle missing, or a sum of three: nothing to gain.
+    CHECK(functions_of(g.program({sine(sum(false, true)), sine(g.x)})) == std::pair(2L, 2L));
+    CHECK(functions_of(g.program({sine(g.graph.add({g.x, g.y, g.z})), sine(g.x), sine(g.y), sine(g.z)})) ==
+          std::pair(4L, 4L));
+    // Another program that takes the sum's sine alone keeps it.
+    Programs two = g.program({sine(sum(false, true)), sine(g.x), cosine(g.y)});
+    two.programs.push_back({"alone", {{"out[0]", sine(sum(false, true))}}});
+    CHECK(functions_of(two) == std::pair(4L, 3L));
 }
 
 TEST_CASE("a value that is real only near the scene's start is checked there; one that is real nowhere is refused") {
