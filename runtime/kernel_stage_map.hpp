@@ -19,8 +19,9 @@
 
 namespace lobatto {
 
-// How `count` values of nodes lie: in `parts` values of type V. T: the number type of a trajectory's state.
-template <class real, class T, int inner>
+// How `count` values of nodes lie: in `parts` values of type V, Packs of at most `most` lanes. T: the number type of a
+// trajectory's state.
+template <class real, class T, int inner, int most = native_lanes<real>>
 struct NodeLayout {
     static constexpr bool in_lanes = std::is_same_v<T, real>;
     static constexpr int padded(int values) {
@@ -28,9 +29,7 @@ struct NodeLayout {
         while (lanes < values) lanes *= 2;
         return lanes;
     }
-    static constexpr int width = !in_lanes                                ? 1
-                                 : padded(inner + 1) < native_lanes<real> ? padded(inner + 1)
-                                                                          : native_lanes<real>;
+    static constexpr int width = !in_lanes ? 1 : padded(inner + 1) < most ? padded(inner + 1) : most;
     using V = std::conditional_t<in_lanes, Pack<real, width>, T>;
     static constexpr int parts_of(int values) { return (values + width - 1) / width; }
     // The end of the step is swept along with the inner nodes where that costs no further part.
@@ -68,13 +67,19 @@ inline void lay_flat(const V* values, int stride, T* flat) {
     }
 }
 
+// The nodes of one trajectory lie in registers of 32 bytes at most: a step waits for its longest chain of operations,
+// and in wider ones divisions, roots and sums over the lanes answer later (docs/adr/0008-sweeps.md).
+template <class real>
+constexpr int node_lanes = native_lanes<real>* static_cast<int>(sizeof(real)) > 32 ? 32 / static_cast<int>(sizeof(real))
+                                                                                   : native_lanes<real>;
+
 struct Unit {};
 
 template <class K, class T>
 struct StageMap {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
-    using Layout = NodeLayout<real, T, m>;
+    using Layout = NodeLayout<real, T, m, node_lanes<real>>;
     using V = typename Layout::V;
     static constexpr bool in_lanes = Layout::in_lanes, with_end = Layout::with_end, absorbs = K::diagonal_part;
     static constexpr int width = Layout::width, count = Layout::count;
