@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The step of many trajectories of a separable system side by side, one in each lane, by sweeps over its nodes.
 //
-// Formula numbers (D..) refer to docs/derivation.md. The unknown is what the nodes X still have to move by, delta: with
-// the stage map M = -h^2 P A (kernel_stage_map.hpp), W and S = dW/dq at X and P the sums that X was made with,
-//     delta = M (W - D X) - P + M (S - D) delta
-// to first order. Where S pays (K::costly) one evaluation gives both sides, and delta follows by repetition; else delta
-// is the first two terms alone. X moves by delta and is evaluated again until delta is small.
+// Formula numbers (D..) refer to docs/derivation.md. The unknown is what the nodes X still have to move by (D41): with
+// the stage map M = -h^2 P A (kernel_stage_map.hpp), W and S = dW/dq at X and the sums P that X was made with,
+//     delta = d + M (S - D) delta,    d = M (W - D X) - P
+// to first order. Where S pays (K::costly) one evaluation gives both sides, and delta follows by repetition; elsewhere
+// delta = d. X moves by delta and is evaluated again until delta is small.
 //
 // No lane sees its neighbours: one that is solved stands still while others go on, and what is computed of it again
 // has the same bits. What the tests ask for does not lie on the chain of operations that a step waits for.
