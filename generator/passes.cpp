@@ -359,6 +359,24 @@ std::set<Id> sums_of_known_angles(const Graph& graph, const Program& program) {
         };
         if (is_known(graph[sum].operands[0]) && is_known(graph[sum].operands[1])) sums.insert(sum);
     }
+    // Near zero sin(a - b) has fewer digits then: not where it is divided by, or is the argument of a function.
+    const auto needs_digits = [&](Id sum) {
+        std::set<Id> above;
+        for (const Id id : graph.topological(roots_of(program))) {
+            const Node& node = graph[id];
+            if (is_trigonometric(node.op) && node.operands[0] == sum) {
+                above.insert(id);
+            } else if (std::any_of(node.operands.begin(), node.operands.end(),
+                                   [&](Id operand) { return above.contains(operand); })) {
+                const bool is_polynomial =
+                    node.op == Op::add || node.op == Op::multiply || (node.op == Op::power && node.index > 0);
+                if (!is_polynomial) return true;
+                above.insert(id);
+            }
+        }
+        return false;
+    };
+    std::erase_if(sums, needs_digits);
     return sums;
 }
 

@@ -34,7 +34,7 @@ struct EnsembleSweeps : StageMap<K, T> {
 
     struct Arrays {
         T P[values], X[values], W[values], S[inner_room * entries], d[values], delta[values], bend[values];
-        T rate[n], inverse_scale[n], inverse_linear[n];
+        T rate[n], inverse_scale[n], inverse_next[n], inverse_linear[n];
     };
 
     // Of increments: the square that is small enough, and what they are measured against at least, a part of the
@@ -46,7 +46,7 @@ struct EnsembleSweeps : StageMap<K, T> {
     Measure settled, near;
     T evaluations;  // of the last step
     T drifting[n];  // the velocity before the last kick, so that the next step need not wait for it
-    T reach;        // largest row of M, sum of squares
+    T reach;        // root of the sum of squares of a row of M, the largest
     Workspace<Arrays> workspace;
 
     void prepare(const typename K::Coefficients& k, real step, int lane) {
@@ -61,7 +61,7 @@ struct EnsembleSweeps : StageMap<K, T> {
                 }
                 largest = maximum(largest, squares);
             }
-        set_lane(reach, lane, largest);
+        set_lane(reach, lane, sqrt(largest));
     }
     void begin(const real* q, const real* u, const real* W0, int lane) {
         Tables::begin(q, W0, lane);
@@ -120,8 +120,9 @@ private:
         for (int c = 0; c < n; ++c) {
             const T W0 = w[c * s + s - 1], position = fabs(q[c]);
             a.rate[c] = fused(T(-h * K::b[0]), W0, u[c]);
-            const T moved = T(h) * (fabs(a.rate[c]) + fabs(T(h) * W0));
+            const T moved = T(fabs(h)) * (fabs(a.rate[c]) + fabs(T(h) * W0));
             a.inverse_scale[c] = T(real(1)) / maximum(moved, fused(T(settled.part), position, T(settled.least)));
+            a.inverse_next[c] = reach * a.inverse_scale[c];
             a.inverse_linear[c] = T(real(1)) / maximum(moved, fused(T(near.part), position, T(near.least)));
             const T rate = fused(T(-h * (K::b[0] + K::b[s - 1])), W0, drifting[c]);
             const auto& of = map_of(c);
@@ -239,7 +240,8 @@ private:
             solved = solved | ready;
             going = going & !ready;
             if (evaluation > 3) going = going & shrinks(e, e_before, enough);
-            e_before = e;
+            // Not beyond 1: a coordinate that began at rest moves by any multiple of nothing.
+            e_before = minimum(e, T(real(1)));
         }
         evaluate(k, time, a);
         return solved;
@@ -287,7 +289,7 @@ private:
         return size(a.delta, a.inverse_linear) <= T(near.enough);
     }
     // delta = d + M bend, and bend = (S - D) delta; where the next sweep would change nothing: it would move X by M
-    // times what `bend` has changed by, at most sqrt(reach) times its size.
+    // times what `bend` has changed by, at most `reach` times its size.
     LOBATTO_INLINE Going sweep(Arrays& a) const {
         T change[values];
         for (int i = 0; i < values; ++i) {
@@ -297,7 +299,7 @@ private:
         add_mapped(a.bend, a.delta);
         slopes_times(a, a.delta, a.bend);
         for (int i = 0; i < values; ++i) change[i] = a.bend[i] - change[i];
-        return size(change, a.inverse_scale) * reach <= T(settled.enough);
+        return size(change, a.inverse_next) <= T(settled.enough);
     }
     // Another sweep, but of the lanes `resting`, whose answer is `known`.
     LOBATTO_INLINE Going sweep_others(Going resting, Going known, Arrays& a) const {

@@ -171,6 +171,7 @@ private:
     }
 
     bool prepare_map(Map& of, real D, int lane) const {
+        if (m == 0) return true;  // nothing is solved
         constexpr int columns = m + s + 3;
         real J[inner_room * inner_room], X[(m + 1) * columns];
         for (int i = 0; i <= m; ++i) {
@@ -185,7 +186,7 @@ private:
             x[m + s + 2] = h * K::c[i + 1];
         }
         bool good = true;
-        if (absorbs && m > 0) {
+        if (absorbs) {
             for (int i = 0; i < m; ++i)
                 for (int j = 0; j < m; ++j) J[i * m + j] = (i == j ? real(1) : real(0)) + h * h * D * row(i, j);
             good = lobatto::solve<inner_room, columns>(J, X);

@@ -199,6 +199,10 @@ TEST_CASE("sines and cosines of a sum of two angles come from those of both, in 
     CHECK(functions_of(g.program({sine(sum(false, true)), sine(g.x)})) == std::pair(2L, 2L));
     CHECK(functions_of(g.program({sine(g.graph.add({g.x, g.y, g.z})), sine(g.x), sine(g.y), sine(g.z)})) ==
           std::pair(4L, 4L));
+    // What is divided by keeps its digits near zero.
+    const Id known = g.graph.multiply({sine(g.x), cosine(g.y)});
+    CHECK(functions_of(g.program({g.graph.power(sine(sum(false, true)), -1), known})) == std::pair(3L, 3L));
+    CHECK(functions_of(g.program({g.graph.power(sine(sum(false, true)), 3), known})) == std::pair(3L, 2L));
     // Another program that takes the sum's sine alone keeps it.
     Programs two = g.program({sine(sum(false, true)), sine(g.x), cosine(g.y)});
     two.programs.push_back({"alone", {{"out[0]", sine(sum(false, true))}}});
