@@ -339,9 +339,9 @@ private:
             remember<false>(q, u, q1, u1, change, W1, solved, a);
         return solved;
     }
-    LOBATTO_INLINE static T sum_over_nodes(const T& start, const T* factor, const T* values) {
+    LOBATTO_INLINE static T sum_over_nodes(const T& start, const T* factor, const T* W) {
         T sum = start;
-        for (int j = 0; j < m; ++j) sum = fused(factor[j], values[j * n], sum);
+        for (int j = 0; j < m; ++j) sum = fused(factor[j], W[j * n], sum);
         return sum;
     }
 
