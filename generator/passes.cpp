@@ -346,8 +346,9 @@ Id angle_of(const Graph& graph, Id term, bool& is_negative) {
 
 // The sums of two angles, both plus or minus, whose sines or cosines a program takes besides those of both angles.
 std::set<Id> sums_of_known_angles(const Graph& graph, const Program& program) {
+    const std::vector<Id> nodes = graph.topological(roots_of(program));
     std::set<Id> arguments;
-    for (const Id id : graph.topological(roots_of(program)))
+    for (const Id id : nodes)
         if (is_trigonometric(graph[id].op)) arguments.insert(graph[id].operands[0]);
     std::set<Id> sums;
     for (const Id sum : arguments) {
@@ -359,24 +360,17 @@ std::set<Id> sums_of_known_angles(const Graph& graph, const Program& program) {
         };
         if (is_known(graph[sum].operands[0]) && is_known(graph[sum].operands[1])) sums.insert(sum);
     }
-    // Near zero sin(a - b) has fewer digits then: not where it is divided by, or is the argument of a function.
-    const auto needs_digits = [&](Id sum) {
-        std::set<Id> above;
-        for (const Id id : graph.topological(roots_of(program))) {
-            const Node& node = graph[id];
-            if (is_trigonometric(node.op) && node.operands[0] == sum) {
-                above.insert(id);
-            } else if (std::any_of(node.operands.begin(), node.operands.end(),
-                                   [&](Id operand) { return above.contains(operand); })) {
-                const bool is_polynomial =
-                    node.op == Op::add || node.op == Op::multiply || (node.op == Op::power && node.index > 0);
-                if (!is_polynomial) return true;
-                above.insert(id);
-            }
-        }
-        return false;
-    };
-    std::erase_if(sums, needs_digits);
+    // Near zero sin(a - b) has fewer digits then: not where it is divided by, or in the argument of a function.
+    std::vector<bool> needs_digits(static_cast<std::size_t>(graph.size()));
+    for (auto id = nodes.rbegin(); id != nodes.rend(); ++id) {
+        const Node& node = graph[*id];
+        const bool is_polynomial =
+            node.op == Op::add || node.op == Op::multiply || (node.op == Op::power && node.index > 0);
+        const bool here = needs_digits[static_cast<std::size_t>(*id)];
+        if (here && is_trigonometric(node.op)) sums.erase(node.operands[0]);
+        if (here || !is_polynomial)
+            for (const Id operand : node.operands) needs_digits[static_cast<std::size_t>(operand)] = true;
+    }
     return sums;
 }
 
@@ -401,9 +395,7 @@ Id sine_or_cosine_of_sum(Graph& graph, Op op, const std::vector<Id>& terms) {
 
 Programs add_angles(const Programs& programs) {
     // Each program by itself: another may take the sum's sine alone.
-    Programs after = rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
-        return same(graph, before[id], std::move(operands));
-    });
+    Programs after = programs;
     for (std::size_t p = 0; p < programs.programs.size(); ++p) {
         const std::set<Id> sums = sums_of_known_angles(programs.graph, programs.programs[p]);
         if (sums.empty()) continue;
@@ -442,7 +434,7 @@ Programs pair_sines(const Programs& programs) {
 std::vector<Id> roots_of(const Programs& programs) {
     std::vector<Id> roots;
     for (const Program& program : programs.programs)
-        for (const Output& output : program.outputs) roots.push_back(output.value);
+        for (const Id root : roots_of(program)) roots.push_back(root);
     for (const auto& [id, name] : programs.names) roots.push_back(id);
     return roots;
 }
