@@ -4,10 +4,12 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "bench/peers/gauss.hpp"
 #include "bench/peers/nystrom.hpp"
 #include "bench/peers/splitting.hpp"
+#include "bench/peers/taylor.hpp"
 #include "bench/reference.hpp"
 
 using namespace lobatto::bench;
@@ -148,6 +150,56 @@ TEST_CASE("the adaptive peer keeps the tolerance it was given, about") {
     MESSAGE(count.steps << " steps, error " << distance(end, reference));
     CHECK(distance(end, reference) < 1e-8);
     CHECK(count.evaluations >= 17 * count.steps);
+}
+
+TEST_CASE("a Taylor series has the order at which it is cut") {
+    const auto order_of = [](auto problem, const Planar& start, int order) {
+        using Type = decltype(problem);
+        const auto taylor = [=](Planar& s, Quad h, long m) { integrate_taylor_fixed<Type>(s, h, m, order); };
+        return measured_order<Type>(start, taylor, 1, 16);
+    };
+    for (const int order : {5, 8}) {
+        CAPTURE(order);
+        CHECK(order_of(HenonHeiles(), star, order) == doctest::Approx(order).epsilon(0.05));
+        CHECK(order_of(Kepler(), {{Quad(0.7), 0}, {0, Quad(1.36)}}, order) == doctest::Approx(order).epsilon(0.05));
+        CHECK(order_of(DoublePendulum(), {{Quad(0.5), Quad(0.3)}, {0, 0}}, order) ==
+              doctest::Approx(order).epsilon(0.08));
+    }
+}
+
+TEST_CASE("Taylor series reach the ends of the race's problems, alone and eight side by side") {
+    for (const Problem& problem : problems()) {
+        CAPTURE(problem.name);
+        with_type_of(problem, [&](auto type) {
+            using Type = decltype(type);
+            constexpr int n = Type::coordinates;
+            auto alone = std::make_unique<Expansion<Type, double>>();
+            auto eight = std::make_unique<Expansion<Type, Eight>>();
+            const auto start = [&](auto& x, int lane, double factor) {
+                for (int k = 0; k < n; ++k) {
+                    put(x, k, lane, problem.q[k] * (k == 0 ? factor : 1));
+                    put(x, n + k, lane, problem.p[k]);
+                }
+            };
+            const auto factor_of = [](int lane) { return 1 + 1e-3 * (lane % 5); };
+            for (int lane = 0; lane < 8; ++lane) start(*eight, lane, factor_of(lane));
+            const long steps = integrate_taylor(*eight, problem.until, 1e-15).steps;
+            const Trajectory end = reference_end(problem, {problem.q, problem.p});
+            long sum = 0;
+            for (int lane = 0; lane < 8; ++lane) {
+                CAPTURE(lane);
+                start(*alone, 0, factor_of(lane));
+                sum += integrate_taylor(*alone, problem.until, 1e-15).steps;
+                for (int k = 0; k < 2 * n; ++k) {
+                    CAPTURE(k);
+                    const double value = get(*alone, k, 0);
+                    if (lane == 0) CHECK(std::fabs(value - (k < n ? end.q[k] : end.p[k - n])) < 1e-11);
+                    CHECK(std::fabs(get(*eight, k, lane) - value) < 1e-11);
+                }
+            }
+            CHECK(std::labs(steps - sum) <= sum / 50);
+        });
+    }
 }
 
 TEST_CASE("the symplectic peers keep the energy of Henon-Heiles without drift") {

@@ -12,10 +12,13 @@
 
 namespace lobatto::bench {
 
+// Put where it is used: the compiler alone gives up in functions as large as a step or a series written out.
+#define WRITTEN_OUT __attribute__((always_inline))
+
 // Calls action(std::integral_constant<int, i>) for i = 0 ... count - 1: loops whose zero coefficients cost nothing.
 template <int count, class Action>
-void unrolled(const Action& action) {
-    [&]<int... i>(std::integer_sequence<int, i...>) {
+WRITTEN_OUT inline void unrolled(const Action& action) {
+    [&]<int... i>(std::integer_sequence<int, i...>) WRITTEN_OUT {
         (action(std::integral_constant<int, i>()), ...);
     }
     (std::make_integer_sequence<int, count>());
