@@ -41,6 +41,7 @@ struct Contestant {
 
 using Contestants = std::vector<Contestant>;
 Contestants own_peers(const Problem& problem);
+Contestants taylor_peer(const Problem& problem);
 Contestants odeint_peers(const Problem& problem);
 Contestants gsl_peers(const Problem& problem);
 Contestants sundials_peers(const Problem& problem);

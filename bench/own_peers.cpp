@@ -4,9 +4,6 @@
 #include "bench/peers/gauss.hpp"
 #include "bench/peers/nystrom.hpp"
 #include "bench/peers/splitting.hpp"
-#include "bench/peers/taylor.hpp"
-
-#include <memory>
 
 namespace lobatto::bench {
 
@@ -61,37 +58,6 @@ Contestant nystrom(const Problem& problem) {
     return {"Dormand-Prince Nystroem 12", 12, false, false, Ladder::tolerance, run};
 }
 
-// Eight trajectories side by side, what is left one by one.
-template <class Type>
-Contestant taylor(const Problem& problem) {
-    const auto single = std::make_shared<Expansion<Type, double>>();
-    const auto eight = std::make_shared<Expansion<Type, Eight>>();
-    const auto run = [=, until = problem.until](double setting, std::vector<Trajectory>& trajectories) {
-        Effort all{true, 0, 0};
-        const auto take = [&](auto& x, std::size_t first, int lanes) {
-            constexpr int n = Type::coordinates;
-            for (int lane = 0; lane < lanes; ++lane)
-                for (int k = 0; k < n; ++k) {
-                    put(x, k, lane, trajectories[first + lane].q[k]);
-                    put(x, n + k, lane, trajectories[first + lane].p[k]);
-                }
-            const long steps = integrate_taylor(x, until, setting).steps;
-            for (int lane = 0; lane < lanes; ++lane)
-                for (int k = 0; k < n; ++k) {
-                    trajectories[first + lane].q[k] = get(x, k, lane);
-                    trajectories[first + lane].p[k] = get(x, n + k, lane);
-                }
-            all.good = all.good && steps >= 0;
-            all.steps += steps;
-        };
-        std::size_t first = 0;
-        for (; first + 8 <= trajectories.size(); first += 8) take(*eight, first, 8);
-        for (; first < trajectories.size(); ++first) take(*single, first, 1);
-        return all;
-    };
-    return {"Taylor series", 0, false, false, Ladder::tolerance, run};
-}
-
 }  // namespace
 
 Contestants own_peers(const Problem& problem) {
@@ -99,7 +65,6 @@ Contestants own_peers(const Problem& problem) {
         using Type = decltype(type);
         if constexpr (Type::separable) {
             return {nystrom<Type>(problem),
-                    taylor<Type>(problem),
                     splitting<Type, blanes_moan_14>(problem, "Blanes-Moan SRKN14a"),
                     splitting<Type, blanes_moan_11>(problem, "Blanes-Moan SRKN11b"),
                     splitting<Type, sofroniou_spaletta_10>(problem, "Sofroniou-Spaletta 35 stages"),
@@ -108,7 +73,7 @@ Contestants own_peers(const Problem& problem) {
                     splitting<Type, kahan_li_8>(problem, "Kahan-Li 17 stages"),
                     splitting<Type, stoermer_verlet>(problem, "Stoermer-Verlet")};
         } else {
-            return {taylor<Type>(problem), gauss<Type, 6>(problem), gauss<Type, 8>(problem)};
+            return {gauss<Type, 6>(problem), gauss<Type, 8>(problem)};
         }
     });
 }

@@ -137,6 +137,7 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
     Contestants contestants;
     const auto enter = [&](Contestants more) { std::move(more.begin(), more.end(), std::back_inserter(contestants)); };
     enter(own_peers(problem));
+    enter(taylor_peer(problem));
     enter(odeint_peers(problem));
     enter(gsl_peers(problem));
     enter(sundials_peers(problem));

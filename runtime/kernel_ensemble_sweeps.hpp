@@ -248,39 +248,45 @@ private:
     }
 
     // The same by evaluations with S: X becomes the nodes, and W is carried to them. One sweep with S follows the first
-    // evaluation, which is seldom the last; two the others.
+    // evaluation; it is often the last.
     template <class Given>
     LOBATTO_INLINE Going solve_with_slopes(const Given& k, real time, Going going, Arrays& a) {
+        evaluate(k, time, a);
+        residual(a, a.d);
+        slopes_times(a, a.d, a.bend);
+        const Going at_first = sweep(a) & S_stands_for_W(a);
+        evaluations = select(going, T(real(1)), T(real(0)));
+        if (any(going & !at_first)) going = evaluate_again(k, time, going, at_first, a);
+        for (int i = 0; i < values; ++i) {
+            a.X[i] += a.delta[i];
+            if constexpr (absorbs) a.bend[i] = fused(diagonal[i % n], a.delta[i], a.bend[i]);
+            a.W[i] += a.bend[i];
+        }
+        return going;
+    }
+    // The evaluations after the first, each with two sweeps; `at_first`: the lanes that need none of them.
+    template <class Given>
+    LOBATTO_INLINE Going evaluate_again(const Given& k, real time, Going going, Going at_first, Arrays& a) {
         T e_before = T(real(0));
-        evaluations = T(real(0));
-        Going further = going, at_first = going & !going;  // still to be solved; solved by the first evaluation
-        for (int evaluation = 1;; ++evaluation) {
+        Going further = going & !at_first;
+        for (int evaluation = 2;; ++evaluation) {
+            move_on(further, a);
             evaluate(k, time, a);
             evaluations += select(further, T(real(1)), T(real(0)));
             residual(a, a.d);
             slopes_times(a, a.d, a.bend);
             Going is_solved = sweep(a);
-            if (evaluation > 1) is_solved = sweep_others(at_first, is_solved, a);
+            is_solved = sweep_others(at_first, is_solved, a);
             is_solved = is_solved & S_stands_for_W(a);
             further = going & !is_solved;
             if (!any(further)) break;
-            if (evaluation == evaluation_limit) {
-                going = going & is_solved;
-                break;
-            }
-            if (evaluation == 1) at_first = is_solved;
+            if (evaluation == evaluation_limit) return going & is_solved;
             if (evaluation >= 3) {
                 const T e = size(a.d, a.inverse_scale);
                 if (evaluation > 3) going = going & (is_solved | shrinks(e, e_before, T(settled.enough)));
                 e_before = e;
                 further = going & further;
             }
-            move_on(further, a);
-        }
-        for (int i = 0; i < values; ++i) {
-            a.X[i] += a.delta[i];
-            if constexpr (absorbs) a.bend[i] = fused(diagonal[i % n], a.delta[i], a.bend[i]);
-            a.W[i] += a.bend[i];
         }
         return going;
     }
