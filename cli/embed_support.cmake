@@ -1,6 +1,6 @@
 # Writes the texts of the kernel support headers into one C++ file, so that the program needs no source tree to compile kernels.
 # The parts of kernel.hpp are joined in this order, each without its includes of the others.
-set(parts kernel_numbers.hpp kernel_pack.hpp kernel_functions.hpp kernel_contract.hpp kernel_solve.hpp kernel_linear.hpp kernel_rows.hpp kernel_neighbours.hpp kernel_stage_map.hpp
+set(parts kernel_numbers.hpp kernel_pack.hpp kernel_functions.hpp kernel_angles.hpp kernel_contract.hpp kernel_solve.hpp kernel_linear.hpp kernel_rows.hpp kernel_neighbours.hpp kernel_stage_map.hpp
     kernel_sweeps.hpp kernel_separable.hpp kernel_clean.hpp kernel_explicit.hpp kernel_galerkin.hpp kernel_general.hpp kernel_ensemble_sweeps.hpp kernel_ensemble.hpp kernel_events.hpp)
 set(kernel_hpp)
 foreach(name ${parts})

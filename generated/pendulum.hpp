@@ -21,7 +21,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "180286fdcd6ce036";
+    static constexpr const char* digest = "9faad2caa0da0fbd";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -46,6 +46,7 @@ struct pendulum {
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};
     static constexpr bool costly = true;        // forces are evaluated less often for having second derivatives
+    static constexpr int angles = 1;            // whose sines and cosines node is given, anew or from those of angles near
 
     // nodes on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1
     static constexpr real c[4] = {0.0, 0.276393202250021, 0.7236067977499789, 1.0};
@@ -157,10 +158,10 @@ struct pendulum {
     }
 
     // (D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, entry_column.
-    template <class given, class number>
-    static void node(const CoefficientsOf<given>& k, const number* q, number* W, number* S) {
+    template <class given, class number, class Angles = lobatto::AnglesAnew>
+    static void node(const CoefficientsOf<given>& k, const number* q, number* W, number* S, Angles angle = {}) {
         number sin_q, cos_q;
-        lobatto::sincos(q[0], sin_q, cos_q);
+        angle.sincos(0, q[0], sin_q, cos_q);
         W[0] = k.omega_squared * sin_q;
         S[0] = k.omega_squared * cos_q;
     }

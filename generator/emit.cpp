@@ -36,6 +36,29 @@ std::string comment_safe(const std::string& text) {
     return safe;
 }
 
+// What sweeps evaluate at the nodes of a step.
+const char* swept_function(Form form) {
+    return form == Form::general ? "stage" : "node";
+}
+
+// The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered.
+std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
+    std::vector<Id> values;
+    for (const Output& output : program.outputs) values.push_back(output.value);
+    const auto moves = [&graph](Id id) {
+        return graph[id].op == Op::input && graph[id].stage > Stage::step_size && graph.input_of(id).code != "time";
+    };
+    std::map<Id, int> halves, angles;
+    for (const Id id : graph.topological(values)) {
+        if (graph[id].op != Op::pair_sine && graph[id].op != Op::pair_cosine) continue;
+        const Id pair = graph[id].operands[0];
+        const std::vector<Id> below = graph.topological({pair});
+        if (++halves[pair] == 2 && std::any_of(below.begin(), below.end(), moves))
+            angles.emplace(pair, static_cast<int>(angles.size()));
+    }
+    return angles;
+}
+
 class Emitter {
 public:
     Emitter(const Derivation& derivation, const Programs& programs, const EmitOptions& options)
@@ -44,7 +67,11 @@ public:
           options_(options),
           hoisted_(programs),
           looped_(derivation, programs, options.precision, [this](Id id) { return name_of(id); }),
-          n_(derivation.system.n) {}
+          n_(derivation.system.n) {
+        for (const Program& program : p_.programs)
+            if (program.name == swept_function(d_.structure.form) && has_near_angles())
+                angles_ = angles_of(p_.graph, program);
+    }
 
     std::string header(const std::string& name, const std::string& digest,
                        const std::vector<PassReport>& report) const {
@@ -53,8 +80,9 @@ public:
         if (options_.precision == Precision::quadruple) text += "#define LOBATTO_USE_FLOAT128\n";
         text += options_.standalone_support.empty() ? "#include \"kernel.hpp\"\n" : options_.standalone_support;
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
-        text += shapes(d_, options_.precision, name, digest) + costs() + tables(d_, options_.precision) +
-                (d_.structure.looped ? looped_.tables() : "") + parameters() + coefficients() + prepare(name);
+        text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
+                tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
+                coefficients() + prepare(name);
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form)) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -123,16 +151,38 @@ private:
         return sum;
     }
 
-    // Whether second derivatives save more evaluations than they cost.
+    // Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less,
+    // about, and five products for each of them (measured).
+    bool is_costly() const {
+        const double evaluation = cost_of("acceleration", "_slope"), with_slopes = cost_of("node", "_node");
+        return with_slopes + 5 * static_cast<double>(d_.structure.entries.size()) <= 2 * evaluation;
+    }
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
-        // With second derivatives a step takes an evaluation less, about, and five products for each of them
-        // (measured).
-        const double evaluation = cost_of("acceleration", "_slope"), with_slopes = cost_of("node", "_node");
-        const bool is_costly = with_slopes + 5 * static_cast<double>(d_.structure.entries.size()) <= 2 * evaluation;
-        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", is_costly),
-                           is_costly ? "forces are evaluated less often for having second derivatives"
-                                     : "second derivatives would cost more than the evaluations they save");
+        const bool costly = is_costly();
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", costly),
+                           costly ? "forces are evaluated less often for having second derivatives"
+                                  : "second derivatives would cost more than the evaluations they save");
+    }
+
+    // Whether sweeps evaluate a function that is written out, in packs of double: where angles may be near others.
+    bool has_near_angles() const {
+        const Structure& structure = d_.structure;
+        if (structure.looped || options_.precision != Precision::double_) return false;
+        const bool is_swept = structure.form == Form::separable && !structure.is_explicit && !structure.clean;
+        return structure.form == Form::general || (is_swept && is_costly());
+    }
+    std::string near_angles() const {
+        if (is_map()) return "";
+        const std::string comment =
+            angles_.empty() ? "nothing that sweeps evaluate takes its sines and cosines from those of angles near"
+                            : fmt::format("whose sines and cosines {} is given, anew or from those of angles near",
+                                          swept_function(d_.structure.form));
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr int angles = {};", angles_.size()),
+                           comment);
+    }
+    bool takes_angles(const Declaration& declaration) const {
+        return !angles_.empty() && std::string(declaration.program) == swept_function(d_.structure.form);
     }
 
     std::string parameters() const {
@@ -249,14 +299,15 @@ private:
                text + "    }\n";
     }
 
-    // A parameter that the body does not use is left without a name.
+    // A parameter that the body does not use is left without a name; a default follows the name.
     static std::string signature(const std::string& result, const std::string& name,
                                  const std::vector<std::pair<std::string, const char*>>& parameters,
                                  const std::string& body) {
         std::string text;
         for (const auto& [type, parameter] : parameters) {
             text += (text.empty() ? "" : ", ") + type;
-            if (mentions(body, parameter)) text += std::string(" ") + parameter;
+            const std::string name_and_default = parameter;
+            if (mentions(body, name_and_default.substr(0, name_and_default.find(' ')))) text += " " + name_and_default;
         }
         return wrapped(fmt::format("    static {} {}({}) {{", result, name, text),
                        std::string(name.size() + result.size() + 13, ' '));
@@ -279,7 +330,9 @@ private:
         for (const Output& output : program->outputs) statements.push_back({output.target, output.value});
         const auto names = [this](Id id) { return name_of(id); };
         const std::string text =
-            FunctionText(p_, statements, names, options_.precision, Stage::step_size, declaration.any_number).lines();
+            FunctionText(p_, statements, names, options_.precision, Stage::step_size, declaration.any_number, false,
+                         takes_angles(declaration) ? angles_ : std::map<Id, int>())
+                .lines();
         return name == "correction" ? with_solves(text) : text;
     }
 
@@ -301,10 +354,13 @@ private:
         } else {
             for (const auto& [of, parameter] : declaration.parameters) parameters.emplace_back(type(of), parameter);
         }
+        if (takes_angles(declaration)) parameters.emplace_back("Angles", "angle = {}");
         return "\n" + wrapped(std::string("    // ") + declaration.comment, "    //     ") +
                (takes_how(declaration)
                     ? "    template <class how = lobatto::OneByOne, class given, class Position, "
                       "class Slope,\n              class number = lobatto::element_of<Position>>\n    LOBATTO_INLINE\n"
+                : takes_angles(declaration)
+                    ? "    template <class given, class number, class Angles = lobatto::AnglesAnew>\n"
                 : any ? "    template <class given, class number>\n"
                       : "") +
                signature(type(declaration.result), declaration.program, parameters, text) + text + "    }\n";
@@ -354,6 +410,7 @@ private:
     Hoisted hoisted_;
     LoopedText looped_;
     int n_;
+    std::map<Id, int> angles_;  // of the function that sweeps evaluate, where they may be near others
 };
 
 }  // namespace

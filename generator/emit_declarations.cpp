@@ -139,6 +139,7 @@ bool is_member_name(const std::string& name) {
                                                   "has_energy",
                                                   "has_tangent",
                                                   "events",
+                                                  "angles",
                                                   "coordinates",
                                                   "points",
                                                   "order",

@@ -86,7 +86,8 @@ Hoisted::Hoisted(const Programs& programs) {
 }
 
 FunctionText::FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                           Precision precision, Stage given, bool any_number, bool fuses) {
+                           Precision precision, Stage given, bool any_number, bool fuses,
+                           const std::map<Id, int>& angles) {
     const Graph& graph = programs.graph;
     const char* const type = any_number ? "auto" : "real";
     std::vector<Id> roots;
@@ -122,6 +123,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
           "W0", "W1",    "q1",   "p1",  "u1", "W_before", "base", "delta", "velocity", "z",          "g",
           "H",  "value", "rows", "how", "Lv", "Lq",       "M",    "S0",    "time",     "not_finite", "Status"})
         taken.insert(name);
+    if (!angles.empty()) taken.insert("angle");
     const auto take = [&taken](const std::string& name) {  // false when it has another meaning
         return !is_member_name(name) && taken.insert(name).second;
     };
@@ -196,7 +198,10 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
                 const Id cosine = graph[both[0]].op == Op::pair_sine ? both[1] : both[0];
                 text_ +=
                     fmt::format("        {} {}, {};\n", any_number ? "number" : "real", local[sine], local[cosine]);
-                text_ += wrapped(fmt::format("        lobatto::sincos({}, {}, {});", text, local[sine], local[cosine]),
+                const auto angle = angles.find(node.operands[0]);
+                const std::string function =
+                    angle == angles.end() ? "lobatto::sincos(" : fmt::format("angle.sincos({}, ", angle->second);
+                text_ += wrapped(fmt::format("        {}{}, {}, {});", function, text, local[sine], local[cosine]),
                                  "            ");
                 return;
             }

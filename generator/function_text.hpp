@@ -29,11 +29,13 @@ struct Statement {
 // Assignments as C++ lines, indented by 8. `external` names what the function is given (inputs, fields of k); a value
 // of a stage up to `given` that has no such name is a mistake of ours. Values used more than once become locals t1, t2,
 // ... or bear the name the derivation gave them; in a template on the type of numbers (`any_number`) they are `auto`.
-// Products are added by fused_sum() where it `fuses`.
+// Products are added by fused_sum() where it `fuses`. Sine and cosine of the pairs numbered in `angles` are asked from
+// the argument `angle`.
 class FunctionText {
 public:
     FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                 Precision precision, Stage given, bool any_number = false, bool fuses = false);
+                 Precision precision, Stage given, bool any_number = false, bool fuses = false,
+                 const std::map<Id, int>& angles = {});
     const std::string& lines() const { return text_; }
 
 private:

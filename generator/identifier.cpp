@@ -29,7 +29,7 @@ std::string identifier(const std::string& name) {
         "return short signed sizeof static static_assert static_cast struct switch template this "
         "thread_local throw true try typedef typeid typename union unsigned using virtual void volatile "
         "wchar_t while xor xor_eq lobatto linux unix Parameters Status math_errhandling errno signgam "
-        "Coefficients CoefficientsOf number given");
+        "Coefficients CoefficientsOf Angles number given");
     // Names in capitals may be macros of the standard headers (NAN, M_PI). What already ends in underscores gets one
     // more, so that different names stay different.
     const std::string stem = name.substr(0, name.find_last_not_of('_') + 1);

@@ -3,6 +3,7 @@
 #ifndef LOBATTO_KERNEL_HPP
 #define LOBATTO_KERNEL_HPP
 
+#include "kernel_angles.hpp"
 #include "kernel_clean.hpp"
 #include "kernel_contract.hpp"
 #include "kernel_ensemble.hpp"

@@ -20,6 +20,9 @@
 //   a constant part of S to iterate with; `clean` (in loops) that steps are those of kernel_clean.hpp. Gauss's nodes
 //   stand between two ends of weight zero.
 // Form::general: see kernel_general.hpp.
+// Forms separable and general: angles, how many arguments of sine and cosine together the function that sweeps evaluate
+//   holds (node, of costly forces, and stage); where there are any it takes one more argument, AnglesAnew by default,
+//   which gives their sines and cosines (kernel_angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 

@@ -53,12 +53,31 @@ LOBATTO_INLINE Doubles<width> unless(const Where<width>& holds, const Doubles<wi
     return Doubles<width>::load(values);
 }
 
+// The minimax polynomials published with FDLIBM, of degree 13 and 14 on [-pi/4, pi/4], with z = r^2 and z2 = z^2:
+//     sin r = r - z r sine_series,   cos r = 1 - z/2 + z2 cosine_series.
+template <int width>
+LOBATTO_INLINE Doubles<width> sine_series(const Doubles<width>& z, const Doubles<width>& z2) {
+    using P = Doubles<width>;
+    return fused(z2,
+                 fused(z2, fused(z, P(-1.58969099521155010221e-10), P(2.50507602534068634195e-08)),
+                       fused(z, P(-2.75573137070700676789e-06), P(1.98412698298579493134e-04))),
+                 fused(z, P(-8.33333333332248946124e-03), P(1.66666666666666324348e-01)));
+}
+template <int width>
+LOBATTO_INLINE Doubles<width> cosine_series(const Doubles<width>& z, const Doubles<width>& z2) {
+    using P = Doubles<width>;
+    return fused(z2,
+                 fused(z2, fused(z, P(-1.13596475577881948265e-11), P(2.08757232129817482790e-09)),
+                       fused(z, P(-2.75573143513906633035e-07), P(2.48015872894767294178e-05))),
+                 fused(z, P(-1.38888888888741095749e-03), P(4.16666666666666019037e-02)));
+}
+
 // x = k pi/2 + r - excess with |r| <= pi/4, and the sine and cosine of r - excess; the last bits of `quadrant` are k's.
 // For |x| < 2^19 pi/2.
 //
 // With pi/2 = a + b + c (53 bits each) x - k a is exact with FMA, and so is what rounding it to r loses. Without FMA
-// the parts have 33, 33 and 53 bits, so that the first two products are exact. Then the minimax polynomials of degree
-// 13 and 14 on [-pi/4, pi/4] published with FDLIBM; `excess` is ready before they are.
+// the parts have 33, 33 and 53 bits, so that the first two products are exact. Then the polynomials; `excess` is ready
+// before they are.
 template <int width>
 struct Reduced {
     Doubles<width> sine, cosine;
@@ -86,19 +105,11 @@ struct Reduced {
         const P z = r * r;
         const P z2 = z * z;
         const P cube = z * r;
-        const P s = fused(z2,
-                          fused(z2, fused(z, P(-1.58969099521155010221e-10), P(2.50507602534068634195e-08)),
-                                fused(z, P(-2.75573137070700676789e-06), P(1.98412698298579493134e-04))),
-                          fused(z, P(-8.33333333332248946124e-03), P(1.66666666666666324348e-01)));
-        const P rest = fused(z, P(-0.5), P(1.0));  // nearly the cosine, and the slope of the sine
-        sine = r - fused(cube, s, excess * rest);  // -0 for -0
-        const P c = fused(z2,
-                          fused(z2, fused(z, P(-1.13596475577881948265e-11), P(2.08757232129817482790e-09)),
-                                fused(z, P(-2.75573143513906633035e-07), P(2.48015872894767294178e-05))),
-                          fused(z, P(-1.38888888888741095749e-03), P(4.16666666666666019037e-02)));
+        const P rest = fused(z, P(-0.5), P(1.0));                   // nearly the cosine, and the slope of the sine
+        sine = r - fused(cube, sine_series(z, z2), excess * rest);  // -0 for -0
         P slope = r;  // minus that of the cosine; without FMA `excess` may be ten units in the last place of r
         if constexpr (!has_fused) slope = r - cube * 1.66666666666666324348e-01;
-        cosine = rest + fused(z2, c, fused(excess, slope, fused(z, P(-0.5), 1.0 - rest)));
+        cosine = rest + fused(z2, cosine_series(z, z2), fused(excess, slope, fused(z, P(-0.5), 1.0 - rest)));
     }
 };
 

@@ -8,11 +8,13 @@
 //     V_i = 0 q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j
 // A sweep takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps the
 // last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every sweep.
+// Angles are taken from those at the start of the step (kernel_angles.hpp).
 #ifndef LOBATTO_KERNEL_GALERKIN_HPP
 #define LOBATTO_KERNEL_GALERKIN_HPP
 
 #include <type_traits>
 
+#include "kernel_angles.hpp"
 #include "kernel_contract.hpp"
 #include "kernel_functions.hpp"
 #include "kernel_numbers.hpp"
@@ -76,6 +78,7 @@ struct GalerkinSweeps {
     struct Arrays {
         V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[parts * n * n];
         T flat[n * parts * width], flat_v[n * parts * width], inverse_scale[n];
+        AngleTable<V, parts, K::angles> near;
     };
 
     V position_map[r][parts], momentum_map[r][parts];  // h A and h A', a column for each node
@@ -191,6 +194,7 @@ private:
             a.inverse_scale[c] = fabs(T(h)) / maximum(scale, rounding);
             kappa_now[c] = kappa[c];
         }
+        if constexpr (K::angles > 0) look_around(k, time, q, a);
         const T small = T(least);
         Going solved = going & !going;
         T e_before = T(Limits<real>::largest);
@@ -213,6 +217,29 @@ private:
         return solved;
     }
 
+    // The angles at the start of the step are those that all its nodes are near, whatever the last step did.
+    template <class Given>
+    LOBATTO_INLINE void look_around(const Given& k, real time, const T* q, Arrays& a) const {
+        using Start = Pack<real, lanes_of<T>>;
+        Angle<Start> angles[K::angles];
+        Start position[n], velocity[n], Lv[n], F[n], M[entries];
+        for (int c = 0; c < n; ++c) {
+            position[c] = Start(q[c]);
+            velocity[c] = Start(v[c * r + r - 1]);
+        }
+        Formulas<K>::stage(k, Start(time), static_cast<const Start*>(position), static_cast<const Start*>(velocity),
+                           +Lv, +F, +M, AnglesKept<Start>{angles});
+        const auto spread = [](const Start& x) LOBATTO_FORMULA {
+            if constexpr (in_lanes)
+                return V(x[0]);
+            else
+                return x;
+        };
+        for (int part = 0; part < parts; ++part)
+            for (int i = 0; i < K::angles; ++i)
+                a.near.of(part)[i] = {spread(angles[i].x), spread(angles[i].sine), spread(angles[i].cosine)};
+    }
+
     // One sweep; the largest change of a velocity, relative.
     template <class Given>
     LOBATTO_INLINE T sweep(const Given& k, real time, const T* q, const T* p, T* kappa_now, Arrays& a) {
@@ -220,8 +247,13 @@ private:
         for (int part = 0; part < parts; ++part) {
             V packed[entries];
             V* const M = a.M + part * n * n;
-            Formulas<K>::stage(k, V(time) + node_time[part], static_cast<const V*>(a.Q + part * n),
-                               static_cast<const V*>(a.v + part * n), a.Lv + part * n, a.F + part * n, +packed);
+            const V* const Q = a.Q + part * n;
+            const V* const velocity = a.v + part * n;
+            if constexpr (K::angles > 0)
+                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed,
+                                   AnglesNear<V>{a.near.of(part)});
+            else
+                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed);
 #pragma GCC unroll 8
             for (int i = 0; i < n * n; ++i) M[i] = V(real(0));
             for (int e = 0; e < entries; ++e) M[K::mass_row[e] * n + K::mass_column[e]] = packed[e];

@@ -139,6 +139,37 @@ TEST_CASE("sine and cosine of one argument become one call, and a lone sine stay
     CHECK(body(source.header, "acceleration").find("sincos(") == std::string::npos);
 }
 
+TEST_CASE("what sweeps evaluate is given sine and cosine of what moves, in packs of double, and of nothing else") {
+    const auto has = [](const KernelSource& source, const std::string& text) {
+        return source.header.find(text) != std::string::npos;
+    };
+    const KernelSource one = kernel(pendulum);
+    CHECK(has(one, "int angles = 1;"));
+    CHECK(body(one.header, "node").find("Angles angle = {}") != std::string::npos);
+    CHECK(count_of(body(one.header, "node"), "angle.sincos(0, q[0], ") == 1);
+    const KernelSource two = kernel({"two", "a'^2 + b'^2 + a'*b'*cos(a - b) + cos(a) + cos(b)", {"a", "b"}, {}});
+    CHECK(has(two, "int angles = 2;"));
+    CHECK(count_of(two.header, "class Angles = lobatto::AnglesAnew") == 1);
+    CHECK(count_of(body(two.header, "stage"), "angle.sincos(") == 2);
+    CHECK(body(two.header, "stage").find("lobatto::sincos(") == std::string::npos);
+    CHECK(count_of(two.header, "angle.sincos(") == 2);
+    // A lone sine; time; other precisions; loops.
+    EmitOptions single;
+    single.precision = Precision::single;
+    for (const KernelSource& none :
+         {kernel({"lone", "q'^2/2 + p'^2/2 - p^2*exp(q)*sin(a)", {"q", "p"}, {"a"}}),
+          emit(
+              derive(read_scene(Source("time.toml",
+                                       "title = 'time'\nlagrangian = \"q'^2*(1 + q^2) + q*sin(t)*cos(t)\"\ntime = 't'\n"
+                                       "[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\nfamily = "
+                                       "\"lobatto\"\npoints = 4\n[run]\nstep = 0.01\nuntil = 1\n")))),
+          emit(derivation_of(pendulum, 4), single)}) {
+        CHECK(has(none, "int angles = 0;"));
+        CHECK_FALSE(has(none, "angle.sincos"));
+        CHECK_FALSE(has(none, "class Angles"));
+    }
+}
+
 TEST_CASE("what acceleration and its derivative have in common is computed once in node") {
     const std::string node = body(kernel({"shared", "q'^2/2 - exp(a*sin(q)^2)", {"q"}, {"a"}}).header, "node");
     CHECK(count_of(node, "exp(") == 1);
@@ -234,6 +265,11 @@ TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suit
                     "m*(real'^2 + W'^2 + sin_x'^2 + x'^2)/2 - sin(x)*cos(x)*W^4 - real^3*sin(W)*cos(W) - sin_x^4",
                     {"real", "W", "sin_x", "x"},
                     {"m"}},
+                   {3});
+    check_compiles({"angles",
+                    "m*(angles'^2 + Angles'^2 + angle'^2)/2 - near*sin(angles)*cos(angles)*cos(Angles - angle)",
+                    {"angles", "Angles", "angle"},
+                    {"m", "near"}},
                    {3});
 }
 

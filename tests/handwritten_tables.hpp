@@ -141,7 +141,7 @@ struct HandwrittenKernel {
     static constexpr const char* method = "by hand";
     static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false,
                           clean = false, is_explicit = false, costly = true;
-    static constexpr int events = 0;
+    static constexpr int events = 0, angles = 0;
 };
 
 }  // namespace lobatto

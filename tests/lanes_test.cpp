@@ -367,6 +367,47 @@ TEST_CASE("with second derivatives a lane is swept where one trajectory's sweeps
     CHECK(distance(stiff[3].last, alone(newton, wide, 20, first)) < 5000);
 }
 
+TEST_CASE("a lane whose nodes are far from the angles at the start of the step leaves the bits of the others") {
+    const Kernel& kernel = kernel_for(all[2]);
+    const auto starts = [](double rate) {
+        return [rate](std::int64_t index, EnsembleStart& start) {
+            around(double_pendulum)(index, start);
+            if (index == 3) start.rate = {rate, rate};
+        };
+    };
+    const double fast = 9;
+    REQUIRE(fast * double_pendulum.step > 0.8);  // the end of a step is beyond pi/4
+    const auto calm = together(kernel, double_pendulum, 9, 20, starts(0)),
+               mixed = together(kernel, double_pendulum, 9, 20, starts(fast));
+    for (std::size_t i = 0; i < 9; ++i)
+        if (i != 3) CHECK(mixed[i] == calm[i]);
+    CHECK(mixed[3].status == LOBATTO_OK);
+    CHECK(mixed[3].steps_done == 20);
+    // Nor do they change its own.
+    const auto same =
+        together(kernel, double_pendulum, 9, 20, [&](std::int64_t, EnsembleStart& start) { starts(fast)(3, start); });
+    CHECK(same[0] == mixed[3]);
+    EnsembleStart start;
+    starts(fast)(3, start);
+    const Kernel newton = newton_kernel(derivation_of(double_pendulum, "points = 4"), Precision::double_);
+    CHECK(distance(mixed[3].last, alone(kernel, double_pendulum, 20, start)) < 5000);
+    CHECK(distance(mixed[3].last, alone(newton, double_pendulum, 20, start)) < 5000);
+}
+
+TEST_CASE("a pendulum whose nodes move far in a sweep takes the steps of Newton's iteration") {
+    TestMotion wide = pendulum;
+    wide.step = 1.2;
+    const Derivation derivation = derivation_of(pendulum, "points = 9");
+    const Kernel kernel = ensemble_kernel_in_own_cache(derivation),
+                 newton = newton_kernel(derivation, Precision::double_);
+    EnsembleStart start;
+    for (int i = 0; i < 5; ++i) {
+        around(wide)(i, start);
+        start.rate[0] += i;
+        CHECK(distance(alone(kernel, wide, 20, start), alone(newton, wide, 20, start)) < 5000);
+    }
+}
+
 namespace {
 
 // Sixteen trajectories of 50 steps in lanes of four widths; the bits of each.
