@@ -21,7 +21,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "9faad2caa0da0fbd";
+    static constexpr const char* digest = "f6e787642dd0d969";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -159,6 +159,7 @@ struct pendulum {
 
     // (D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, entry_column.
     template <class given, class number, class Angles = lobatto::AnglesAnew>
+    LOBATTO_INLINE
     static void node(const CoefficientsOf<given>& k, const number* q, number* W, number* S, Angles angle = {}) {
         number sin_q, cos_q;
         angle.sincos(0, q[0], sin_q, cos_q);
@@ -168,6 +169,7 @@ struct pendulum {
 
     // (D1) W = M^-1 grad V(q) alone; n.
     template <class given, class number>
+    LOBATTO_INLINE
     static void acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
         W[0] = k.omega_squared * lobatto::sin(q[0]);
     }

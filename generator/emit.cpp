@@ -157,6 +157,12 @@ private:
         const double evaluation = cost_of("acceleration", "_slope"), with_slopes = cost_of("node", "_node");
         return with_slopes + 5 * static_cast<double>(d_.structure.entries.size()) <= 2 * evaluation;
     }
+    // Accelerations of few operations are put where they are used: a call would cost as much.
+    bool is_put_in_place(const Declaration& declaration) const {
+        const std::string name = declaration.program;
+        return d_.structure.form == Form::separable && !d_.structure.looped &&
+               (name == "node" || name == "acceleration") && cost_of("node", "_node") <= 200;
+    }
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
         const bool costly = is_costly();
@@ -363,6 +369,7 @@ private:
                     ? "    template <class given, class number, class Angles = lobatto::AnglesAnew>\n"
                 : any ? "    template <class given, class number>\n"
                       : "") +
+               (is_put_in_place(declaration) ? "    LOBATTO_INLINE\n" : "") +
                signature(type(declaration.result), declaration.program, parameters, text) + text + "    }\n";
     }
 

@@ -52,7 +52,7 @@ enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
 template <class K>
 struct Formulas {
     template <class Given, class Time, class... Rest>
-    static void node(const Given& k, Time time, Rest... rest) {
+    [[gnu::always_inline]] static inline void node(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::node(k, rest...);
         else
@@ -67,7 +67,7 @@ struct Formulas {
             K::template acceleration<How>(k, time, position, slope);
     }
     template <class Given, class Time, class... Rest>
-    static void acceleration(const Given& k, Time time, Rest... rest) {
+    [[gnu::always_inline]] static inline void acceleration(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::acceleration(k, rest...);
         else

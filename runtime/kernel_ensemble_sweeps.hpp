@@ -254,7 +254,8 @@ private:
         evaluate(k, time, a);
         residual(a, a.d);
         slopes_times(a, a.d, a.bend);
-        const Going at_first = sweep(a) & S_stands_for_W(a);
+        Going at_first = sweep(a);
+        at_first = at_first & S_stands_for_W(a);  // of what sweep() left
         evaluations = select(going, T(real(1)), T(real(0)));
         if (any(going & !at_first)) going = evaluate_again(k, time, going, at_first, a);
         for (int i = 0; i < values; ++i) {
