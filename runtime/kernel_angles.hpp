@@ -5,8 +5,8 @@
 //     sin x = sin x0 + (cos x0 sin delta + sin x0 (cos delta - 1)),
 //     cos x = cos x0 + (cos x0 (cos delta - 1) - sin x0 sin delta),
 // where |delta| <= pi/4, which is as far as the polynomials of kernel_functions.hpp reach. The error is absolute: below
-// 2.1 units of 2^-53 (tests/vector_functions_test.cpp). A function of a kernel that holds `angles` of them (node or stage,
-// see kernel_contract.hpp) asks its last argument for each, by its number: AnglesAnew, AnglesKept or AnglesNear.
+// 2.1 units of 2^-53 (tests/vector_functions_test.cpp). A function of a kernel that holds `angles` of them (node or
+// stage, see kernel_contract.hpp) asks its last argument for each, by its number: AnglesAnew, AnglesKept or AnglesNear.
 #ifndef LOBATTO_KERNEL_ANGLES_HPP
 #define LOBATTO_KERNEL_ANGLES_HPP
 
