@@ -189,12 +189,13 @@ private:
 
     // The sum of (x_i scale_i)^2.
     LOBATTO_INLINE static T size(const T* x, const T* scale) {
-        T sum = T(real(0));
+        T sum[2] = {T(real(0)), T(real(0))};  // two, which do not wait for each other
         for (int i = 0; i < values; ++i) {
             const T relative = x[i] * scale[i % n];
-            sum = i == 0 ? relative * relative : fused(relative, relative, sum);
+            T& part = sum[i % 2];
+            part = i < 2 ? relative * relative : fused(relative, relative, part);
         }
-        return sum;
+        return values > 1 ? sum[0] + sum[1] : sum[0];
     }
 
     template <class Given>
@@ -255,7 +256,7 @@ private:
         residual(a, a.d);
         slopes_times(a, a.d, a.bend);
         Going at_first = sweep(a);
-        at_first = at_first & S_stands_for_W(a);  // of what sweep() left
+        at_first = at_first & S_stands_for_W(a);  // of what the sweep has left, so not in one expression
         evaluations = select(going, T(real(1)), T(real(0)));
         if (any(going & !at_first)) going = evaluate_again(k, time, going, at_first, a);
         for (int i = 0; i < values; ++i) {
