@@ -36,6 +36,39 @@ std::string comment_safe(const std::string& text) {
     return safe;
 }
 
+// What `whole` costs, about, in additions: as one program, or as `part` of each repeated formula, row by row.
+double cost_of(const Programs& programs, const Structure& structure, const std::string& whole,
+               const std::string& part) {
+    double sum = 0;
+    for (const Program& program : programs.programs) {
+        if (program.name != whole && !program.name.ends_with(part)) continue;
+        std::vector<Id> values;
+        for (const Output& output : program.outputs) values.push_back(output.value);
+        const Operations operations = count(programs.graph, programs.graph.topological(values));
+        double rows = 1;
+        for (std::size_t e = 0; e < structure.elements.repeated.size(); ++e)
+            if (program.name == fmt::format("element_{}{}", e + 1, part))
+                rows = static_cast<double>(structure.elements.repeated[e].rows.size());
+        sum += rows * static_cast<double>(operations.additions + operations.multiplications + 8 * operations.divisions +
+                                          16 * operations.functions);
+    }
+    return sum;
+}
+
+// Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
+// and five products for each of them (measured).
+bool is_costly(const Programs& programs, const Structure& structure) {
+    const double evaluation = cost_of(programs, structure, "acceleration", "_slope"),
+                 with_slopes = cost_of(programs, structure, "node", "_node");
+    return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
+}
+
+// Whether sweeps are solved by accelerations alone, what is taken into the stage map left out of them.
+bool takes_remainder(const Programs& programs, const Structure& structure) {
+    return structure.diagonal_part && !structure.looped && !structure.is_explicit && !structure.clean &&
+           !is_costly(programs, structure);
+}
+
 // What sweeps evaluate at the nodes of a step.
 const char* swept_function(Form form) {
     return form == Form::general ? "stage" : "node";
@@ -133,40 +166,20 @@ private:
         return text;
     }
 
-    // What `whole` costs, about, in additions: as one program, or as `part` of each repeated formula, row by row.
-    double cost_of(const std::string& whole, const std::string& part) const {
-        double sum = 0;
-        for (const Program& program : p_.programs) {
-            if (program.name != whole && !program.name.ends_with(part)) continue;
-            std::vector<Id> values;
-            for (const Output& output : program.outputs) values.push_back(output.value);
-            const Operations operations = count(p_.graph, p_.graph.topological(values));
-            double rows = 1;
-            for (std::size_t e = 0; e < d_.structure.elements.repeated.size(); ++e)
-                if (program.name == fmt::format("element_{}{}", e + 1, part))
-                    rows = static_cast<double>(d_.structure.elements.repeated[e].rows.size());
-            sum += rows * static_cast<double>(operations.additions + operations.multiplications +
-                                              8 * operations.divisions + 16 * operations.functions);
-        }
-        return sum;
-    }
-
-    // Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less,
-    // about, and five products for each of them (measured).
-    bool is_costly() const {
-        const double evaluation = cost_of("acceleration", "_slope"), with_slopes = cost_of("node", "_node");
-        return with_slopes + 5 * static_cast<double>(d_.structure.entries.size()) <= 2 * evaluation;
-    }
     // Accelerations of few operations are put where they are used: a call would cost as much.
     bool is_put_in_place(const Declaration& declaration) const {
         const std::string name = declaration.program;
         return d_.structure.form == Form::separable && !d_.structure.looped &&
-               (name == "node" || name == "acceleration") && cost_of("node", "_node") <= 200;
+               (name == "node" || name == "acceleration" || name == "remainder") &&
+               cost_of(p_, d_.structure, "node", "_node") <= 200;
     }
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
-        const bool costly = is_costly();
-        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", costly),
+        const bool costly = is_costly(p_, d_.structure), remainder = takes_remainder(p_, d_.structure);
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool has_remainder = {};", remainder),
+                           remainder ? "forces without the part in the stage map are a function of their own"
+                                     : "forces have no function without a part") +
+               fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", costly),
                            costly ? "forces are evaluated less often for having second derivatives"
                                   : "second derivatives would cost more than the evaluations they save");
     }
@@ -176,7 +189,7 @@ private:
         const Structure& structure = d_.structure;
         if (structure.looped || options_.precision != Precision::double_) return false;
         const bool is_swept = structure.form == Form::separable && !structure.is_explicit && !structure.clean;
-        return structure.form == Form::general || (is_swept && is_costly());
+        return structure.form == Form::general || (is_swept && is_costly(p_, d_.structure));
     }
     std::string near_angles() const {
         if (is_map()) return "";
@@ -329,6 +342,7 @@ private:
     std::string body(const Declaration& declaration) const {
         const std::string name = declaration.program;
         if (d_.structure.looped && name != "event") return looped_.body(name);
+        if (name == "remainder" && !takes_remainder(p_, d_.structure)) return "";
         const auto program =
             std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
         if (program == p_.programs.end()) return "";
@@ -427,6 +441,8 @@ KernelSource emit_kernel(const Derivation& derivation, Programs programs, const 
     source.form = derivation.structure.form;
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
+    if (!takes_remainder(programs, derivation.structure))
+        std::erase_if(programs.programs, [](const Program& program) { return program.name == "remainder"; });
     source.report = optimise(programs);
     const Emitter emitter(derivation, programs, options);
     // The digest of the text with the digest left out, put in its place.

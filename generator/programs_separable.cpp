@@ -62,6 +62,7 @@ public:
         } else {
             if (d_.structure.unrolled) step();
             if (d_.structure.diagonal_part || d_.structure.absorbed) quadratic_part();
+            if (d_.structure.diagonal_part) remainder();
         }
         velocities_as_inputs();
         events();
@@ -138,6 +139,17 @@ private:
         for (std::size_t e = 0; e < d_.structure.entries.size(); ++e)
             values.push_back(stiffness(e, d_.structure.constant_hessian));
         program("quadratic_part", "S0", values);
+    }
+
+    // What V leaves without its quadratic part: W - D q without what cancels in it.
+    void remainder() {
+        std::vector<GiNaC::ex> gradient = d_.system.gradient;
+        for (const auto& [place, value] : d_.structure.constant_hessian.entries())
+            gradient[static_cast<std::size_t>(place.first)] -=
+                value * d_.system.q[static_cast<std::size_t>(place.second)];
+        Ids rest;
+        for (const GiNaC::ex& one : gradient) rest.push_back(convert(one));
+        program("remainder", "R", times(inverse_mass_, rest));
     }
 
     // (D20): the paper's Phi for one coordinate, the shift for a constant force.

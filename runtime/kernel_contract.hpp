@@ -18,7 +18,8 @@
 //   unknowns, `neighbours` that acceleration can go SideBySide (kernel_rows.hpp; with row_reach, how far its rows
 //   reach, in_passing, that it can go InPassing, and unit_masses), and `absorbed` says that quadratic_part(k, S0) gives
 //   a constant part of S to iterate with; `clean` (in loops) that steps are those of kernel_clean.hpp. Gauss's nodes
-//   stand between two ends of weight zero.
+//   stand between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal,
+//   D, and taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
 // Form::general: see kernel_general.hpp.
 // Forms separable and general: angles, how many arguments of sine and cosine together the function that sweeps evaluate
 //   holds (node, of costly forces, and stage); where there are any it takes one more argument, AnglesAnew by default,
@@ -72,6 +73,13 @@ struct Formulas {
             K::acceleration(k, rest...);
         else
             K::acceleration(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    [[gnu::always_inline]] static inline void remainder(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::remainder(k, rest...);
+        else
+            K::remainder(k, time, rest...);
     }
     template <class Given, class Time, class... Rest>
     static void slope(const Given& k, Time time, Rest... rest) {

@@ -146,10 +146,10 @@ private:
         for (int c = 0; c < n; ++c)
             for (int j = 0; j < m; ++j) to[j * n + c] = sum_of<m>(to[j * n + c], map_of(c).inner, j, r + c, n);
     }
-    // M (W - D X) - P.
+    // M (W - D X) - P; where K has a remainder, W holds W - D X while it is solved for X.
     LOBATTO_INLINE void residual(const Arrays& a, T* r) const {
         for (int i = 0; i < values; ++i) r[i] = -a.P[i];
-        if constexpr (absorbs) {
+        if constexpr (absorbs && !K::has_remainder) {
             T rest_of[values];
             for (int i = 0; i < values; ++i) rest_of[i] = fused(-diagonal[i % n], a.X[i], a.W[i]);
             add_mapped(rest_of, r);
@@ -205,8 +205,16 @@ private:
             if constexpr (K::costly)
                 Formulas<K>::node(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n,
                                   a.S + j * entries);
+            else if constexpr (K::has_remainder)
+                Formulas<K>::remainder(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
             else
                 Formulas<K>::acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+    }
+    // W at the nodes X.
+    template <class Given>
+    LOBATTO_INLINE void settle(const Given& k, real time, Arrays& a) const {
+        for (int j = 0; j < m; ++j)
+            Formulas<K>::acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
     }
 
     // X and P of these lanes move on by delta.
@@ -244,7 +252,7 @@ private:
             // Not beyond 1: a coordinate that began at rest moves by any multiple of nothing.
             e_before = minimum(e, T(real(1)));
         }
-        evaluate(k, time, a);
+        settle(k, time, a);
         return solved;
     }
 

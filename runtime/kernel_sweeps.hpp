@@ -72,8 +72,8 @@ private:
         return terms > 1 ? even + odd : even;
     }
 
-    // One sweep: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place. The size of
-    // what Y moved by; `displaced`: the same, in the measure for carrying.
+    // One sweep: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place, unless W is
+    // K's remainder. The size of what Y moved by; `displaced`: the same, in the measure for carrying.
     template <bool is_carried>
     LOBATTO_INLINE real sweep(Arrays& a, real& displaced) const {
         for (int p = 0; p < parts; ++p) {
@@ -83,7 +83,8 @@ private:
             else
                 for (int c = 0; c < n; ++c) r[c] = a.W[p * n + c];
             for (int c = 0; c < n; ++c) {
-                if constexpr (absorbs) r[c] = fused(-V(diagonal[c]), (is_carried ? a.Y : a.X)[p * n + c], r[c]);
+                if constexpr (absorbs && !K::has_remainder)
+                    r[c] = fused(-V(diagonal[c]), (is_carried ? a.Y : a.X)[p * n + c], r[c]);
                 lay_flat<1>(&r[c], 1, a.flat + (c * parts + p) * width);
             }
         }
@@ -123,6 +124,8 @@ private:
             else if constexpr (K::costly)
                 Formulas<K>::node(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n,
                                   a.S + p * entries);
+            else if constexpr (K::has_remainder)
+                Formulas<K>::remainder(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
             else
                 Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
     }
