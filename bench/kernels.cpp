@@ -98,7 +98,7 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, dou
 }
 
 // Where the iteration of a step ends, relative to the displacement in it; 0: at rounding.
-constexpr std::array tolerances = {0.0, 1e-12, 1e-10, 1e-9, 1e-7};
+constexpr std::array tolerances = {0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7};
 
 // Whether the energy error of a run a hundred times as long stays within ten times that of the run: a step beyond the
 // linear stability limit may look good at T and be lost at 3 T.

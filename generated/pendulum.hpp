@@ -21,7 +21,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "f6e787642dd0d969";
+    static constexpr const char* digest = "ec05864c69738335";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -45,6 +45,7 @@ struct pendulum {
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};
+    static constexpr bool has_remainder = false;  // forces have no function without a part
     static constexpr bool costly = true;        // forces are evaluated less often for having second derivatives
     static constexpr int angles = 1;            // whose sines and cosines node is given, anew or from those of angles near
 

@@ -119,9 +119,9 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
     std::set<std::string> taken;
     for (const Input& input : graph.inputs()) taken.insert(input.code.substr(0, input.code.find('[')));
     for (const char* name :
-         {"k",  "p",     "h",    "q",   "u",  "v",        "W",    "S",     "Q",        "F",          "J",
-          "W0", "W1",    "q1",   "p1",  "u1", "W_before", "base", "delta", "velocity", "z",          "g",
-          "H",  "value", "rows", "how", "Lv", "Lq",       "M",    "S0",    "time",     "not_finite", "Status"})
+         {"k",     "p",    "h",   "q",  "u",        "v",    "W",     "S",        "Q",          "F",     "J", "W0",
+          "W1",    "q1",   "p1",  "u1", "W_before", "base", "delta", "velocity", "z",          "g",     "R", "H",
+          "value", "rows", "how", "Lv", "Lq",       "M",    "S0",    "time",     "not_finite", "Status"})
         taken.insert(name);
     if (!angles.empty()) taken.insert("angle");
     const auto take = [&taken](const std::string& name) {  // false when it has another meaning

@@ -170,6 +170,25 @@ TEST_CASE("what sweeps evaluate is given sine and cosine of what moves, in packs
     }
 }
 
+TEST_CASE("what the stage map leaves of the forces is a function of its own, without what cancels") {
+    const SceneText star{"star", "(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - x^2*y + y^3/3", {"x", "y"}, {}};
+    const std::string header = kernel(star, 6).header;
+    CHECK(header.find("bool has_remainder = true;") != std::string::npos);
+    // R = (2 x y, x^2 - y^2): no term is linear.
+    const std::string remainder = body(header, "remainder");
+    INFO(remainder);
+    CHECK(count_of(remainder, "x * x") == 1);
+    CHECK(count_of(remainder, "y * y") == 1);
+    CHECK(count_of(remainder, " - ") == 1);
+    CHECK(count_of(remainder, " + ") == 0);
+    // Nothing is left out of these: no quadratic part; forces for which sweeps take second derivatives; no sweeps.
+    for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
+                                    kernel({"costly", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
+        CHECK(none.find("bool has_remainder = false;") != std::string::npos);
+        CHECK(none.find("void remainder(") == std::string::npos);
+    }
+}
+
 TEST_CASE("what acceleration and its derivative have in common is computed once in node") {
     const std::string node = body(kernel({"shared", "q'^2/2 - exp(a*sin(q)^2)", {"q"}, {"a"}}).header, "node");
     CHECK(count_of(node, "exp(") == 1);
@@ -271,6 +290,11 @@ TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suit
                     {"angles", "Angles", "angle"},
                     {"m", "near"}},
                    {3});
+    check_compiles({"rest",
+                    "m*(R'^2 + remainder'^2)/2 - (R^2 + remainder^2)/2 - R^2*remainder*has_remainder",
+                    {"R", "remainder"},
+                    {"m", "has_remainder"}},
+                   {5});
 }
 
 TEST_CASE("a parameter named as a local of prepare does not take the local's place") {
