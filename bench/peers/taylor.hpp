@@ -272,16 +272,16 @@ inline double root_of_inverse(double x, int n) {
     return root_of_inverse(Eight{} + x, n)[0];
 }
 
-// The state by its series at h: even and odd powers apart.
+// The state by its series at h: even and odd powers apart, what is added to the state rounded once.
 template <class Problem, class real, class number>
 void advance(Expansion<Problem, real>& x, number h, int order) {
     const number h2 = h * h;
     for (auto& y : x.y) {
         const int even = order - order % 2, odd = order - 1 + order % 2;
         number E = y[even], O = y[odd];
-        for (int k = even; (k -= 2) >= 0;) E = E * h2 + y[k];
-        for (int k = odd; (k -= 2) >= 0;) O = O * h2 + y[k];
-        y[0] = E + h * O;
+        for (int k = even; (k -= 2) >= 2;) E = E * h2 + y[k];
+        for (int k = odd; (k -= 2) >= 1;) O = O * h2 + y[k];
+        y[0] += h * O + h2 * E;
     }
 }
 
@@ -339,7 +339,7 @@ AdaptiveCount integrate_taylor(Expansion<Problem, real>& x, double until, double
         }
         return most;
     };
-    number t{};
+    number t{}, lost{};  // the time, and what its roundings have added
     AdaptiveCount counts{0, 0};
     while (any(t < until)) {
         x.expand(order);
@@ -347,14 +347,16 @@ AdaptiveCount integrate_taylor(Expansion<Problem, real>& x, double until, double
         size = size > 1 ? size : number{} + 1;  // errors relative to large states, absolute beside small ones
         const number last = root_of_inverse(largest(order) / size, order);
         const number before = root_of_inverse(largest(order - 1) / size, order - 1);
-        const number left = until - t;
+        const number left = (until - t) + lost;
         number h = factor * (last < before ? last : before);
         const auto arrives = h >= left;
         h = arrives ? left : h;
         if (any((t < until) & !(h > 1e-12 * until))) return {-1, 0};
         advance(x, h, order);
         counts.steps += in_rows ? 1 : count(t < until);
-        t = arrives ? number{} + until : t + h;
+        const number step = h - lost, next = t + step;
+        lost = (next - t) - step;
+        t = arrives ? number{} + until : next;
     }
     return counts;
 }
