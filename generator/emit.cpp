@@ -63,9 +63,12 @@ bool is_costly(const Programs& programs, const Structure& structure) {
     return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
 }
 
-// Whether sweeps are solved by accelerations alone, what is taken into the stage map left out of them.
+// Whether sweeps are solved by accelerations alone, without what is taken into the stage map. Passes may change what is
+// costly: a program that was left out before them stays so.
 bool takes_remainder(const Programs& programs, const Structure& structure) {
-    return structure.diagonal_part && !structure.looped && !structure.is_explicit && !structure.clean &&
+    const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
+                                      [](const Program& program) { return program.name == "remainder"; });
+    return is_there && !structure.looped && !structure.is_explicit && !structure.clean &&
            !is_costly(programs, structure);
 }
 
@@ -74,19 +77,33 @@ const char* swept_function(Form form) {
     return form == Form::general ? "stage" : "node";
 }
 
-// The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered.
+// The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered. Not
+// those beside a quotient whose divisor moves with the same: in sin(r)/r both must come from the same digits of a small
+// r.
 std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
     std::vector<Id> values;
     for (const Output& output : program.outputs) values.push_back(output.value);
-    const auto moves = [&graph](Id id) {
-        return graph[id].op == Op::input && graph[id].stage > Stage::step_size && graph.input_of(id).code != "time";
+    const auto moving_below = [&graph](Id id) {
+        std::set<Id> inputs;
+        for (const Id one : graph.topological({id}))
+            if (graph[one].op == Op::input && graph[one].stage > Stage::step_size && graph.input_of(one).code != "time")
+                inputs.insert(one);
+        return inputs;
     };
+    const std::vector<Id> all = graph.topological(values);
+    std::set<Id> dividing;
+    for (const Id id : all) {
+        const Node& node = graph[id];
+        if ((node.op == Op::power && node.index < 0) || node.op == Op::raise || node.op == Op::log)
+            dividing.merge(moving_below(node.operands[0]));
+    }
     std::map<Id, int> halves, angles;
-    for (const Id id : graph.topological(values)) {
+    for (const Id id : all) {
         if (graph[id].op != Op::pair_sine && graph[id].op != Op::pair_cosine) continue;
         const Id pair = graph[id].operands[0];
-        const std::vector<Id> below = graph.topological({pair});
-        if (++halves[pair] == 2 && std::any_of(below.begin(), below.end(), moves))
+        const std::set<Id> inputs = moving_below(pair);
+        const auto divides = [&dividing](Id input) { return dividing.contains(input); };
+        if (++halves[pair] == 2 && !inputs.empty() && std::none_of(inputs.begin(), inputs.end(), divides))
             angles.emplace(pair, static_cast<int>(angles.size()));
     }
     return angles;
@@ -166,9 +183,11 @@ private:
         return text;
     }
 
-    // Accelerations of few operations are put where they are used: a call would cost as much.
+    // Accelerations of few operations are put where they are used: a call would cost as much. So is a stage that gives
+    // angles near: at the start of a step nothing else is asked of it.
     bool is_put_in_place(const Declaration& declaration) const {
         const std::string name = declaration.program;
+        if (name == "stage") return takes_angles(declaration);
         return d_.structure.form == Form::separable && !d_.structure.looped &&
                (name == "node" || name == "acceleration" || name == "remainder") &&
                cost_of(p_, d_.structure, "node", "_node") <= 200;

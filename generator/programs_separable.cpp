@@ -147,8 +147,13 @@ private:
         for (const auto& [place, value] : d_.structure.constant_hessian.entries())
             gradient[static_cast<std::size_t>(place.first)] -=
                 value * d_.system.q[static_cast<std::size_t>(place.second)];
+        // Expanded where that leaves fewer terms: then some cancelled.
+        const auto terms = [](const GiNaC::ex& e) { return GiNaC::is_a<GiNaC::add>(e) ? e.nops() : 1; };
         Ids rest;
-        for (const GiNaC::ex& one : gradient) rest.push_back(convert(one));
+        for (const GiNaC::ex& one : gradient) {
+            const GiNaC::ex open = one.expand();
+            rest.push_back(convert(terms(open) < terms(one) ? open : one));
+        }
         program("remainder", "R", times(inverse_mass_, rest));
     }
 

@@ -47,12 +47,12 @@ constexpr double near_below = 0.7853981633974483;  // pi/4
 // x, in the lanes that are too far from `angle`, takes its place there.
 template <class T>
 [[gnu::noinline, gnu::cold]] void recentre(Angle<T>& angle, const T& x) {
-    const auto far = fabs(x - angle.x) > near_below;
+    const auto near = fabs(x - angle.x) <= near_below;  // not where one of them is not a number
     T sine, cosine;
     lobatto::sincos(x, sine, cosine);
-    angle.x = select(far, x, angle.x);
-    angle.sine = select(far, sine, angle.sine);
-    angle.cosine = select(far, cosine, angle.cosine);
+    angle.x = select(near, angle.x, x);
+    angle.sine = select(near, angle.sine, sine);
+    angle.cosine = select(near, angle.cosine, cosine);
 }
 
 // The sine and cosine of x0 + delta from those of x0.
@@ -78,7 +78,7 @@ struct AnglesNear {
     LOBATTO_INLINE void sincos(int i, const T& x, T& sine, T& cosine) const {
         Angle<T>& near = angles[i];
         T delta = x - near.x;
-        if (__builtin_expect(any(fabs(delta) > functions::near_below), 0)) {
+        if (__builtin_expect(!all(fabs(delta) <= functions::near_below), 0)) {
             functions::recentre(near, x);
             delta = x - near.x;
         }

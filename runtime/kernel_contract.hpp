@@ -96,7 +96,7 @@ struct Formulas {
             K::slopes(k, time, rest...);
     }
     template <class Given, class Time, class... Rest>
-    static void stage(const Given& k, Time time, Rest... rest) {
+    [[gnu::always_inline]] static inline void stage(const Given& k, Time time, Rest... rest) {
         if constexpr (K::autonomous)
             K::stage(k, rest...);
         else

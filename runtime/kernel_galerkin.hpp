@@ -217,7 +217,8 @@ private:
         return solved;
     }
 
-    // The angles at the start of the step are those that all its nodes are near, whatever the last step did.
+    // The angles at the start of the step are those that all its nodes are near; those of velocities with the velocity
+    // of the last step's last node. Nothing else of the stage is computed.
     template <class Given>
     LOBATTO_INLINE void look_around(const Given& k, real time, const T* q, Arrays& a) const {
         using Start = Pack<real, lanes_of<T>>;

@@ -153,11 +153,12 @@ TEST_CASE("what sweeps evaluate is given sine and cosine of what moves, in packs
     CHECK(count_of(body(two.header, "stage"), "angle.sincos(") == 2);
     CHECK(body(two.header, "stage").find("lobatto::sincos(") == std::string::npos);
     CHECK(count_of(two.header, "angle.sincos(") == 2);
-    // A lone sine; time; other precisions; loops.
+    // A lone sine; beside a quotient that needs its digits; time; other precisions.
     EmitOptions single;
     single.precision = Precision::single;
     for (const KernelSource& none :
-         {kernel({"lone", "q'^2/2 + p'^2/2 - p^2*exp(q)*sin(a)", {"q", "p"}, {"a"}}),
+         {kernel({"lone", "q'^2/2*(1 + q^2) + cos(q)", {"q"}, {}}),
+          kernel({"quotient", "q'^2/2 + p'^2/2 + sin(sqrt(p^2 + q^2))/sqrt(p^2 + q^2)", {"q", "p"}, {}}),
           emit(
               derive(read_scene(Source("time.toml",
                                        "title = 'time'\nlagrangian = \"q'^2*(1 + q^2) + q*sin(t)*cos(t)\"\ntime = 't'\n"
@@ -181,7 +182,10 @@ TEST_CASE("what the stage map leaves of the forces is a function of its own, wit
     CHECK(count_of(remainder, "y * y") == 1);
     CHECK(count_of(remainder, " - ") == 1);
     CHECK(count_of(remainder, " + ") == 0);
-    // Nothing is left out of these: no quadratic part; forces for which sweeps take second derivatives; no sweeps.
+    // An offset: the terms that cancel do so after expansion.
+    CHECK(count_of(body(kernel({"offset", "x'^2/2 - (x - 1)^2/2 - x^3/30", {"x"}, {}}, 6).header, "remainder"),
+                   " * ") <= 2);
+    // Nothing is left out of these: no quadratic part; forces for which sweeps take second derivatives.
     for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
                                     kernel({"costly", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
         CHECK(none.find("bool has_remainder = false;") != std::string::npos);
@@ -295,6 +299,8 @@ TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suit
                     {"R", "remainder"},
                     {"m", "has_remainder"}},
                    {5});
+    // Costly as derived, not so after the passes.
+    check_compiles({"eighth", "x'^2/2 - x^2/2 - x^3/3 - x^4/4 - x^5/5 - x^6/6 - x^7/7 - x^8/8", {"x"}, {}}, {5});
 }
 
 TEST_CASE("a parameter named as a local of prepare does not take the local's place") {

@@ -57,21 +57,34 @@ WRITTEN_OUT inline auto sum_of(const Term& term) {
     return real((sums[0] + sums[1]) + (sums[2] + sums[3]));
 }
 
-// Coefficient k of a product, of a square, and of the product without a_0 b_k.
+// Coefficient k of a product, of a square, and of the product without a_0 b_k; the newest coefficients come last, so
+// that the others need not wait for them.
 template <int k, class real>
 WRITTEN_OUT inline real product(const Series<real>& a, const Series<real>& b) {
-    return sum_of<k + 1>([&](auto j) WRITTEN_OUT { return a[j] * b[k - j]; });
+    if constexpr (k == 0)
+        return a[0] * b[0];
+    else if constexpr (k == 1)
+        return a[0] * b[1] + a[1] * b[0];
+    else
+        return sum_of<k - 1>([&](auto j) WRITTEN_OUT { return a[j + 1] * b[k - 1 - j]; }) + (a[0] * b[k] + a[k] * b[0]);
 }
 template <int k, class real>
 WRITTEN_OUT inline real square(const Series<real>& a) {
-    real sum = sum_of<(k + 1) / 2>([&](auto j) WRITTEN_OUT { return a[j] * a[k - j]; });
+    if constexpr (k == 0) return a[0] * a[0];
+    real sum = a[0] * a[k];
+    if constexpr (k > 2) sum += sum_of<(k - 1) / 2>([&](auto j) WRITTEN_OUT { return a[j + 1] * a[k - 1 - j]; });
     sum += sum;
     if constexpr (k % 2 == 0) sum += a[k / 2] * a[k / 2];
     return sum;
 }
 template <int k, class real>
 WRITTEN_OUT inline real later_product(const Series<real>& a, const Series<real>& b) {
-    return sum_of<k>([&](auto j) WRITTEN_OUT { return a[j + 1] * b[k - 1 - j]; });
+    if constexpr (k == 0)
+        return real{};
+    else if constexpr (k == 1)
+        return a[1] * b[0];
+    else
+        return sum_of<k - 1>([&](auto j) WRITTEN_OUT { return a[j + 1] * b[k - 1 - j]; }) + a[k] * b[0];
 }
 
 // The type of constants beside a number: Eight takes double for each of its parts.
@@ -113,7 +126,7 @@ template <class real>
 struct Expansion<Pendulum, real> {
     Series<real> y[2], s, c;
     void expand(int order) {
-        auto& [q, p] = y;
+        auto &q = y[0], &p = y[1];
         s[0] = sine(q[0]);
         c[0] = cosine(q[0]);
         for_orders(order, [&](auto k) WRITTEN_OUT {
@@ -128,7 +141,7 @@ template <class real>
 struct Expansion<HenonHeiles, real> {
     Series<real> y[4];
     void expand(int order) {
-        auto& [x1, x2, p1, p2] = y;
+        auto &x1 = y[0], &x2 = y[1], &p1 = y[2], &p2 = y[3];
         for_orders(order, [&](auto k) WRITTEN_OUT {
             constexpr auto factor = inverse<real, k + 1>;
             x1[k + 1] = factor * p1[k];
@@ -143,7 +156,7 @@ template <class real>
 struct Expansion<DoublePendulum, real> {
     Series<real> y[4], slope_a, slope_b, slope_d, sine_a, cosine_a, sine_b, cosine_b, s, c, determinant, coupling;
     void expand(int order) {
-        auto& [a, b, pa, pb] = y;
+        auto &a = y[0], &b = y[1], &pa = y[2], &pb = y[3];
         constexpr Constant<real> g = DoublePendulum::g;
         sine_a[0] = sine(a[0]);
         cosine_a[0] = cosine(a[0]);
@@ -179,7 +192,7 @@ template <class real>
 struct Expansion<Kepler, real> {
     Series<real> y[4], r2, w;  // w = |q|^-3
     void expand(int order) {
-        auto& [x1, x2, p1, p2] = y;
+        auto &x1 = y[0], &x2 = y[1], &p1 = y[2], &p2 = y[3];
         r2[0] = x1[0] * x1[0] + x2[0] * x2[0];
         const real over = 1 / r2[0];
         w[0] = over * over * square_root(r2[0]);
@@ -187,9 +200,13 @@ struct Expansion<Kepler, real> {
             if constexpr (k > 0) {
                 // k r2 w' + 3/2 r2' w = 0.
                 r2[k] = square<k>(x1) + square<k>(x2);
-                w[k] = over * sum_of<k>([&](auto j) WRITTEN_OUT {
-                           return -((3 * k - j) * inverse<real, 2 * k>)*r2[k - j] * w[j];
-                       });
+                const auto term = [&](auto j)
+                                      WRITTEN_OUT { return -((3 * k - j) * inverse<real, 2 * k>)*r2[k - j] * w[j]; };
+                real sum = term(std::integral_constant<int, 0>());
+                if constexpr (k > 1)
+                    sum +=
+                        sum_of<k - 1>([&](auto j) WRITTEN_OUT { return term(std::integral_constant<int, j + 1>()); });
+                w[k] = over * sum;
             }
             constexpr auto factor = inverse<real, k + 1>;
             x1[k + 1] = factor * p1[k];
@@ -351,7 +368,7 @@ AdaptiveCount integrate_taylor(Expansion<Problem, real>& x, double until, double
         number h = factor * (last < before ? last : before);
         const auto arrives = h >= left;
         h = arrives ? left : h;
-        if (any((t < until) & !(h > 1e-12 * until))) return {-1, 0};
+        if (any((t < until) & !arrives & !(h > 1e-12 * until))) return {-1, 0};
         advance(x, h, order);
         counts.steps += in_rows ? 1 : count(t < until);
         const number step = h - lost, next = t + step;
