@@ -78,8 +78,7 @@ const char* swept_function(Form form) {
 }
 
 // The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered. Not
-// those beside a quotient whose divisor moves with the same: in sin(r)/r both must come from the same digits of a small
-// r.
+// those beside a quotient whose divisor moves with the same: in sin(r)/r both must come from the same digits of r.
 std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
     std::vector<Id> values;
     for (const Output& output : program.outputs) values.push_back(output.value);
@@ -192,6 +191,7 @@ private:
                (name == "node" || name == "acceleration" || name == "remainder") &&
                cost_of(p_, d_.structure, "node", "_node") <= 200;
     }
+
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
         const bool costly = is_costly(p_, d_.structure), remainder = takes_remainder(p_, d_.structure);
