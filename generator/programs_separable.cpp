@@ -151,7 +151,7 @@ private:
         const auto terms = [](const GiNaC::ex& e) { return GiNaC::is_a<GiNaC::add>(e) ? e.nops() : 1; };
         Ids rest;
         for (const GiNaC::ex& one : gradient) {
-            const GiNaC::ex open = one.expand();
+            const GiNaC::ex open = expanded(one);
             rest.push_back(convert(terms(open) < terms(one) ? open : one));
         }
         program("remainder", "R", times(inverse_mass_, rest));

@@ -185,6 +185,10 @@ TEST_CASE("what the stage map leaves of the forces is a function of its own, wit
     // An offset: the terms that cancel do so after expansion.
     CHECK(count_of(body(kernel({"offset", "x'^2/2 - (x - 1)^2/2 - x^3/30", {"x"}, {}}, 6).header, "remainder"),
                    " * ") <= 2);
+    // Towers of powers are not written out: no memory has room for their terms.
+    const std::string tower =
+        kernel({"tower", "q'^2/2 + p'^2/2 - (q^2 + p^2)/2 - ((p + q^64)^64 + q)^64", {"q", "p"}, {}}, 6).header;
+    CHECK(tower.size() < 20000);
     // Nothing is left out of these: no quadratic part; forces for which sweeps take second derivatives.
     for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
                                     kernel({"costly", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
