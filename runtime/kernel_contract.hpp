@@ -32,6 +32,7 @@
 #include <utility>
 
 #include "kernel_numbers.hpp"
+#include "kernel_pack.hpp"
 
 namespace lobatto {
 
@@ -226,7 +227,8 @@ struct Pause {
     }
 };
 
-// Room for a step's arrays: on the stack while they are few, else in the stepper.
+// Room for a step's arrays: on the stack while they are few, else in the stepper. In line, so that they are registers
+// where there are enough, and what the step refers to need not lie in memory for a call.
 template <class Arrays>
 struct Workspace {
     struct Nothing {};
@@ -234,7 +236,7 @@ struct Workspace {
     mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
 
     template <class Use>
-    auto with(const Use& use) const {
+    LOBATTO_INLINE auto with(const Use& use) const {
         if constexpr (is_large) {
             return use(kept);
         } else {
