@@ -111,7 +111,7 @@ void emit_scene(const EmitCommand& options) {
     options.method.apply(scene);
     check_digits(scene, options.precision);
     const KernelSource source =
-        emit(derive(scene, options.general), {options.precision, options.standalone ? kernel_hpp_text : std::string()});
+        emit(derive(scene, options.general), {options.precision, options.standalone ? support_text() : std::string()});
 
     std::error_code error;
     fs::create_directories(options.folder, error);
@@ -126,7 +126,7 @@ void emit_scene(const EmitCommand& options) {
                             options.scene));
         const fs::path support = fs::path(options.folder) / "kernel.hpp";
         keep_scene(options.scene, support);
-        write_atomically(support, kernel_hpp_text);
+        write_atomically(support, support_text());
     }
     write_atomically(path, source.header);
     print_report(source.report);

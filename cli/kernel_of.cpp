@@ -43,7 +43,9 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
     if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
-    for (const std::string& part : {kernel_abi_h_text, kernel_hpp_text, source.header, kernel_export_hpp_text})
+    std::vector<std::string> names = {source.stepper, "kernel_angles.hpp", "kernel_events.hpp"};
+    if (together > 0) names.push_back("kernel_ensemble.hpp");
+    for (const std::string& part : {kernel_abi_h_text, support_text(names), source.header, kernel_export_hpp_text})
         append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
     return translation;

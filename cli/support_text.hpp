@@ -3,11 +3,22 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace lobatto {
 
-extern const std::string kernel_hpp_text;         // runtime/kernel.hpp with the parts that it includes, as one file
+struct SupportPart {
+    std::string name, text;  // kernel_NAME.hpp and what it says
+};
+
+// The parts of runtime/kernel.hpp; each stands after those that it includes.
+extern const std::vector<SupportPart> support_parts;
 extern const std::string kernel_abi_h_text;       // runtime/kernel_abi.h
 extern const std::string kernel_export_hpp_text;  // runtime/kernel_export.hpp
+
+// The named parts and those that they include, as one file. Throws std::logic_error for a name that is none.
+std::string support_text(const std::vector<std::string>& names);
+// All parts as one file: runtime/kernel.hpp.
+std::string support_text();
 
 }  // namespace lobatto

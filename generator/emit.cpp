@@ -453,11 +453,21 @@ private:
     std::map<Id, int> angles_;  // of the function that sweeps evaluate, where they may be near others
 };
 
+// Where the Stepper of a kernel is; as stepping_of in runtime/kernel_contract.hpp.
+std::string stepper_of(const Structure& structure) {
+    if (structure.form == Form::linear_map) return "kernel_linear.hpp";
+    if (structure.form == Form::general) return "kernel_general.hpp";
+    return structure.clean         ? "kernel_clean.hpp"
+           : structure.is_explicit ? "kernel_explicit.hpp"
+                                   : "kernel_separable.hpp";
+}
+
 }  // namespace
 
 KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options) {
     KernelSource source;
     source.form = derivation.structure.form;
+    source.stepper = stepper_of(derivation.structure);
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
     if (!takes_remainder(programs, derivation.structure))

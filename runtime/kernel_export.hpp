@@ -2,80 +2,65 @@
 // Wraps an emitted kernel K into the C structure of kernel_abi.h. Compiled into every kernel library, after kernel.hpp.
 #pragma once
 
+#include <cstddef>
 #include <new>
+#include <type_traits>
 
 #include "kernel.hpp"
 #include "kernel_abi.h"
 
 namespace lobatto {
 
-template <class K, int lanes>
-struct EnsembleType {
-    using type = Ensemble<K, lanes>;
-};
-struct NothingType {
-    struct type {};
+// In a library of single trajectories, and where trajectories side by side would be no faster.
+struct NoEnsemble {
+    static constexpr std::int32_t lanes = 0, bytes = 0, alignment = 0;
+    static constexpr std::nullptr_t prepare{}, start{}, advance{}, state{}, energy{};
 };
 
-// The functions of an ensemble of LOBATTO_ENSEMBLES trajectories or more; none without that.
-template <class K>
-struct ExportEnsemble {
-    using real = typename K::real;
 #ifdef LOBATTO_ENSEMBLES
-    static constexpr int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES);
-#else
-    static constexpr int lanes = 0;
-#endif
-    using Side = typename std::conditional_t<(lanes > 0), EnsembleType<K, (lanes > 0 ? lanes : 1)>, NothingType>::type;
-    static constexpr std::int32_t bytes = lanes > 0 ? sizeof(Side) : 0, alignment = lanes > 0 ? alignof(Side) : 0;
+// The functions of `lanes` trajectories side by side.
+template <class K, int width>
+struct ExportLanes {
+    using real = typename K::real;
+    using Side = Ensemble<K, width>;
+    static constexpr std::int32_t lanes = width, bytes = sizeof(Side), alignment = alignof(Side);
 
-    static const real* in(const void* numbers) {
-        return static_cast<const real*>(numbers);
-    }
-    static real* out(void* numbers) {
-        return static_cast<real*>(numbers);
-    }
+    static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
+    static real* out(void* numbers) { return static_cast<real*>(numbers); }
 
     // `use` with the statuses of the lanes.
     template <class Use>
     static void with(std::int32_t* codes, const Use& use) {
-        if constexpr (lanes > 0) {
-            Status status[lanes > 0 ? lanes : 1];
-            for (int lane = 0; lane < lanes; ++lane) status[lane] = static_cast<Status>(codes[lane]);
-            use(+status);
-            for (int lane = 0; lane < lanes; ++lane) codes[lane] = static_cast<std::int32_t>(status[lane]);
-        }
+        Status status[lanes];
+        for (int lane = 0; lane < lanes; ++lane) status[lane] = static_cast<Status>(codes[lane]);
+        use(+status);
+        for (int lane = 0; lane < lanes; ++lane) codes[lane] = static_cast<std::int32_t>(status[lane]);
     }
-    static void make(void* ensemble, const void* parameters, const void* step, std::int32_t* codes) {
+    static void prepare(void* ensemble, const void* parameters, const void* step, std::int32_t* codes) {
+        with(codes, [&](Status* status) { (new (ensemble) Side)->prepare(in(parameters), *in(step), status); });
+    }
+    static void start(void* ensemble, const void* time, const void* q, const void* p, std::int32_t* codes) {
+        with(codes, [&](Status* status) { static_cast<Side*>(ensemble)->start(*in(time), in(q), in(p), status); });
+    }
+    static void advance(void* ensemble, std::int64_t steps, double tolerance, std::int32_t* codes, std::int64_t* done,
+                        std::int64_t* iterations) {
         with(codes, [&](Status* status) {
-            if constexpr (lanes > 0) (new (ensemble) Side)->prepare(in(parameters), *in(step), status);
+            static_cast<Side*>(ensemble)->advance(steps, static_cast<real>(tolerance), status, done, iterations);
         });
     }
-    static void begin(void* ensemble, const void* time, const void* q, const void* p, std::int32_t* codes) {
-        with(codes, [&](Status* status) {
-            if constexpr (lanes > 0) static_cast<Side*>(ensemble)->start(*in(time), in(q), in(p), status);
-        });
+    static void state(const void* ensemble, void* q, void* p) {
+        static_cast<const Side*>(ensemble)->state(out(q), out(p));
     }
-    static void go(void* ensemble, std::int64_t steps, double tolerance, std::int32_t* codes, std::int64_t* done,
-                   std::int64_t* iterations) {
-        with(codes, [&](Status* status) {
-            if constexpr (lanes > 0)
-                static_cast<Side*>(ensemble)->advance(steps, static_cast<real>(tolerance), status, done, iterations);
-        });
-    }
-    static void read(const void* ensemble, void* q, void* p) {
-        if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->state(out(q), out(p));
-    }
-    static void measure(const void* ensemble, void* value) {
-        if constexpr (lanes > 0) static_cast<const Side*>(ensemble)->energy(out(value));
-    }
-
-    static constexpr auto prepare = lanes > 0 ? make : nullptr;
-    static constexpr auto start = lanes > 0 ? begin : nullptr;
-    static constexpr auto advance = lanes > 0 ? go : nullptr;
-    static constexpr auto state = lanes > 0 ? read : nullptr;
-    static constexpr auto energy = lanes > 0 ? measure : nullptr;
+    static void energy(const void* ensemble, void* value) { static_cast<const Side*>(ensemble)->energy(out(value)); }
 };
+
+// An ensemble of LOBATTO_ENSEMBLES trajectories or more.
+template <class K, int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+using ExportEnsemble = std::conditional_t<(lanes > 0), ExportLanes<K, lanes>, NoEnsemble>;
+#else
+template <class>
+using ExportEnsemble = NoEnsemble;
+#endif
 
 template <class K>
 struct Export {

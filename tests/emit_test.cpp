@@ -58,7 +58,7 @@ std::size_t count_of(const std::string& text, const std::string& part) {
 // Compiles the header and ten steps with every warning an error; runs them; the compiler's complaints, or "".
 std::string complaints(const KernelSource& source) {
     const test::TemporaryFolder folder;
-    test::write_text(folder / "kernel.hpp", kernel_hpp_text);
+    test::write_text(folder / "kernel.hpp", support_text());
     test::write_text(folder / (source.name + ".hpp"), source.header);
     test::write_text(folder / "program.cpp",
                      fmt::format("#include \"{0}.hpp\"\n"
@@ -259,7 +259,7 @@ TEST_CASE("a derivative that cancels to nothing is no disagreement between passe
 TEST_CASE("two standalone headers can be included in one program" * doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     EmitOptions options;
-    options.standalone_support = kernel_hpp_text;
+    options.standalone_support = support_text();
     SceneText other = pendulum;
     other.name = "other";
     for (const SceneText& scene : {pendulum, other})

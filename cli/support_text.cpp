@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/support_text.hpp"
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+namespace lobatto {
+namespace {
+
+constexpr std::string_view include = "#include \"";
+
+// The file that a line includes from beside its own; empty if none.
+std::string included(const std::string& line) {
+    if (!line.starts_with(include)) return {};
+    return line.substr(include.size(), line.find('"', include.size()) - include.size());
+}
+
+void need(const std::string& name, std::set<std::string>& needed) {
+    if (!needed.insert(name).second) return;
+    const auto part = std::find_if(support_parts.begin(), support_parts.end(),
+                                   [&](const SupportPart& candidate) { return candidate.name == name; });
+    if (part == support_parts.end()) throw std::logic_error("there is no support header " + name);
+    std::istringstream lines(part->text);
+    for (std::string line; std::getline(lines, line);)
+        if (const std::string other = included(line); !other.empty()) need(other, needed);
+}
+
+}  // namespace
+
+std::string support_text(const std::vector<std::string>& names) {
+    std::set<std::string> needed;
+    for (const std::string& name : names) need(name, needed);
+    std::string whole;
+    for (const SupportPart& part : support_parts) {
+        if (!needed.contains(part.name)) continue;
+        std::istringstream lines(part.text);
+        for (std::string line; std::getline(lines, line);)
+            if (included(line).empty()) whole += line + '\n';
+    }
+    return whole;
+}
+
+std::string support_text() {
+    std::vector<std::string> names;
+    for (const SupportPart& part : support_parts) names.push_back(part.name);
+    return support_text(names);
+}
+
+}  // namespace lobatto
