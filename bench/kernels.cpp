@@ -100,16 +100,30 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, dou
 // Where the iteration of a step ends, relative to the displacement in it; 0: at rounding.
 constexpr std::array tolerances = {0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7};
 
+// `steps` steps of h of each trajectory.
+using Run = std::function<Effort(double h, std::int64_t steps, std::vector<Trajectory>& trajectories)>;
+
+Run run_of(const Kernel& kernel, double tolerance) {
+    const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
+    return [stepper, tolerance](double h, std::int64_t steps, std::vector<Trajectory>& trajectories) -> Effort {
+        const lobatto_kernel& table = stepper->kernel().table();
+        if (table.lanes > 0) return run_lanes(table, h, steps, tolerance, trajectories);
+        if (stepper->prepare({}, h) != LOBATTO_OK) return {};
+        return one_by_one(trajectories,
+                          [&](Trajectory& trajectory) { return run_one(*stepper, steps, tolerance, trajectory); });
+    };
+}
+
 // Whether the energy error of a run a hundred times as long stays within ten times that of the run: a step beyond the
 // linear stability limit may look good at T and be lost at 3 T.
-bool endures(const Problem& problem, LoadedStepper<double>& stepper, std::int64_t steps, double tolerance,
-             Trajectory trajectory) {
+bool endures(const Problem& problem, const Run& run, std::int64_t steps, const Trajectory& start) {
     constexpr std::int64_t looks = 16, times = 100;
     constexpr double rounding = 1e-13;
-    const double H0 = energy_of(problem, trajectory);
+    const double h = problem.until / static_cast<double>(steps), H0 = energy_of(problem, start);
+    std::vector<Trajectory> one = {start};
     const auto error_after = [&](std::int64_t count) {
-        if (!run_one(stepper, count, tolerance, trajectory).good) return std::numeric_limits<double>::infinity();
-        return std::fabs(energy_of(problem, trajectory) / H0 - 1);
+        if (!run(h, count, one).good) return std::numeric_limits<double>::infinity();
+        return std::fabs(energy_of(problem, one.front()) / H0 - 1);
     };
     double largest = rounding;
     for (std::int64_t look = 0; look < looks; ++look) {
@@ -122,29 +136,32 @@ bool endures(const Problem& problem, LoadedStepper<double>& stepper, std::int64_
     return true;
 }
 
-Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel) {
-    const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
+Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel,
+                         std::int64_t together) {
+    const Run run = run_of(kernel, tolerance);
     // Beyond this, of which `lobatto run` warns, a step must prove itself.
     const double longest = stability_limit(quadrature_of(method)) / problem.frequency;
     const auto proven = std::make_shared<std::map<std::int64_t, bool>>();
-    const auto run = [stepper, tolerance, longest, proven, &problem](double setting,
-                                                                     std::vector<Trajectory>& trajectories) -> Effort {
+    const auto race = [run, longest, proven, &problem](double setting,
+                                                       std::vector<Trajectory>& trajectories) -> Effort {
         const double h = problem.until / setting;
         const auto steps = static_cast<std::int64_t>(setting);
-        if (h > longest && proven->count(steps) == 0)
-            (*proven)[steps] = stepper->prepare({}, h) == LOBATTO_OK &&
-                               endures(problem, *stepper, steps, tolerance, trajectories.front());
-        if (h > longest && !proven->at(steps)) return {};
-        const lobatto_kernel& table = stepper->kernel().table();
-        if (trajectories.size() > 1 && table.lanes > 0) return run_lanes(table, h, steps, tolerance, trajectories);
-        if (stepper->prepare({}, h) != LOBATTO_OK) return {};
-        return one_by_one(trajectories,
-                          [&](Trajectory& trajectory) { return run_one(*stepper, steps, tolerance, trajectory); });
+        if (h > longest) {
+            const auto [place, is_new] = proven->try_emplace(steps, false);
+            if (is_new) place->second = endures(problem, run, steps, trajectories.front());
+            if (!place->second) return {};
+        }
+        return run(h, steps, trajectories);
     };
     const std::string name = method.name() + (tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
-    Contestant contestant{name, method.order(), true, true, Ladder::steps, run};
-    contestant.cold_start = [&problem, method] { return cold_start_seconds(problem, method); };
+    Contestant contestant{name, method.order(), true, true, Ladder::steps, race};
+    contestant.cold_start = [&problem, method, together] { return cold_start_seconds(problem, method, together); };
     return contestant;
+}
+
+Kernel kernel_for(const KernelSource& source, std::int64_t together) {
+    return together > 0 ? ensemble_kernel_of(source, Precision::double_, together)
+                        : kernel_of(source, Precision::double_);
 }
 
 }  // namespace
@@ -171,31 +188,33 @@ Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t to
     for (std::future<void>& worker : workers) worker.get();
     Contestants contestants;
     for (std::size_t i = 0; i < methods.size(); ++i) {
-        const Kernel kernel = together > 0 ? ensemble_kernel_of(sources[i], Precision::double_, together)
-                                           : kernel_of(sources[i], Precision::double_);
+        const Kernel kernel = kernel_for(sources[i], together);
         for (const double tolerance : tolerances)
             if (tolerance == 0 || methods[i].family != Family::splitting)
-                contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel));
+                contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel, together));
     }
     return contestants;
 }
 
-double cold_start_seconds(const Problem& problem, Method method) {
-    std::string folder = (std::filesystem::temp_directory_path() / "lobatto-bench-XXXXXX").string();
-    if (mkdtemp(folder.data()) == nullptr) throw MachineError("cannot create a folder in the temporary folder");
+double cold_start_seconds(const Problem& problem, Method method, std::int64_t together) {
     const char* const variable = "LOBATTO_CACHE_DIR";
     const char* const before = std::getenv(variable);
     const std::string saved = before == nullptr ? "" : before;
-    setenv(variable, folder.c_str(), 1);
-    const auto start = std::chrono::steady_clock::now();
-    kernel_of(source_of(problem, method), Precision::double_);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    double best = std::numeric_limits<double>::infinity();
+    for (int repetition = 0; repetition < 3; ++repetition) {
+        std::string folder = (std::filesystem::temp_directory_path() / "lobatto-bench-XXXXXX").string();
+        if (mkdtemp(folder.data()) == nullptr) throw MachineError("cannot create a folder in the temporary folder");
+        setenv(variable, folder.c_str(), 1);
+        const auto start = std::chrono::steady_clock::now();
+        kernel_for(source_of(problem, method), together);
+        best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+        std::filesystem::remove_all(folder);
+    }
     if (before == nullptr)
         unsetenv(variable);
     else
         setenv(variable, saved.c_str(), 1);
-    std::filesystem::remove_all(folder);
-    return seconds;
+    return best;
 }
 
 }  // namespace lobatto::bench

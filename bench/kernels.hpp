@@ -14,7 +14,7 @@ KernelSource source_of(const Problem& problem, Method method);
 // trajectories go side by side; 0: one alone.
 Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together);
 
-// Seconds from the scene to the loaded kernel, nothing cached.
-double cold_start_seconds(const Problem& problem, Method method);
+// Seconds from the scene to the loaded kernel, nothing cached; the best of three.
+double cold_start_seconds(const Problem& problem, Method method, std::int64_t together);
 
 }  // namespace lobatto::bench

@@ -45,6 +45,7 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
     std::vector<std::string> names = {source.stepper, "kernel_angles.hpp", "kernel_events.hpp"};
     if (together > 0) names.push_back("kernel_ensemble.hpp");
+    if (together > 0 && source.form == Form::separable) names.push_back("kernel_ensemble_sweeps.hpp");
     for (const std::string& part : {kernel_abi_h_text, support_text(names), source.header, kernel_export_hpp_text})
         append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";

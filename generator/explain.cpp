@@ -15,7 +15,7 @@ namespace {
 
 using GiNaC::ex;
 
-constexpr int most_swept = 16;  // coordinates of the general form: `most_full` of kernel_galerkin.hpp
+constexpr int most_swept = 16;  // coordinates of the general form: `most_full` of kernel_contract.hpp
 
 bool holds_any(const SparseMatrix& matrix, const std::vector<GiNaC::symbol>& symbols) {
     return std::any_of(matrix.entries().begin(), matrix.entries().end(), [&](const auto& entry) {

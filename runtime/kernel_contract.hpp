@@ -152,6 +152,18 @@ constexpr bool is_clean() {
     return stepping_of<K>() == Stepping::clean;
 }
 
+// Whether a coordinate may move as soon as its acceleration is known.
+template <class K>
+constexpr bool moves_in_passing() {
+    if constexpr (K::neighbours && stepping_of<K>() == Stepping::in_turn)
+        return K::in_passing;
+    else
+        return false;
+}
+
+// The most coordinates whose mass matrix is treated as a full one.
+constexpr int most_full = 16;
+
 // What the steppers of all forms carry.
 template <class K>
 struct Motion {
@@ -178,6 +190,22 @@ struct Motion {
 // that fails leaves the state of the last good one.
 template <class K, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Stepper;
+
+// K for what a trajectory side by side with others rarely does alone: its steps by Newton's iteration, so that sweeps
+// are compiled for lanes only.
+template <class K>
+struct Unswept : K {
+    static constexpr bool any_number = false;
+};
+template <class K>
+using Alone = std::conditional_t<stepping_of<K>() == Stepping::in_turn, K, Unswept<K>>;
+template <class K>
+using Single = Stepper<Alone<K>>;
+
+// How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
+// going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
+template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
+struct Lanes;
 
 // A system with constant mass, whose velocity is kept beside its position.
 template <class K>

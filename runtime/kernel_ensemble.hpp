@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Trajectories side by side: each in its lane, with its own parameters and state, one step size and time for all.
 //
-// What a lane computes depends on no other lane. Where the sweeps of one fail, a Stepper of its own takes that step, by
-// Newton's iteration if need be; a lane that no way leads on keeps its last good state and its status.
+// What a lane computes depends on no other lane. Where the sweeps of one fail, a Stepper of its own takes that step by
+// Newton's iteration; a lane that no way leads on keeps its last good state and its status.
 #ifndef LOBATTO_KERNEL_ENSEMBLE_HPP
 #define LOBATTO_KERNEL_ENSEMBLE_HPP
 
@@ -10,13 +10,7 @@
 #include <type_traits>
 
 #include "kernel_contract.hpp"
-#include "kernel_ensemble_sweeps.hpp"
-#include "kernel_explicit.hpp"
-#include "kernel_galerkin.hpp"
-#include "kernel_general.hpp"
-#include "kernel_linear.hpp"
 #include "kernel_pack.hpp"
-#include "kernel_separable.hpp"
 
 namespace lobatto {
 
@@ -34,157 +28,6 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
     }
 }
 
-// How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
-// going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
-template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
-struct Lanes;
-
-template <class K, class T>
-struct Lanes<K, T, Form::linear_map, Stepping::solved> {
-    using real = typename K::real;
-    using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    T q[n], p[n], evaluations = T(real(0));
-
-    const T& position(int c) const { return q[c]; }
-
-    void prepare(const Stepper<K>&, int) {}
-    void set_tolerance(real) {}
-    void start(const Stepper<K>& single, const real* momentum, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, momentum[c]);
-        }
-    }
-    void momentum(const Stepper<K>&, int lane, real* momentum) const {
-        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
-    }
-    template <class Given>
-    Going step(const Given& k, real, Going going) {
-        T q1[n], p1[n], not_finite = T(real(0));
-        K::propagate(k, +q, +p, +q1, +p1);
-        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
-        going = going & (not_finite == T(real(0)));
-        for (int c = 0; c < n; ++c) {
-            q[c] = select(going, q1[c], q[c]);
-            p[c] = select(going, p1[c], p[c]);
-        }
-        return going;
-    }
-    void follow(const Stepper<K>& single, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, single.p[c]);
-        }
-    }
-};
-
-template <class K, class T>
-struct Lanes<K, T, Form::separable, Stepping::solved> {
-    using real = typename K::real;
-    using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    T q[n], u[n], evaluations = T(real(0));
-    EnsembleSweeps<K, T> sweeps;
-
-    const T& position(int c) const { return q[c]; }
-    void prepare(const Stepper<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
-    void set_tolerance(real tolerance) { sweeps.set_tolerance(tolerance); }
-    void start(const Stepper<K>& single, const real*, int lane) {
-        follow_state(single, lane);
-        sweeps.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
-    }
-    void momentum(const Stepper<K>& single, int lane, real* momentum) const {
-        real velocity[n];
-        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
-        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
-    }
-    template <class Given>
-    Going step(const Given& k, real time, Going going) {
-        const Going moved = sweeps.step(k, time, q, u, going);
-        evaluations = sweeps.evaluations;
-        return moved;
-    }
-    // Takes over the state and the memory of the step that `single` has taken.
-    void follow(const Stepper<K>& single, int lane) {
-        follow_state(single, lane);
-        sweeps.recall(
-            single.u, [&](int i, int c) { return single.node_acceleration(i, c); },
-            [&](int i, int c) { return single.node_position(i, c); }, lane);
-    }
-
-private:
-    void follow_state(const Stepper<K>& single, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(u[c], lane, single.u[c]);
-        }
-    }
-};
-
-template <class K, class T>
-struct Lanes<K, T, Form::separable, Stepping::in_turn> {
-    using real = typename K::real;
-    using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    int now{};  // the present; 1 - now: room for the next
-    T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
-    Turns<K> turns;
-    real h;
-
-    const T& position(int c) const { return q[now][c]; }
-    void prepare(const Stepper<K>& single, int) {
-        turns = single.turns;
-        h = single.step_size;
-    }
-    void set_tolerance(real) {}
-    void start(const Stepper<K>& single, const real*, int lane) { follow(single, lane); }
-    void momentum(const Stepper<K>& single, int lane, real* momentum) const {
-        real velocity[n];
-        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
-        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
-    }
-    template <class Given>
-    Going step(const Given& k, real time, Going going) {
-        const int next = 1 - now;
-        T not_finite = T(real(0));
-        if constexpr (moves_in_passing<K>()) {
-            step_in_passing<K>(turns, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
-            for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
-        } else {
-            T q1[n], u1[n], W1[n];
-            for (int c = 0; c < n; ++c) {
-                q1[c] = q[now][c];
-                u1[c] = u[now][c];
-                W1[c] = W[now][c];
-            }
-            step_in_turn<K>(turns, k, time, h, q1, u1, W1);
-            for (int c = 0; c < n; ++c) {
-                not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
-                q[next][c] = q1[c];
-                u[next][c] = u1[c];
-                W[next][c] = W1[c];
-            }
-        }
-        going = going & (not_finite == T(real(0)));
-        if (!all(going))
-            for (int c = 0; c < n; ++c) {
-                q[next][c] = select(going, q[next][c], q[now][c]);
-                u[next][c] = select(going, u[next][c], u[now][c]);
-                if constexpr (Turns<K>::kicks_ends) W[next][c] = select(going, W[next][c], W[now][c]);
-            }
-        now = next;
-        return going;
-    }
-    void follow(const Stepper<K>& single, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[now][c], lane, single.q[c]);
-            set_lane(u[now][c], lane, single.u[c]);
-            set_lane(W[now][c], lane, single.acceleration(c));
-        }
-    }
-};
-
 // How many of `trajectories` stand side by side: a register of each value; two, which hide each other's latency, where
 // one or two coordinates leave room for them. None where the lanes serve a single step better.
 template <class K>
@@ -198,46 +41,6 @@ constexpr int ensemble_lanes(int trajectories) {
     return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;
 }
 
-template <class K, class T>
-struct Lanes<K, T, Form::general, Stepping::solved> {
-    using real = typename K::real;
-    using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    T q[n], p[n], evaluations = T(real(0));
-    GalerkinSweeps<K, T> sweeps;
-
-    const T& position(int c) const { return q[c]; }
-    void prepare(const Stepper<K>& single, int) { sweeps.prepare(single.step_size); }
-    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
-    void start(const Stepper<K>& single, const real*, int lane) {
-        follow_state(single, lane);
-        real velocity[n] = {};
-        single.velocity(single.time(), single.q, single.p, velocity);
-        sweeps.begin(velocity, lane);
-    }
-    void momentum(const Stepper<K>&, int lane, real* momentum) const {
-        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
-    }
-    template <class Given>
-    Going step(const Given& k, real time, Going going) {
-        const Going moved = sweeps.step(k, time, q, p, going);
-        evaluations = sweeps.evaluations;
-        return moved;
-    }
-    void follow(const Stepper<K>& single, int lane) {
-        follow_state(single, lane);
-        sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
-    }
-
-private:
-    void follow_state(const Stepper<K>& single, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, single.p[c]);
-        }
-    }
-};
-
 template <class K, int width>
 struct Ensemble {
     using real = typename K::real;
@@ -249,7 +52,7 @@ struct Ensemble {
     Lanes<K, T> motion;
     typename K::Parameters parameters[width];
     typename K::Coefficients coefficients_of[width];
-    mutable Stepper<K> single;  // takes the steps of a lane that has left the others
+    mutable Single<K> single;  // takes the steps of a lane that has left the others
     real step_size{}, start_time{};
     std::int64_t steps{};
 

@@ -386,6 +386,49 @@ private:
     }
 };
 
+template <class K, class T>
+struct Lanes<K, T, Form::separable, Stepping::solved> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], u[n], evaluations = T(real(0));
+    EnsembleSweeps<K, T> sweeps;
+
+    const T& position(int c) const { return q[c]; }
+    void prepare(const Single<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
+    void set_tolerance(real tolerance) { sweeps.set_tolerance(tolerance); }
+    void start(const Single<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        sweeps.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
+    }
+    void momentum(const Single<K>& single, int lane, real* momentum) const {
+        real velocity[n];
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
+        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const Going moved = sweeps.step(k, time, q, u, going);
+        evaluations = sweeps.evaluations;
+        return moved;
+    }
+    // Takes over the state and the memory of the step that `single` has taken.
+    void follow(const Single<K>& single, int lane) {
+        follow_state(single, lane);
+        sweeps.recall(
+            single.u, [&](int i, int c) { return single.node_acceleration(i, c); },
+            [&](int i, int c) { return single.node_position(i, c); }, lane);
+    }
+
+private:
+    void follow_state(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(u[c], lane, single.u[c]);
+        }
+    }
+};
+
 }  // namespace lobatto
 
 #endif

@@ -58,15 +58,6 @@ LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename
     }
 }
 
-// Whether a coordinate may move as soon as its acceleration is known.
-template <class K>
-constexpr bool moves_in_passing() {
-    if constexpr (K::neighbours && stepping_of<K>() == Stepping::in_turn)
-        return K::in_passing;
-    else
-        return false;
-}
-
 // Takes the acceleration of a coordinate as soon as it is known, which is kicked and drifts; the last kick of a step
 // keeps accelerations instead.
 template <class K, class T, class Given, bool is_last>
@@ -381,6 +372,69 @@ private:
         Formulas<K>::acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size,
                                   static_cast<const real*>(begin), +ends.W[0]);
         Formulas<K>::acceleration(coefficients, this->time(), static_cast<const real*>(q), +ends.W[1]);
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::separable, Stepping::in_turn> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    int now{};  // the present; 1 - now: room for the next
+    T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
+    Turns<K> turns;
+    real h;
+
+    const T& position(int c) const { return q[now][c]; }
+    void prepare(const Single<K>& single, int) {
+        turns = single.turns;
+        h = single.step_size;
+    }
+    void set_tolerance(real) {}
+    void start(const Single<K>& single, const real*, int lane) { follow(single, lane); }
+    void momentum(const Single<K>& single, int lane, real* momentum) const {
+        real velocity[n];
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
+        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const int next = 1 - now;
+        T not_finite = T(real(0));
+        if constexpr (moves_in_passing<K>()) {
+            step_in_passing<K>(turns, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+            for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
+        } else {
+            T q1[n], u1[n], W1[n];
+            for (int c = 0; c < n; ++c) {
+                q1[c] = q[now][c];
+                u1[c] = u[now][c];
+                W1[c] = W[now][c];
+            }
+            step_in_turn<K>(turns, k, time, h, q1, u1, W1);
+            for (int c = 0; c < n; ++c) {
+                not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
+                q[next][c] = q1[c];
+                u[next][c] = u1[c];
+                W[next][c] = W1[c];
+            }
+        }
+        going = going & (not_finite == T(real(0)));
+        if (!all(going))
+            for (int c = 0; c < n; ++c) {
+                q[next][c] = select(going, q[next][c], q[now][c]);
+                u[next][c] = select(going, u[next][c], u[now][c]);
+                if constexpr (Turns<K>::kicks_ends) W[next][c] = select(going, W[next][c], W[now][c]);
+            }
+        now = next;
+        return going;
+    }
+    void follow(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[now][c], lane, single.q[c]);
+            set_lane(u[now][c], lane, single.u[c]);
+            set_lane(W[now][c], lane, single.acceleration(c));
+        }
     }
 };
 

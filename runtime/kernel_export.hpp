@@ -53,16 +53,10 @@ struct ExportLanes {
     }
     static void energy(const void* ensemble, void* value) { static_cast<const Side*>(ensemble)->energy(out(value)); }
 };
-
-// An ensemble of LOBATTO_ENSEMBLES trajectories or more.
-template <class K, int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
-using ExportEnsemble = std::conditional_t<(lanes > 0), ExportLanes<K, lanes>, NoEnsemble>;
-#else
-template <class>
-using ExportEnsemble = NoEnsemble;
 #endif
 
-template <class K>
+// The functions of one trajectory, and those of E.
+template <class K, class E = NoEnsemble>
 struct Export {
     using real = typename K::real;
     using S = Stepper<K>;
@@ -210,7 +204,6 @@ struct Export {
             return 0;
     }
 
-    using E = ExportEnsemble<K>;
     static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
                                              sizeof(lobatto_kernel),
                                              K::name,
@@ -256,9 +249,18 @@ struct Export {
                                              K::has_energy ? E::energy : nullptr};
 };
 
+// With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster.
+#ifdef LOBATTO_ENSEMBLES
+template <class K, int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+using Exported = std::conditional_t<(lanes > 0), Export<Alone<K>, ExportLanes<K, lanes>>, Export<K>>;
+#else
+template <class K>
+using Exported = Export<K>;
+#endif
+
 }  // namespace lobatto
 
 #define LOBATTO_EXPORT_KERNEL(K)                                                                         \
     extern "C" __attribute__((visibility("default"))) const lobatto_kernel* lobatto_kernel_table(void) { \
-        return &lobatto::Export<K>::table;                                                               \
+        return &lobatto::Exported<K>::table;                                                             \
     }

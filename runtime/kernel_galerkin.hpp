@@ -23,9 +23,6 @@
 
 namespace lobatto {
 
-// The most coordinates whose mass matrix is treated as a full one.
-constexpr int most_full = 16;
-
 // M = L D L^T of a symmetric matrix, in place: L below the diagonal, 1/D on it. No pivoting: a mass matrix is positive
 // definite as a rule, and where it is not, what fails shows as not finite or not converging.
 template <int n, class V>
@@ -356,6 +353,46 @@ private:
             p[c] = select(done, p1[c], p[c]);
         }
         return done;
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::general, Stepping::solved> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], p[n], evaluations = T(real(0));
+    GalerkinSweeps<K, T> sweeps;
+
+    const T& position(int c) const { return q[c]; }
+    void prepare(const Single<K>& single, int) { sweeps.prepare(single.step_size); }
+    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
+    void start(const Single<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        real velocity[n] = {};
+        single.velocity(single.time(), single.q, single.p, velocity);
+        sweeps.begin(velocity, lane);
+    }
+    void momentum(const Single<K>&, int lane, real* momentum) const {
+        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const Going moved = sweeps.step(k, time, q, p, going);
+        evaluations = sweeps.evaluations;
+        return moved;
+    }
+    void follow(const Single<K>& single, int lane) {
+        follow_state(single, lane);
+        sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
+    }
+
+private:
+    void follow_state(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, single.p[c]);
+        }
     }
 };
 

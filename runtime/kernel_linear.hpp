@@ -336,6 +336,46 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
     }
 };
 
+template <class K, class T>
+struct Lanes<K, T, Form::linear_map, Stepping::solved> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], p[n], evaluations = T(real(0));
+
+    const T& position(int c) const { return q[c]; }
+
+    void prepare(const Single<K>&, int) {}
+    void set_tolerance(real) {}
+    void start(const Single<K>& single, const real* momentum, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, momentum[c]);
+        }
+    }
+    void momentum(const Single<K>&, int lane, real* momentum) const {
+        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
+    }
+    template <class Given>
+    Going step(const Given& k, real, Going going) {
+        T q1[n], p1[n], not_finite = T(real(0));
+        K::propagate(k, +q, +p, +q1, +p1);
+        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
+        going = going & (not_finite == T(real(0)));
+        for (int c = 0; c < n; ++c) {
+            q[c] = select(going, q1[c], q[c]);
+            p[c] = select(going, p1[c], p[c]);
+        }
+        return going;
+    }
+    void follow(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, single.p[c]);
+        }
+    }
+};
+
 }  // namespace lobatto
 
 #endif

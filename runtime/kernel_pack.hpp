@@ -698,6 +698,24 @@ LOBATTO_INLINE Pack<real, width> first_lanes(const Pack<real, width>& values, in
     return first_lanes(values, count, std::make_integer_sequence<int, width>());
 }
 
+// One lane of a value, which may be a plain number.
+template <class real, int width>
+inline void set_lane(Pack<real, width>& value, int lane, real x) {
+    value.set(lane, x);
+}
+template <class real>
+inline void set_lane(real& value, int, real x) {
+    value = x;
+}
+template <class real, int width>
+inline real lane_of(const Pack<real, width>& value, int lane) {
+    return value[lane];
+}
+template <class real>
+inline real lane_of(const real& value, int) {
+    return value;
+}
+
 }  // namespace lobatto
 
 #endif

@@ -38,24 +38,6 @@ struct NodeLayout {
     static constexpr int parts = parts_of(count);
 };
 
-// One lane of a value, which may be a plain number.
-template <class real, int width>
-inline void set_lane(Pack<real, width>& value, int lane, real x) {
-    value.set(lane, x);
-}
-template <class real>
-inline void set_lane(real& value, int, real x) {
-    value = x;
-}
-template <class real, int width>
-inline real lane_of(const Pack<real, width>& value, int lane) {
-    return value[lane];
-}
-template <class real>
-inline real lane_of(const real& value, int) {
-    return value;
-}
-
 // Values of nodes one by one: a Pack's lanes in memory.
 template <int parts, class V, class T>
 inline void lay_flat(const V* values, int stride, T* flat) {
