@@ -22,6 +22,15 @@ void append_part(std::string& whole, const std::string& text) {
     }
 }
 
+// What a library of this kernel is compiled from.
+std::string support_of(const KernelSource& source, bool is_ensemble) {
+    if (source.stepper.empty()) return support_text();
+    std::vector<std::string> names = {source.stepper, "kernel_angles.hpp", "kernel_events.hpp"};
+    if (is_ensemble) names.push_back("kernel_ensemble.hpp");
+    if (is_ensemble && source.form == Form::separable) names.push_back("kernel_ensemble_sweeps.hpp");
+    return support_text(names);
+}
+
 Kernel built(const KernelSource& source, const Translation& translation, Compiled* compiled) {
     const Compiled object = compile(translation);
     if (compiled != nullptr) *compiled = object;
@@ -43,10 +52,8 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
     if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
-    std::vector<std::string> names = {source.stepper, "kernel_angles.hpp", "kernel_events.hpp"};
-    if (together > 0) names.push_back("kernel_ensemble.hpp");
-    if (together > 0 && source.form == Form::separable) names.push_back("kernel_ensemble_sweeps.hpp");
-    for (const std::string& part : {kernel_abi_h_text, support_text(names), source.header, kernel_export_hpp_text})
+    for (const std::string& part :
+         {kernel_abi_h_text, support_of(source, together > 0), source.header, kernel_export_hpp_text})
         append_part(translation.text, part);
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
     return translation;

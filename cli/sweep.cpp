@@ -262,7 +262,7 @@ void sweep(const SweepOptions& options) {
     keep_scene(scene.path, path);
     SweepTable table(path, format, comments_of(scene, source, request, grid), columns_of(scene, grid));
     std::vector<Failure> failures;
-    SweepWatch watch(derivation, kernel, request);
+    SweepWatch watch(derivation, source, kernel, request);
     std::int64_t departures = 0;
     request.sink = [&](const EnsembleTrajectory& trajectory) {
         const bool departs = trajectory.status == LOBATTO_OK && watch.departs(trajectory);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "cli/energy_watch.hpp"
+#include "cli/kernel_of.hpp"
 #include "cli/stability_limit.hpp"
 #include "runtime/frequency.hpp"
 
@@ -31,10 +32,11 @@ double kinetic_energy(const LoadedStepper<double>& stepper, double time, const s
 
 }  // namespace
 
-SweepWatch::SweepWatch(const Derivation& derivation, const Kernel& kernel, const EnsembleRequest& request)
+SweepWatch::SweepWatch(const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+                       const EnsembleRequest& request)
     : derivation_(derivation),
+      source_(source),
       request_(request),
-      kernel_(kernel),
       watches_(kernel->has_energy != 0 && EnergyWatch::can_watch(derivation)),
       stepper_(kernel) {}
 
@@ -87,6 +89,7 @@ std::string SweepWatch::warning() const {
 }
 
 bool SweepWatch::run_again() {
+    if (!alone_) alone_ = kernel_of(source_, Precision::double_);
     TrajectoryRequest again;
     again.parameters = start_.parameters;
     again.q = start_.q;
@@ -96,9 +99,9 @@ bool SweepWatch::run_again() {
     again.tolerance = request_.tolerance;
     again.steps = request_.steps;
     again.interrupted = request_.interrupted;
-    EnergyWatch watch(derivation_, kernel_);
+    EnergyWatch watch(derivation_, *alone_);
     again.sink = [&](const Records& records) { watch.look(records); };
-    return integrate(kernel_, again).status == LOBATTO_OK && !watch.departure(derivation_, kernel_, again).empty();
+    return integrate(*alone_, again).status == LOBATTO_OK && !watch.departure(derivation_, *alone_, again).empty();
 }
 
 }  // namespace lobatto

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,10 @@ namespace lobatto {
 class SweepWatch {
 public:
     // What is handed over outlives it. Systems that EnergyWatch can watch; of others nothing is told.
-    SweepWatch(const Derivation& derivation, const Kernel& kernel, const EnsembleRequest& request);
+    SweepWatch(const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+               const EnsembleRequest& request);
     // Whether the energy of this one, which reached the end, is off by as much as the motion has. Those where the
-    // kinetic energies of both ends leave that open are run once more by themselves.
+    // kinetic energies of both ends leave that open are run once more by themselves, as `lobatto run` does it.
     bool departs(const EnsembleTrajectory& trajectory);
 
     // Looks for the largest frequency at the start and at the last kept state; of the first 1000 trajectories, of up to
@@ -31,8 +33,9 @@ private:
     bool prepare(const EnsembleTrajectory& trajectory);
 
     const Derivation& derivation_;
+    const KernelSource& source_;
     const EnsembleRequest& request_;
-    Kernel kernel_;
+    std::optional<Kernel> alone_;  // for one trajectory; compiled when the first is run again
     bool watches_;
     LoadedStepper<double> stepper_;
     EnsembleStart start_;

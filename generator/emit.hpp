@@ -23,7 +23,7 @@ struct KernelSource {
     Form form{};                     // of its steps (generator/structure.hpp)
     std::string name;                // struct lobatto::kernels::NAME, a C identifier
     std::string header;              // the whole text of NAME.hpp
-    std::string stepper;             // the part of runtime/kernel.hpp that its Stepper is in
+    std::string stepper;             // the part of runtime/kernel.hpp that its Stepper is in; empty: any
     std::string digest;              // 16 hexadecimal digits of the header's formulas
     std::vector<PassReport> report;  // first row: as derived
 };

@@ -127,7 +127,7 @@ and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
      * q[l * n ...], p[l * n ...]. status: one lobatto_status a lane, which each function sets; a lane whose status is
      * not LOBATTO_OK on entry of start or advance is left alone: where it has not started, its state means nothing.
      * No lane's results depend on its neighbours. */
-    int32_t lanes; /* 0: none, and the functions are null; else `advance` takes its steps by Newton's iteration alone */
+    int32_t lanes; /* 0: none, and the functions are null; else `advance` takes its steps without sweeps */
     int32_t ensemble_bytes;
     int32_t ensemble_alignment;
     void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Trajectories side by side: each in its lane, with its own parameters and state, one step size and time for all.
 //
-// What a lane computes depends on no other lane. Where the sweeps of one fail, a Stepper of its own takes that step by
-// Newton's iteration; a lane that no way leads on keeps its last good state and its status.
+// What a lane computes depends on no other lane. Where the sweeps of one fail, it sweeps once more as if it began
+// there, and if these fail too, a Stepper of its own takes that step by Newton's iteration; a lane that no way leads on
+// keeps its last good state and its status.
 #ifndef LOBATTO_KERNEL_ENSEMBLE_HPP
 #define LOBATTO_KERNEL_ENSEMBLE_HPP
 
@@ -106,11 +107,22 @@ struct Ensemble {
                     if (going[lane]) leave(lane, Status::time_stands_still);
                 break;
             }
-            const Going moved = motion.step(coefficients, time, going);
-            evaluations += motion.evaluations;
-            if (any(going & !moved)) {
+            Going left = going;
+            for (int attempt = 1;; ++attempt) {  // one text of the step, which is in line
+                left = left & !motion.step(coefficients, time, left);
+                evaluations += motion.evaluations;
+                if constexpr (Lanes<K, T>::attempts > 1) {
+                    if (attempt > 1) motion.go_on();
+                    if (attempt == 1 && any(left)) {
+                        start_again(left, time);
+                        continue;
+                    }
+                }
+                break;
+            }
+            if (any(left)) {
                 for (int lane = 0; lane < width; ++lane) {
-                    if (!going[lane] || moved[lane]) continue;
+                    if (!left[lane]) continue;
                     const Status alone = step_alone(lane, time);
                     if (alone != Status::ok) leave(lane, alone);
                 }
@@ -158,6 +170,17 @@ private:
     Status begin_alone(int lane, real time, const real* q, const real* p) {
         const Status status = single.prepare(parameters[lane], step_size);
         return status == Status::ok ? single.start(time, q, p) : status;
+    }
+
+    // These lanes forget the steps before.
+    void start_again(Going these, real time) {
+        for (int lane = 0; lane < width; ++lane) {
+            if (!these[lane]) continue;
+            real q[n], p[n];
+            state_of(lane, q, p);
+            begin_alone(lane, time, q, p);
+            motion.start(single, p, lane);
+        }
     }
 
     Status step_alone(int lane, real time) {

@@ -360,7 +360,7 @@ template <class K, class T>
 struct Lanes<K, T, Form::general, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates;
+    static constexpr int n = K::coordinates, attempts = 2;
     T q[n], p[n], evaluations = T(real(0));
     GalerkinSweeps<K, T> sweeps;
 
@@ -382,6 +382,7 @@ struct Lanes<K, T, Form::general, Stepping::solved> {
         evaluations = sweeps.evaluations;
         return moved;
     }
+    void go_on() {}
     void follow(const Single<K>& single, int lane) {
         follow_state(single, lane);
         sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
