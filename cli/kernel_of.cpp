@@ -52,9 +52,10 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
     if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
-    for (const std::string& part :
-         {kernel_abi_h_text, support_of(source, together > 0), source.header, kernel_export_hpp_text})
-        append_part(translation.text, part);
+    append_part(translation.text, std::string(kernel_abi_h_text));
+    append_part(translation.text, support_of(source, together > 0));
+    append_part(translation.text, source.header);
+    append_part(translation.text, std::string(kernel_export_hpp_text));
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
     return translation;
 }

@@ -23,7 +23,7 @@ void need(const std::string& name, std::set<std::string>& needed) {
     const auto part = std::find_if(support_parts.begin(), support_parts.end(),
                                    [&](const SupportPart& candidate) { return candidate.name == name; });
     if (part == support_parts.end()) throw std::logic_error("there is no support header " + name);
-    std::istringstream lines(part->text);
+    std::istringstream lines{std::string(part->text)};
     for (std::string line; std::getline(lines, line);)
         if (const std::string other = included(line); !other.empty()) need(other, needed);
 }
@@ -35,8 +35,8 @@ std::string support_text(const std::vector<std::string>& names) {
     for (const std::string& name : names) need(name, needed);
     std::string whole;
     for (const SupportPart& part : support_parts) {
-        if (!needed.contains(part.name)) continue;
-        std::istringstream lines(part.text);
+        if (!needed.contains(std::string(part.name))) continue;
+        std::istringstream lines{std::string(part.text)};
         for (std::string line; std::getline(lines, line);)
             if (included(line).empty()) whole += line + '\n';
     }
@@ -45,7 +45,7 @@ std::string support_text(const std::vector<std::string>& names) {
 
 std::string support_text() {
     std::vector<std::string> names;
-    for (const SupportPart& part : support_parts) names.push_back(part.name);
+    for (const SupportPart& part : support_parts) names.emplace_back(part.name);
     return support_text(names);
 }
 

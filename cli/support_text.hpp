@@ -3,18 +3,19 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace lobatto {
 
 struct SupportPart {
-    std::string name, text;  // kernel_NAME.hpp and what it says
+    std::string_view name, text;  // kernel_NAME.hpp and what it says
 };
 
 // The parts of runtime/kernel.hpp; each stands after those that it includes.
 extern const std::vector<SupportPart> support_parts;
-extern const std::string kernel_abi_h_text;       // runtime/kernel_abi.h
-extern const std::string kernel_export_hpp_text;  // runtime/kernel_export.hpp
+extern const std::string_view kernel_abi_h_text;       // runtime/kernel_abi.h
+extern const std::string_view kernel_export_hpp_text;  // runtime/kernel_export.hpp
 
 // The named parts and those that they include, as one file. Throws std::logic_error for a name that is none.
 std::string support_text(const std::vector<std::string>& names);

@@ -33,15 +33,15 @@ TEST_CASE("every support header is a part, stands after those it includes and is
     std::string before;
     for (const SupportPart& part : support_parts) {
         CAPTURE(part.name);
-        CHECK(part.text == test::read_file(tree + "/runtime/" + part.name));
+        CHECK(part.text == test::read_file(tree + "/runtime/" + std::string(part.name)));
         for (std::size_t at = part.text.find("#include \""); at != std::string::npos;
              at = part.text.find("#include \"", at + 1)) {
-            const std::string line = part.text.substr(at, part.text.find('\n', at) - at);
+            const std::string line(part.text.substr(at, part.text.find('\n', at) - at));
             CAPTURE(line);
             CHECK(before.find(line) != std::string::npos);
         }
-        before += "#include \"" + part.name + "\"\n";
-        CHECK(has_part(support_text({part.name}), "NUMBERS"));
+        before += "#include \"" + std::string(part.name) + "\"\n";
+        CHECK(has_part(support_text({std::string(part.name)}), "NUMBERS"));
     }
     const std::string whole = support_text();
     CHECK(whole.find("#include \"") == std::string::npos);
