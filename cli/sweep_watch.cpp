@@ -9,6 +9,7 @@
 #include "cli/energy_watch.hpp"
 #include "cli/kernel_of.hpp"
 #include "cli/stability_limit.hpp"
+#include "runtime/error.hpp"
 #include "runtime/frequency.hpp"
 
 namespace lobatto {
@@ -37,6 +38,7 @@ SweepWatch::SweepWatch(const Derivation& derivation, const KernelSource& source,
     : derivation_(derivation),
       source_(source),
       request_(request),
+      kernel_(kernel),
       watches_(kernel->has_energy != 0 && EnergyWatch::can_watch(derivation)),
       stepper_(kernel) {}
 
@@ -89,7 +91,13 @@ std::string SweepWatch::warning() const {
 }
 
 bool SweepWatch::run_again() {
-    if (!alone_) alone_ = kernel_of(source_, Precision::double_);
+    if (!alone_) {
+        try {
+            alone_ = kernel_of(source_, Precision::double_);
+        } catch (const MachineError&) {  // what the sweep has computed is not lost for want of a compiler
+            alone_ = kernel_;
+        }
+    }
     TrajectoryRequest again;
     again.parameters = start_.parameters;
     again.q = start_.q;

@@ -35,6 +35,7 @@ private:
     const Derivation& derivation_;
     const KernelSource& source_;
     const EnsembleRequest& request_;
+    Kernel kernel_;                // of the ensemble
     std::optional<Kernel> alone_;  // for one trajectory; compiled when the first is run again
     bool watches_;
     LoadedStepper<double> stepper_;

@@ -204,8 +204,6 @@ using Single = Stepper<Alone<K>>;
 
 // How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
 // going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
-// `attempts`: 2 where a lane that has not moved may, when it starts anew from there; go_on() then lets the others
-// remember the steps before again.
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Lanes;
 

@@ -107,26 +107,9 @@ struct Ensemble {
                     if (going[lane]) leave(lane, Status::time_stands_still);
                 break;
             }
-            Going left = going;
-            for (int attempt = 1;; ++attempt) {  // one text of the step, which is in line
-                left = left & !motion.step(coefficients, time, left);
-                evaluations += motion.evaluations;
-                if constexpr (Lanes<K, T>::attempts > 1) {
-                    if (attempt > 1) motion.go_on();
-                    if (attempt == 1 && any(left)) {
-                        start_again(left, time);
-                        continue;
-                    }
-                }
-                break;
-            }
-            if (any(left)) {
-                for (int lane = 0; lane < width; ++lane) {
-                    if (!left[lane]) continue;
-                    const Status alone = step_alone(lane, time);
-                    if (alone != Status::ok) leave(lane, alone);
-                }
-            }
+            const Going moved = motion.step(coefficients, time, going);
+            evaluations += motion.evaluations;
+            if (any(going & !moved)) lead_on(going & !moved, time, evaluations, leave);
         }
         for (int lane = 0; lane < width; ++lane) {
             if (status[lane] == Status::ok) done[lane] = taken;
@@ -172,15 +155,30 @@ private:
         return status == Status::ok ? single.start(time, q, p) : status;
     }
 
-    // These lanes forget the steps before.
-    void start_again(Going these, real time) {
-        for (int lane = 0; lane < width; ++lane) {
-            if (!these[lane]) continue;
-            real q[n], p[n];
-            state_of(lane, q, p);
-            begin_alone(lane, time, q, p);
-            motion.start(single, p, lane);
+    // What becomes of the lanes that a step has not moved.
+    template <class Leave>
+    [[gnu::noinline, gnu::cold]] void lead_on(Going left, real time, T& evaluations, const Leave& leave) {
+        // Sweeps of any Lagrangian that begin with the velocity alone solve many steps that those with a memory do not.
+        if constexpr (K::form == Form::general) {
+            if (steps > 0) {
+                for (int lane = 0; lane < width; ++lane)
+                    if (left[lane]) start_anew(lane, time);
+                left = left & !motion.step(coefficients, time, left);
+                evaluations += motion.evaluations;
+            }
         }
+        for (int lane = 0; lane < width; ++lane) {
+            if (!left[lane]) continue;
+            const Status alone = step_alone(lane, time);
+            if (alone != Status::ok) leave(lane, alone);
+        }
+    }
+
+    // The lane forgets the steps before; its state stays.
+    void start_anew(int lane, real time) {
+        real q[n], p[n];
+        state_of(lane, q, p);
+        if (begin_alone(lane, time, q, p) == Status::ok) motion.start(single, p, lane);
     }
 
     Status step_alone(int lane, real time) {

@@ -390,7 +390,7 @@ template <class K, class T>
 struct Lanes<K, T, Form::separable, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates, attempts = 2;
+    static constexpr int n = K::coordinates;
     T q[n], u[n], evaluations = T(real(0));
     EnsembleSweeps<K, T> sweeps;
 
@@ -412,7 +412,6 @@ struct Lanes<K, T, Form::separable, Stepping::solved> {
         evaluations = sweeps.evaluations;
         return moved;
     }
-    void go_on() { sweeps.has_history = true; }
     // Takes over the state and the memory of the step that `single` has taken.
     void follow(const Single<K>& single, int lane) {
         follow_state(single, lane);

@@ -379,7 +379,7 @@ template <class K, class T>
 struct Lanes<K, T, Form::separable, Stepping::in_turn> {
     using real = typename K::real;
     using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates, attempts = 1;
+    static constexpr int n = K::coordinates;
     int now{};  // the present; 1 - now: room for the next
     T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
     Turns<K> turns;

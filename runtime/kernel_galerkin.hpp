@@ -360,7 +360,7 @@ template <class K, class T>
 struct Lanes<K, T, Form::general, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates, attempts = 2;
+    static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
     GalerkinSweeps<K, T> sweeps;
 
@@ -377,12 +377,11 @@ struct Lanes<K, T, Form::general, Stepping::solved> {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
     template <class Given>
-    Going step(const Given& k, real time, Going going) {
+    [[gnu::noinline]] Going step(const Given& k, real time, Going going) {
         const Going moved = sweeps.step(k, time, q, p, going);
         evaluations = sweeps.evaluations;
         return moved;
     }
-    void go_on() {}
     void follow(const Single<K>& single, int lane) {
         follow_state(single, lane);
         sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);

@@ -340,7 +340,7 @@ template <class K, class T>
 struct Lanes<K, T, Form::linear_map, Stepping::solved> {
     using real = typename K::real;
     using Going = decltype(T() < T());
-    static constexpr int n = K::coordinates, attempts = 1;
+    static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
 
     const T& position(int c) const { return q[c]; }
