@@ -256,13 +256,17 @@ struct Pause {
 };
 
 // Room for a step's arrays: on the stack while they are few, else in the stepper. In line, so that they are registers
-// where there are enough, and what the step refers to need not lie in memory for a call.
+// where there are enough, and what the step refers to need not lie in memory for a call; or apart, as a function.
 template <class Arrays>
 struct Workspace {
     struct Nothing {};
     static constexpr bool is_large = sizeof(Arrays) > 16384;
     mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
 
+    template <class Use>
+    [[gnu::noinline]] auto apart(const Use& use) const {
+        return with(use);
+    }
     template <class Use>
     LOBATTO_INLINE auto with(const Use& use) const {
         if constexpr (is_large) {
