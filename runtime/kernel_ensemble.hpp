@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Trajectories side by side: each in its lane, with its own parameters and state, one step size and time for all.
 //
-// What a lane computes depends on no other lane. Where the sweeps of one fail, it sweeps once more as if it began
-// there, and if these fail too, a Stepper of its own takes that step by Newton's iteration; a lane that no way leads on
-// keeps its last good state and its status.
+// What a lane computes depends on no other lane. Where the sweeps of one fail, a Stepper of its own takes that step by
+// Newton's iteration, in the general form after sweeps that begin anew; a lane that no way leads on keeps its last good
+// state and its status.
 #ifndef LOBATTO_KERNEL_ENSEMBLE_HPP
 #define LOBATTO_KERNEL_ENSEMBLE_HPP
 
