@@ -15,11 +15,11 @@
 #include <limits>
 #include <set>
 
-#include "cli/drawing.hpp"
-#include "cli/tradeoff/pictures.hpp"
-#include "cli/tradeoff/report.hpp"
-#include "cli/tradeoff/search.hpp"
-#include "runtime/partial_file.hpp"
+#include "analysis/tradeoff/search.hpp"
+#include "cli/print/drawing.hpp"
+#include "cli/print/tradeoff_pictures.hpp"
+#include "cli/print/tradeoff_report.hpp"
+#include "runtime/run/partial_file.hpp"
 
 using namespace lobatto;
 

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "bench/report.hpp"
-#include "cli/drawing.hpp"
+#include "cli/print/drawing.hpp"
 
 namespace lobatto::bench {
 

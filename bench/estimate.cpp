@@ -16,11 +16,11 @@
 #include <map>
 #include <sstream>
 
-#include "cli/drawing.hpp"
-#include "cli/tradeoff/calibration.hpp"
-#include "cli/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/calibration.hpp"
+#include "analysis/tradeoff/laboratory.hpp"
+#include "cli/print/drawing.hpp"
 #include "runtime/error.hpp"
-#include "runtime/partial_file.hpp"
+#include "runtime/run/partial_file.hpp"
 
 using namespace lobatto;
 

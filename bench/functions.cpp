@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/kernel.hpp"
+#include "runtime/kernel/kernel.hpp"
 
 namespace {
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/kernel_of.hpp"
+#include "analysis/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 
 using namespace lobatto;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/kernel_of.hpp"
+#include "analysis/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 
 namespace lobatto::bench {

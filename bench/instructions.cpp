@@ -9,12 +9,12 @@
 #include <regex>
 #include <sstream>
 
+#include "analysis/kernel_of.hpp"
 #include "bench/kernels.hpp"
-#include "cli/kernel_of.hpp"
-#include "runtime/cache.hpp"
-#include "runtime/compiler.hpp"
+#include "runtime/build/cache.hpp"
+#include "runtime/build/compiler.hpp"
+#include "runtime/build/process.hpp"
 #include "runtime/error.hpp"
-#include "runtime/process.hpp"
 
 namespace lobatto::bench {
 

@@ -14,10 +14,10 @@
 #include <map>
 #include <thread>
 
+#include "analysis/gradients.hpp"
+#include "analysis/kernel_of.hpp"
+#include "analysis/stability/limit.hpp"
 #include "bench/reference.hpp"
-#include "cli/gradients.hpp"
-#include "cli/kernel_of.hpp"
-#include "cli/stability_limit.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "bench/contestant.hpp"
-#include "generator/emit.hpp"
-#include "generator/scene.hpp"
+#include "generator/emit/kernel.hpp"
+#include "generator/scene/scene.hpp"
 
 namespace lobatto::bench {
 

@@ -20,7 +20,7 @@
 #include <optional>
 #include <sstream>
 
-#include "cli/tradeoff/choice.hpp"
+#include "analysis/tradeoff/choice.hpp"
 #include "runtime/error.hpp"
 
 using namespace lobatto;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "runtime/compiler.hpp"
+#include "runtime/build/compiler.hpp"
 
 namespace lobatto::bench {
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "runtime/kernel_abi.h"
+#include "runtime/kernel/abi.h"
 
 int main(int count, char** arguments) {
     if (count < 4) return 2;

@@ -18,8 +18,8 @@
 #include <system_error>
 #include <vector>
 
-#include "cli/commands.hpp"
-#include "generator/source.hpp"
+#include "cli/commands/commands.hpp"
+#include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
 
 namespace {

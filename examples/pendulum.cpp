@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From Lagrangian to kernel to your own program. Written by `lobatto emit scenes/pendulum.toml`: pendulum.hpp.
-//   g++ -std=c++17 -O2 -I generated -I runtime examples/pendulum.cpp -o pendulum && ./pendulum
+//   g++ -std=c++17 -O2 -I generated -I runtime/kernel examples/pendulum.cpp -o pendulum && ./pendulum
 #include <cstdio>
 
 #include "pendulum.hpp"

@@ -2,18 +2,11 @@
 // The one place that calls the stages in order.
 #include "generator/pipeline.hpp"
 
-#include "generator/limits.hpp"
-#include "generator/programs.hpp"
-#include "generator/start.hpp"
+#include "generator/formula/limits.hpp"
+#include "generator/mechanics/start.hpp"
+#include "generator/programs/programs.hpp"
 
 namespace lobatto {
-
-const Discretisation& Derivation::discretisation() const {
-    if (discretisation_) return *discretisation_;
-    const Limits limits(scene.path);
-    discretisation_ = std::make_shared<const Discretisation>(discretise(system, quadrature));
-    return *discretisation_;
-}
 
 namespace {
 

@@ -12,7 +12,7 @@ inline std::optional<Finished> built_and_run(const TemporaryFolder& folder, cons
     const std::string program = (folder / name).string();
     std::vector<std::string> command{"g++", "-std=c++17", "-ffp-contract=off"};
     command.insert(command.end(), arguments.begin(), arguments.end());
-    command.insert(command.end(), {"-I", LOBATTO_SOURCE_DIR "/runtime", program + ".cpp", "-o", program});
+    command.insert(command.end(), {"-I", LOBATTO_SOURCE_DIR "/runtime/kernel", program + ".cpp", "-o", program});
     const Finished built = run(command);
     if (built.exit_code != 0) throw std::runtime_error(built.err);
     if (!runs_here) return std::nullopt;

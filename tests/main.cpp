@@ -67,12 +67,11 @@ public:
     Workers(int argc, char** argv, int at_once) : argc_(argc), argv_(argv), at_once_(at_once) {}
 
     int run() {
-        // Files of the same name do not occur. The longest texts first: they tend to run longest.
+        // The longest texts first: they tend to run longest.
         std::vector<std::string> files = asked_for();
         const auto length = [](const std::string& file) {
             std::error_code unknown;
-            const auto source = LOBATTO_SOURCE_DIR "/tests" / std::filesystem::path(file).filename();
-            return std::filesystem::file_size(source, unknown);
+            return std::filesystem::file_size(file, unknown);
         };
         std::stable_sort(files.begin(), files.end(),
                          [&](const std::string& a, const std::string& b) { return length(a) > length(b); });
@@ -96,8 +95,11 @@ private:
     }
 
     void start(const std::string& file) {
-        const std::string name = std::filesystem::path(file).stem();
-        const Worker worker{name, folder_ / (name + ".notes"), folder_ / (name + ".log")};
+        const auto inside = std::filesystem::path(file).lexically_relative(LOBATTO_SOURCE_DIR "/tests");
+        const std::string name = std::filesystem::path(inside).replace_extension();
+        std::string flat = name;
+        std::replace(flat.begin(), flat.end(), '/', '.');
+        const Worker worker{name, folder_ / (flat + ".notes"), folder_ / (flat + ".log")};
         const pid_t pid = ::fork();
         if (pid < 0) throw std::runtime_error("cannot fork");
         if (pid == 0) {
@@ -134,7 +136,7 @@ private:
         }
         passed_ += passed;
         failed_ += failed;
-        std::printf("%-28s %3d passed, %d failed\n", worker.file.c_str(), passed, failed);
+        std::printf("%-36s %3d passed, %d failed\n", worker.file.c_str(), passed, failed);
         std::fflush(stdout);
         if (const char* path = std::getenv("LOBATTO_TEST_NOTES"))
             std::ofstream(path) << passed_ << ' ' << failed_ << " \n";

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/kernel_of.hpp"
-#include "runtime/library.hpp"
-#include "tests/scenes.hpp"
+#include "analysis/kernel_of.hpp"
+#include "runtime/build/library.hpp"
+#include "tests/scenes/scenes.hpp"
 
 namespace lobatto::test {
 

@@ -16,9 +16,9 @@
 #include <iostream>
 #include <random>
 
-#include "cli/kernel_of.hpp"
-#include "generator/check.hpp"
-#include "generator/optimise.hpp"
+#include "analysis/kernel_of.hpp"
+#include "generator/check/check.hpp"
+#include "generator/graph/optimise.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "tests/support.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Fuzz target: whatever bytes a formula has, it is read or refused, soon.
-#include "generator/scene.hpp"
+#include "generator/scene/scene.hpp"
 #include "tests/fuzz/formula_scene.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

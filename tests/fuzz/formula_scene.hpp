@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "generator/source.hpp"
+#include "generator/formula/source.hpp"
 
 namespace lobatto {
 

@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <fstream>
 
-#include "runtime/checkpoint.hpp"
+#include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
-#include "runtime/output.hpp"
-#include "runtime/sha256.hpp"
+#include "runtime/run/checkpoint.hpp"
+#include "runtime/run/output.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static const std::string path = "/dev/shm/lobatto-fuzz-" + std::to_string(::getpid());

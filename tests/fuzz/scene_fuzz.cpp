@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "generator/scene.hpp"
+#include "generator/scene/scene.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     try {

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/hardest_steps.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t shared = 16;       // places for positions, and for momenta
+constexpr double step_work = 3e5;        // steps times numbers of a state that are taken again; more are not
+constexpr double grossly = 0.1;          // of what a step moves
+constexpr double spike = 100;            // times as fast as at the ends of the step
+constexpr std::size_t spike_limit = 64;  // coordinates
+constexpr int looks = 16, closer = 60;   // at the way of a step; then golden sections
+constexpr double golden = 0.6180339887498949;
+
+// Of the `every` states from `state` on, the one from which a step goes furthest.
+template <class real>
+std::vector<real> before_furthest(LoadedStepper<real>& stepper, const std::vector<real>& state, std::int64_t every,
+                                  const std::vector<double>& scale) {
+    std::vector<real> furthest = state, here = state;
+    if (every == 1 || start_at(stepper, state) != LOBATTO_OK) return furthest;
+    double largest = 0;
+    for (std::int64_t i = 0; i < every; ++i) {
+        const std::vector<real> next = state_after(stepper, 1);
+        if (next.empty()) break;
+        if (const double moved = distance(next, here, scale); moved > largest) {
+            largest = moved;
+            furthest = here;
+        }
+        here = next;
+    }
+    return furthest;
+}
+
+// Whether on the straight way from one state to the next a velocity or a force is far larger than at both ends and in
+// between: a singularity, or a barrier, that no node of the step has met.
+template <class real>
+bool jumps_over(LoadedStepper<real>& stepper, const std::vector<real>& from, const std::vector<real>& to, real step,
+                const std::vector<double>& scale) {
+    const std::size_t n = from.size() / 2;
+    if (n > spike_limit) return false;
+    // |q'|, |p'| at a part of the way; nothing where there are none.
+    const auto rates = [&](double part) {
+        std::vector<real> q(n), p(n), v, Lv, Lq;
+        const auto between = [&](std::size_t k) {
+            return from[1 + k] + static_cast<real>(part) * (to[1 + k] - from[1 + k]);
+        };
+        for (std::size_t k = 0; k < n; ++k) q[k] = between(k), p[k] = between(n + k);
+        std::vector<double> sizes;
+        if (stepper.velocity(from[0], q, p, v) != LOBATTO_OK) return sizes;
+        stepper.slopes(from[0], q, v, Lv, Lq);
+        for (const std::vector<real>* part_of : {&v, &Lq})
+            for (const real rate : *part_of) sizes.push_back(std::fabs(static_cast<double>(rate)));
+        return sizes;
+    };
+    const std::vector<double> first = rates(0), last = rates(1);
+    if (first.empty() || last.empty()) return false;
+    std::vector<std::vector<double>> inside;
+    for (int i = 1; i < looks; ++i) {
+        inside.push_back(rates(static_cast<double>(i) / looks));
+        if (inside.back().empty()) return true;
+    }
+    for (std::size_t k = 0; k < 2 * n; ++k) {
+        if (std::isinf(scale[k])) continue;
+        const double mean = std::fabs(static_cast<double>((to[1 + k] - from[1 + k]) / step)),
+                     ordinary = std::max({first[k], last[k], mean});
+        const auto most =
+            std::max_element(inside.begin(), inside.end(), [k](const auto& x, const auto& y) { return x[k] < y[k]; });
+        if (!((*most)[k] > 2 * ordinary)) continue;
+        double low = static_cast<double>(most - inside.begin()) / looks, high = low + 2.0 / looks;
+        for (int section = 0; section < closer; ++section) {
+            const double left = high - golden * (high - low), right = low + golden * (high - low);
+            const std::vector<double> at_left = rates(left), at_right = rates(right);
+            if (at_left.empty() || at_right.empty()) return true;
+            if (std::max(at_left[k], at_right[k]) > spike * ordinary) return true;
+            (at_left[k] > at_right[k] ? high : low) = at_left[k] > at_right[k] ? right : left;
+        }
+    }
+    return false;
+}
+
+}  // namespace
+
+template <class real>
+HardestSteps<real>::HardestSteps() : places_(2 * shared + 1) {}
+
+template <class real>
+void HardestSteps<real>::look(const std::vector<real>& state, real energy) {
+    const std::size_t n = state.size() / 2;
+    const auto consider = [&](std::size_t place, real change) {
+        if (change < real(0)) change = -change;
+        if (change > places_[place].change) places_[place] = {change, before_};
+    };
+    if (!before_.empty()) {
+        for (std::size_t k = 0; k < n; ++k) {
+            consider(k % shared, state[1 + k] - before_[1 + k]);
+            consider(shared + k % shared, state[1 + n + k] - before_[1 + n + k]);
+        }
+        consider(2 * shared, energy - energy_before_);
+    }
+    before_ = state;
+    energy_before_ = energy;
+}
+
+template <class real>
+States<real> HardestSteps<real>::states() const {
+    States<real> states;
+    for (const Place& place : places_)
+        if (!place.state.empty()) states.push_back(place.state);
+    std::sort(states.begin(), states.end());
+    states.erase(std::unique(states.begin(), states.end()), states.end());
+    return states;
+}
+
+template <class real>
+std::vector<real> HardestSteps<real>::seen() const {
+    if (before_.empty()) return {};
+    std::vector<real> all = before_;
+    all.push_back(energy_before_);
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+        if (places_[i].state.empty()) continue;
+        all.push_back(static_cast<real>(i));
+        all.push_back(places_[i].change);
+        all.insert(all.end(), places_[i].state.begin(), places_[i].state.end());
+    }
+    return all;
+}
+
+template <class real>
+void HardestSteps<real>::go_on_after(const std::vector<real>& seen, std::size_t columns) {
+    if (seen.empty()) return;
+    const auto width = static_cast<std::ptrdiff_t>(columns);
+    auto at = seen.begin();
+    before_.assign(at, at + width);
+    energy_before_ = at[width];
+    for (at += width + 1; at < seen.end(); at += width + 2)
+        places_[static_cast<std::size_t>(at[0])] = {at[1], {at + 2, at + 2 + width}};
+}
+
+template <class real>
+SingleSteps single_steps(LoadedStepper<real>& stepper, const States<real>& states, std::int64_t every, real end,
+                         const std::vector<real>& parameters, real step, const std::vector<double>& scale) {
+    const double work = static_cast<double>(every) * static_cast<double>(states.size() * scale.size());
+    States<real> hardest = states;
+    if (every > 1 && work <= step_work)
+        for (std::vector<real>& state : hardest) {
+            const std::int64_t left = std::llround(static_cast<double>((end - state[0]) / step));
+            state = before_furthest(stepper, state, std::min(every, left), scale);
+        }
+    SingleSteps seen;
+    const std::vector<Halved<real>> steps = halved(stepper, hardest, parameters, step, scale);
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        const Halved<real>& one = steps[i];
+        if (one.end.empty()) continue;
+        seen.error = std::fmax(seen.error, std::fmin(1, one.difference));
+        if (!seen.unresolved && (!(one.difference <= grossly * distance(one.end, hardest[i], scale)) ||
+                                 jumps_over(stepper, hardest[i], one.end, step, scale)))
+            seen.unresolved = static_cast<double>(hardest[i][0]);
+    }
+    return seen;
+}
+
+template class HardestSteps<float>;
+template class HardestSteps<double>;
+template class HardestSteps<long double>;
+template class HardestSteps<__float128>;
+template SingleSteps single_steps(LoadedStepper<float>&, const States<float>&, std::int64_t, float,
+                                  const std::vector<float>&, float, const std::vector<double>&);
+template SingleSteps single_steps(LoadedStepper<double>&, const States<double>&, std::int64_t, double,
+                                  const std::vector<double>&, double, const std::vector<double>&);
+template SingleSteps single_steps(LoadedStepper<long double>&, const States<long double>&, std::int64_t, long double,
+                                  const std::vector<long double>&, long double, const std::vector<double>&);
+template SingleSteps single_steps(LoadedStepper<__float128>&, const States<__float128>&, std::int64_t, __float128,
+                                  const std::vector<__float128>&, __float128, const std::vector<double>&);
+
+}  // namespace lobatto

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Whether the step of a run suits its motion: against the stability limit, and by what its own polynomials say.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/accuracy/hardest_steps.hpp"
+#include "generator/mechanics/derivation.hpp"
+#include "runtime/run/trajectory.hpp"
+
+namespace lobatto {
+
+class StepJudge {
+public:
+    // Looks at the kept states go by: how far the motion goes, where it changes most, and a few states of all its
+    // times, chosen as if at random: equal distances could go along with the motion's own rhythm.
+    explicit StepJudge(const Scene& scene);
+    void look(const Records& records);
+
+    // What it has seen so far, for a later run that goes on.
+    std::vector<double> seen() const;
+    void go_on_after(const std::vector<double>& seen);
+
+    enum class Neighbours { unknown, stay, part_quickly };  // motions that begin beside this one
+    struct Judgement {
+        double error = 0;                             // estimated, relative to the amplitude, at most 1
+        Neighbours neighbours = Neighbours::unknown;  // unknown of long runs
+        double radians = 0;                           // h times the largest frequency met; 0: not looked for
+        double limit = 0;  // of that, by linear stability; infinite when it lies above, and for Gauss
+        struct Unresolved {
+            std::int64_t step;  // the first is 1
+            double time;        // of its start
+        };
+        std::optional<Unresolved> unresolved;  // the first such step that was found
+        std::string text() const;              // of the error, one line
+        // Beyond the limit, and the error as large as the motion: where no energy is kept that would tell, the run is
+        // lost.
+        bool is_lost() const { return radians > limit && error >= 1; }
+    };
+    Judgement judge(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request,
+                    const TrajectoryResult& result) const;
+    // What to tell of a run that is lost, as of any stop.
+    static std::string loss(const Judgement& judgement, const TrajectoryRequest& request,
+                            const TrajectoryResult& result);
+    // One warning a string.
+    static std::vector<std::string> warnings(const Judgement& judgement, double wanted_error);
+
+private:
+    std::vector<int> groups_;           // coordinates of the same unit have the same number
+    std::int64_t rows_a_step_;          // states between the steps are less accurate than those at them
+    std::vector<double> least_, most_;  // 2n
+    struct State {
+        std::int64_t number;
+        std::vector<double> row;  // t, q, p
+    };
+    std::map<std::uint64_t, State> some_;  // by a scrambled number: those with the smallest
+    HardestSteps<double> hardest_;
+    std::int64_t seen_ = 0;
+    void keep(std::int64_t number, std::vector<double> row);
+};
+
+// Coordinates of the same unit have the same number.
+std::vector<int> unit_groups(const Scene& scene);
+
+}  // namespace lobatto

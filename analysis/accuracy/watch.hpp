@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Watches the kept states of a run and measures them against all that is known of the system in closed form.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "generator/mechanics/derivation.hpp"
+#include "runtime/measure/diagnostics.hpp"
+#include "runtime/run/trajectory.hpp"
+
+namespace lobatto {
+
+class Watch {
+public:
+    // The stepper is prepared; `velocity` is the initial one.
+    Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
+          const std::vector<double>& velocity);
+
+    void look(const Records& records);
+    void look_at_end(const TrajectoryResult& result);  // whatever was skipped: the last state is compared
+
+    std::optional<double> discrete_error() const;  // largest |H_d - H_d(0)| / |H_d(0)|, of linear systems
+    std::optional<double> position_error() const;  // largest |q - exact q|, where the solution is known in closed form
+    // What it has seen so far, for a later run that goes on.
+    std::vector<double> seen() const;
+    void go_on_after(const std::vector<double>& seen);
+
+    bool is_elliptic() const { return closed_ && closed_->kind == ClosedSolution::Kind::pendulum; }
+
+private:
+    void compare(double time, double q);
+
+    std::int64_t between_ = 0;  // states between two steps
+    std::optional<ClosedSolution> closed_;
+    long double omega_squared_ = 0, q0_ = 0, velocity0_ = 0;
+    double position_error_ = 0;
+    std::int64_t seen_ = 0, compared_ = 0, stride_ = 1;
+
+    std::optional<DiscreteEnergy> discrete_;
+    double discrete_start_ = 0, discrete_error_ = 0;
+};
+
+}  // namespace lobatto

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/exact_start.hpp"
+
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+ExactStart::ExactStart(const Scene& scene) : from_velocity(scene.start == Start::velocity) {
+    for (const Parameter& parameter : scene.parameters)
+        parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name));
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
+        const std::string& name = scene.coordinates[k].name;
+        q.push_back(scene.evaluate(scene.initial_position[k], "the initial position of " + name));
+        rate.push_back(scene.evaluate(
+            scene.initial_rate[k], (from_velocity ? "the initial velocity of " : "the initial momentum of ") + name));
+    }
+}
+
+template <class real>
+StartIn<real> start_in(const ExactStart& start, const Kernel& kernel, real step) {
+    const auto all = [](const std::vector<GiNaC::numeric>& values) {
+        std::vector<real> converted;
+        for (const GiNaC::numeric& value : values) converted.push_back(number_of<real>(value));
+        return converted;
+    };
+    StartIn<real> result{all(start.parameters), all(start.q), all(start.rate)};
+    LoadedStepper<real> stepper(kernel);
+    const lobatto_status status = stepper.prepare(result.parameters, step);
+    if (status != LOBATTO_OK)
+        throw ComputationError(status == LOBATTO_SINGULAR_MASS
+                                   ? "the mass matrix has no inverse for the scene's parameters"
+                                   : "the kernel's coefficients are not finite for the scene's parameters and step");
+    if (start.from_velocity) result.p = stepper.momentum(real(0), result.q, result.p);
+    return result;
+}
+
+template StartIn<float> start_in(const ExactStart&, const Kernel&, float);
+template StartIn<double> start_in(const ExactStart&, const Kernel&, double);
+template StartIn<long double> start_in(const ExactStart&, const Kernel&, long double);
+template StartIn<__float128> start_in(const ExactStart&, const Kernel&, __float128);
+
+}  // namespace lobatto

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/kernel_of.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "analysis/support_text.hpp"
+#include "generator/mechanics/structure.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// In one translation unit a header's guard is a warning and its include of another part is a missing file.
+void append_part(std::string& whole, const std::string& text) {
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        const bool joins_parts = line == "#pragma once" || line.starts_with("#include \"");
+        if (!joins_parts) whole += line + '\n';
+    }
+}
+
+// What a library of this kernel is compiled from.
+std::string support_of(const KernelSource& source, bool is_ensemble) {
+    if (source.stepper.empty()) return support_text();
+    std::vector<std::string> names = {source.stepper, "base/angles.hpp", "steppers/events.hpp"};
+    if (is_ensemble) names.push_back("steppers/ensemble.hpp");
+    if (is_ensemble && source.form == Form::separable) names.push_back("iteration/ensemble_fixed_point.hpp");
+    return support_text(names);
+}
+
+Kernel built(const KernelSource& source, const Translation& translation, Compiled* compiled) {
+    const Compiled object = compile(translation);
+    if (compiled != nullptr) *compiled = object;
+    if (object.was_altered)
+        fmt::print(stderr,
+                   "lobatto: the compiled kernel {} was not as it had been built: damaged, changed, or open to others. "
+                   "It was compiled again.\n",
+                   object.object);
+    return Kernel::load(object.object, source.digest);
+}
+
+}  // namespace
+
+Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together) {
+    Translation translation;
+    translation.name = source.name;
+    translation.quadruple = precision == Precision::quadruple;
+    translation.short_loops = source.form == Form::general;
+    if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
+    if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
+        translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
+    append_part(translation.text, std::string(kernel_abi_h_text));
+    append_part(translation.text, support_of(source, together > 0));
+    append_part(translation.text, source.header);
+    append_part(translation.text, std::string(kernel_export_hpp_text));
+    translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
+    return translation;
+}
+
+Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled) {
+    return built(source, translation_of(source, precision), compiled);
+}
+
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together) {
+    return built(source, translation_of(source, precision, std::max<std::int64_t>(together, 1)), nullptr);
+}
+
+}  // namespace lobatto

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Where the two halves meet: what the generator wrote becomes a kernel that the runtime can run.
+#pragma once
+
+#include <cstdint>
+
+#include "generator/emit/kernel.hpp"
+#include "runtime/build/compile.hpp"
+#include "runtime/build/library.hpp"
+
+namespace lobatto {
+
+// The whole translation unit of a kernel: the support headers, the emitted header, the export.
+// `together` > 0: with what ensembles need of which a thread has so many trajectories; that takes longer to compile.
+Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together = 0);
+
+// Compiles it, or finds it in the cache, and loads it. `source` must have been emitted with this precision, without
+// standalone support.
+Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled = nullptr);
+// The same for ensembles, of which a thread has `together` trajectories: its table has lanes, where they are worth it.
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together);
+
+}  // namespace lobatto

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A scene as a request for a trajectory.
+#include "analysis/motion.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& values, const std::string& what) {
+    std::vector<double> numbers;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+        const std::string name = fmt::format("the initial {} of {}", what, scene.coordinates[k].name);
+        numbers.push_back(scene.evaluate(values[k], name).to_double());
+    }
+    return numbers;
+}
+
+}  // namespace
+
+GiNaC::numeric step_of(const Scene& scene, const Overrides& overrides) {
+    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
+    if (!step.is_positive()) {
+        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}",
+                                     overrides.step.empty() ? scene.path : "--step", step.to_double()));
+    }
+    const double size = step.to_double();
+    if (!(size >= 1e-152 && size <= 1e152)) {
+        throw InputError(fmt::format(
+            "{}: the step must be between 1e-152 and 1e152, because its square stands in the formulas, but is {:.6g}; "
+            "choose another unit of time",
+            overrides.step.empty() ? scene.path : "--step", size));
+    }
+    return step;
+}
+
+Steps steps_of(const Scene& scene, const Overrides& overrides) {
+    const GiNaC::numeric step = step_of(scene, overrides), until = scene.evaluate(scene.run.until, "the end time");
+    if (until.is_negative()) {
+        throw InputError(fmt::format("{}: the end time must not be negative, but is {:.6g}",
+                                     overrides.until.empty() ? scene.path : "--until", until.to_double()));
+    }
+    const double ratio = (until / step).to_double();
+    if (!(ratio < 9e15))
+        throw InputError(fmt::format(
+            "{}: {:.3g} steps are too many to count; make the step larger or the end time smaller", scene.path, ratio));
+    const double nearest = std::round(ratio);
+    const bool reaches_end = std::fabs(ratio - nearest) <= 1e-9;
+    return {static_cast<std::int64_t>(reaches_end ? nearest : std::floor(ratio)), reaches_end};
+}
+
+TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper) {
+    TrajectoryRequest request;
+    for (const Parameter& parameter : scene.parameters)
+        request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = steps;
+    request.tolerance = scene.method.tolerance;
+    request.every = scene.outputs.every;
+    request.dense = scene.outputs.dense;
+    const bool from_velocity = scene.start == Start::velocity;
+    request.q = doubles(scene, scene.initial_position, "position");
+    request.p = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
+
+    TrajectoryResult none;
+    none.status = stepper.prepare(request.parameters, request.step);
+    if (none.status == LOBATTO_OK) {
+        if (from_velocity) request.p = stepper.momentum(request.time, request.q, request.p);
+        none.status = stepper.start(request.time, request.q, request.p);
+    }
+    none.q = request.q;
+    none.p = request.p;
+    if (none.status != LOBATTO_OK)
+        throw ComputationError(fmt::format("{}: {}", scene.path, explain_stop(none, request)));
+    return request;
+}
+
+}  // namespace lobatto

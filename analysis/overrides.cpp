@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/overrides.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/formula/expression.hpp"
+#include "generator/formula/suggest.hpp"
+
+namespace lobatto {
+
+namespace {
+
+[[noreturn]] void fail_unknown(const Source& source, const Scene& scene, const std::string& name) {
+    for (const Parameter& constant : scene.constants) {
+        if (constant.written == name)
+            source.fail(
+                {1, 1},
+                fmt::format(
+                    "'{}' is declared constant in {}, so it is part of the kernel; only run-time parameters can be set",
+                    name, scene.path));
+    }
+    if (scene.parameters.empty())
+        source.fail({1, 1}, fmt::format("unknown parameter '{}'; {} has no run-time parameters", name, scene.path));
+    std::vector<std::string> names;
+    for (const Parameter& parameter : scene.parameters) names.push_back(parameter.written);
+    source.fail({1, 1},
+                fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
+}
+
+void set_parameter(const std::string& argument, Scene& scene) {
+    const Source source("--set", argument);
+    const std::size_t equals = argument.find('=');
+    if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
+    const std::string name = argument.substr(0, equals);
+    const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
+                                        [&](const Parameter& p) { return p.written == name; });
+    if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
+    const Scope scope{nullptr, fmt::format("the value of {}", name), false, {}};
+    const Text text = text_of(argument, equals + 1);
+    parameter->value = parse_expression(source, text, scope);
+    value_in_range(source, text.at.front(), parameter->value, scope.formula);
+}
+
+GiNaC::ex in_parameters(const std::string& option, const std::string& argument, const std::string& what,
+                        const Scene& scene) {
+    Names names = parameter_names(scene);
+    const Scope scope{&names, what, false, {}};
+    GiNaC::exmap values;
+    for (const Parameter& parameter : scene.parameters)  // whose own values may be formulas, as 2*pi
+        values[parameter.symbol] = scene.evaluate(parameter.value, "the parameter " + parameter.name);
+    const Source source(option, argument);
+    const GiNaC::ex expression = parse_expression(source, text_of(argument, 0), scope);
+    value_in_range(source, {1, 1}, expression, what, values);
+    return expression;
+}
+
+}  // namespace
+
+Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
+    end = std::min(end, argument.size());
+    Text text{argument.substr(begin, end - begin), {}};
+    int column = 0;
+    for (std::size_t i = 0; i <= end; ++i) {
+        const bool starts_character = i == argument.size() || (static_cast<unsigned char>(argument[i]) & 0xC0) != 0x80;
+        if (starts_character) ++column;
+        if (i >= begin) text.at.push_back({1, column});
+    }
+    return text;
+}
+
+void apply(const Overrides& overrides, Scene& scene) {
+    for (const std::string& argument : overrides.set) set_parameter(argument, scene);
+    if (!overrides.step.empty()) scene.run.step = in_parameters("--step", overrides.step, "the step", scene);
+    if (!overrides.until.empty()) scene.run.until = in_parameters("--until", overrides.until, "the end time", scene);
+    if (overrides.every && *overrides.every < 1)
+        throw InputError(fmt::format(
+            "--every: {} is not a number of states; give 1 to keep each, 10 to keep every tenth", *overrides.every));
+    if (overrides.every && *overrides.every > 1 && scene.outputs.dense > 0)
+        throw InputError(
+            fmt::format("--every: the scene asks for states between two steps (dense = {}), so all steps are kept",
+                        scene.outputs.dense));
+    if (overrides.every) scene.outputs.every = *overrides.every;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Values that stand in for those of a scene: parameters, step, end, what is kept.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "generator/scene/scene.hpp"
+
+namespace lobatto {
+
+struct Overrides {
+    std::vector<std::string> set;  // "name=expression": run-time parameters; the expression is a number such as 2*pi
+    std::string step, until;       // expressions in the parameters; empty: as in the scene
+    std::optional<long> every;
+};
+
+// The bytes of an argument from `begin` on, to before `end`, each with its column.
+Text text_of(const std::string& argument, std::size_t begin, std::size_t end = std::string::npos);
+
+// Throws InputError with the place in the argument.
+void apply(const Overrides& overrides, Scene& scene);
+
+}  // namespace lobatto

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/candidate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::int64_t often = 36;  // times that are compared
+
+}  // namespace
+
+std::string precision_name(Precision precision) {
+    switch (precision) {
+        case Precision::single:
+            return "float";
+        case Precision::double_:
+            return "double";
+        case Precision::extended:
+            return "long double";
+        case Precision::quadruple:
+            return "__float128";
+    }
+    return "";
+}
+
+double rounding_of(Precision precision) {
+    switch (precision) {
+        case Precision::single:
+            return std::ldexp(1.0, -23);
+        case Precision::double_:
+            return std::ldexp(1.0, -52);
+        case Precision::extended:
+            return std::ldexp(1.0, -63);
+        case Precision::quadruple:
+            return std::ldexp(1.0, -112);
+    }
+    return 0;
+}
+
+std::vector<Member> family_in(Precision precision, bool is_separable) {
+    std::vector<Member> members;
+    for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {
+        if (family == Family::splitting && !is_separable) continue;
+        for (const int points : sizes_of(family)) members.push_back({family, points, precision});
+    }
+    return members;
+}
+
+std::string Candidate::name() const {
+    return fmt::format("{} {}{}",
+                       member.family == Family::lobatto ? "Lobatto"
+                       : member.family == Family::gauss ? "Gauss"
+                                                        : "Splitting",
+                       member.points, member.arithmetic == StepArithmetic::clean ? " clean" : "");
+}
+
+bool StepLadder::good(std::int64_t steps) const {
+    return std::gcd(steps, std::int64_t(samples_)) >= std::min({steps, often, std::int64_t(samples_)});
+}
+
+std::int64_t StepLadder::at_least(double steps) const {
+    std::int64_t count = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(steps)));
+    while (!good(count)) ++count;
+    // Nearby ones may be compared more often.
+    std::int64_t best = count;
+    const auto near = static_cast<std::int64_t>(static_cast<double>(count) * (1 + (ratio_ - 1) / 4));
+    for (std::int64_t other = count + 1; other <= near && other - count < samples_; ++other)
+        if (std::gcd(other, std::int64_t(samples_)) > std::gcd(best, std::int64_t(samples_))) best = other;
+    return best;
+}
+
+std::int64_t StepLadder::at_most(double steps) const {
+    std::int64_t count = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::floor(steps)));
+    while (!good(count)) --count;
+    return count;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The method and the step that keep a promise at the least cost, and the promise.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "analysis/tradeoff/search.hpp"
+
+namespace lobatto {
+
+constexpr double least_error = 1e-15, largest_error = 0.1;  // that can be asked for
+
+struct Choice {
+    Measurement measurement;  // its error is the prediction
+    double until = 0;
+    std::string reference;       // what it was compared with
+    double uncertainty = 0;      // of that
+    double frequency = 0;        // the largest of the motion
+    double stability_limit = 0;  // of h times it
+    int members = 0;             // looked at
+    bool complete = false;       // whether none of the others can be expected to be faster
+    double seconds = 0;          // that the search took
+
+    double step() const { return until / static_cast<double>(measurement.candidate.steps); }
+};
+
+struct ChoiceRequest {
+    double error = 0;  // the promise: the largest at any time, relative to the amplitude of the motion
+    double seconds = 20;
+    const volatile int* interrupted = nullptr;
+    std::function<void(const std::string&)> say = [](const std::string&) {};
+};
+
+// ComputationError: the error cannot be kept, or nobody knows the motion that well; it says what can be promised.
+Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& request);
+
+}  // namespace lobatto

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/exploration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <thread>
+
+namespace lobatto {
+
+std::vector<Measurement> pareto_front(const Laboratory& laboratory) {
+    std::vector<Measurement> complete, front;
+    for (const auto& [key, m] : laboratory.notebook().all())
+        if (m.complete) complete.push_back(m);
+    std::sort(complete.begin(), complete.end(), [&](const Measurement& a, const Measurement& b) {
+        return std::tuple(a.seconds, laboratory.figure(a), a.candidate.key()) <
+               std::tuple(b.seconds, laboratory.figure(b), b.candidate.key());
+    });
+    for (const Measurement& m : complete)
+        if (front.empty() || laboratory.figure(m) < laboratory.figure(front.back())) front.push_back(m);
+    return front;
+}
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double most_steps = 1e9;
+
+// Members in the order in which they are looked at: first those far apart, then between them.
+std::vector<Member> tour(bool is_separable) {
+    std::vector<Member> members;
+    const auto add = [&](Family family, Precision precision, std::initializer_list<int> points) {
+        for (const int count : points) members.push_back({family, count, precision});
+    };
+    add(Family::lobatto, Precision::double_, {8, 4});
+    add(Family::gauss, Precision::double_, {6});
+    add(Family::lobatto, Precision::double_, {12, 2});
+    add(Family::gauss, Precision::double_, {10});
+    add(Family::lobatto, Precision::double_, {6, 10});
+    add(Family::lobatto, Precision::single, {6});
+    add(Family::gauss, Precision::double_, {3, 1});
+    add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
+    add(Family::lobatto, Precision::extended, {12});
+    if (is_separable) {
+        add(Family::splitting, Precision::double_, {11, 17});
+        for (const int count : {8, 12})
+            members.push_back({Family::lobatto, count, Precision::double_, StepArithmetic::clean});
+    }
+    add(Family::lobatto, Precision::double_, {5, 3, 9, 7, 11});
+    add(Family::gauss, Precision::double_, {8, 4, 2, 5, 7, 9});
+    if (is_separable) add(Family::splitting, Precision::double_, {6, 14, 35});
+    add(Family::lobatto, Precision::single, {4, 8});
+    add(Family::lobatto, Precision::extended, {9});
+    return members;
+}
+
+// The least time of what is as accurate or better.
+double fastest_within(const Laboratory& laboratory, double figure) {
+    double seconds = infinity;
+    for (const auto& [key, m] : laboratory.notebook().all())
+        if (m.complete && laboratory.figure(m) <= figure) seconds = std::min(seconds, m.seconds);
+    return seconds;
+}
+
+// A ladder of steps of one member; finer ratios and looser iterations once it is known to be among the best.
+struct Scan {
+    Member member;
+    double ratio = 1.5, tolerance = 0;
+    auto key() const { return std::tuple(member, ratio, tolerance); }
+    friend bool operator<(const Scan& a, const Scan& b) { return a.key() < b.key(); }
+};
+
+// From coarse to fine until it has lost, or rounding is reached.
+void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
+    const StepLadder ladder = laboratory.ladder(scan.ratio);
+    const double longest_run = laboratory.request().seconds / 40;
+    double least = infinity;
+    int no_better = 0, dominated = 0;
+    for (std::int64_t steps = ladder.at_least(laboratory.fewest_steps());
+         static_cast<double>(steps) < most_steps && (laboratory.left() > reserve || !std::isfinite(least));
+         steps = ladder.next(steps)) {
+        const Measurement m = laboratory.measure({scan.member, steps, scan.tolerance});
+        if (m.seconds > longest_run) return;
+        if (!m.complete) continue;
+        const double figure = laboratory.figure(m);
+        no_better = figure > 0.7 * least ? no_better + 1 : 0;
+        least = std::min(least, figure);
+        const double rounding =
+            1e4 * rounding_of(scan.member.precision) * std::sqrt(static_cast<double>(steps)) + scan.tolerance;
+        if (no_better >= 3 && least < rounding) return;
+        // Another is as accurate in a fraction of the time; four times in a row, because the coarsest steps may be
+        // slow.
+        const double lead = scan.ratio < 1.5 ? 2 : 4;
+        dominated = figure < 0.1 && m.seconds > lead * fastest_within(laboratory, figure) ? dominated + 1 : 0;
+        if (dominated >= 4) return;
+    }
+}
+
+// What would tell more about the members that are best at present; none is done twice.
+std::optional<Scan> refinement(const Laboratory& laboratory, const std::set<Scan>& done) {
+    std::vector<Member> winners;
+    for (const Measurement& m : pareto_front(laboratory))
+        if (m.error < 0.1 && std::find(winners.begin(), winners.end(), m.candidate.member) == winners.end())
+            winners.push_back(m.candidate.member);
+    for (const double ratio : {1.2, 1.08})
+        for (const double tolerance : {0.0, 1e-12, 1e-9, 1e-6})
+            for (const Member& member : winners) {
+                if (member.precision == Precision::quadruple) continue;
+                if (tolerance > 0 && (!member.iterates() || tolerance < 4 * rounding_of(member.precision))) continue;
+                if (const Scan scan{member, ratio, tolerance}; done.count(scan) == 0) return scan;
+            }
+    return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<Member> first_of_tour() {
+    const std::vector<Member> members = tour(false);
+    return {members.begin(), members.begin() + 4};
+}
+
+void explore(Laboratory& laboratory) {
+    Workshop& workshop = laboratory.workshop();
+    const double all = laboratory.request().seconds, reserve = 0.12 * all;
+    double last_order = 0.25 * all;  // what is ordered later would not be used
+    std::vector<Member> waiting = tour(laboratory.derivation().system.separable);
+    std::set<Scan> done;
+    const auto name = [](const Member& member) {
+        return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));
+    };
+    // However long the reference took: something is measured.
+    const auto has_time = [&] { return laboratory.left() > reserve || laboratory.notebook().all().empty(); };
+    while (has_time()) {
+        laboratory.check_interruption();
+        std::size_t at_work = 0;
+        for (const Member& member : waiting)
+            at_work += workshop.is_ordered(member) && !workshop.is_ready(member) ? 1 : 0;
+        const auto next =
+            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return !workshop.is_ordered(m); });
+        if (at_work <= workshop.threads() && next != waiting.end() && laboratory.left() > last_order)
+            workshop.order(*next);
+        const auto ready =
+            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return workshop.is_ready(m); });
+        if (ready != waiting.end()) {
+            const Member member = *ready;
+            waiting.erase(ready);
+            last_order = std::max(last_order, reserve + 1.5 * workshop.compile_seconds(member));
+            laboratory.request().say("measuring " + name(member));
+            work_on(laboratory, {member, member.precision == Precision::quadruple ? 2.0 : 1.5, 0}, reserve);
+        } else if (const auto scan = refinement(laboratory, done)) {
+            laboratory.request().say(fmt::format("finer steps of {}", name(scan->member)));
+            done.insert(*scan);
+            work_on(laboratory, *scan, reserve);
+        } else if (at_work == 0 && next == waiting.end()) {
+            break;
+        } else {
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+    }
+    workshop.cancel();
+}
+
+}  // namespace lobatto

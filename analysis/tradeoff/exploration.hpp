@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The trade of speed for accuracy over the whole family, from coarse to fine, refined where something wins.
+#pragma once
+
+#include <vector>
+
+#include "analysis/tradeoff/laboratory.hpp"
+
+namespace lobatto {
+
+// Returns when time is up or all has been seen; what it measured is in the laboratory's notebook.
+void explore(Laboratory& laboratory);
+std::vector<Member> first_of_tour();  // the kernels it begins with
+
+// Of all in the notebook those than which no other is both faster and more accurate; from coarse to fine.
+std::vector<Measurement> pareto_front(const Laboratory& laboratory);
+
+}  // namespace lobatto

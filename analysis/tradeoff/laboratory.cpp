@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/laboratory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/accuracy/step_judge.hpp"
+#include "runtime/build/compiler.hpp"
+#include "runtime/build/sha256.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr int few_coordinates = 10, some_coordinates = 20;
+constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
+constexpr double reference_share = 0.4;        // of the seconds
+constexpr double longest_radians = 4;          // h omega of the coarsest steps tried; Lobatto's limits are near pi
+const std::string measurements_version = "3";  // of what is measured: older notebooks are begun anew
+
+// A run to the end of which nothing but error and time was asked.
+bool knows_errors_only(const Measurement& m) {
+    return m.complete && std::isnan(m.energy_error) && std::isnan(m.defect) && std::isnan(m.momentum_error);
+}
+
+// In quadruple precision where that is asked for and affordable. Order 22; of large systems the equations of a step are
+// large too, and order 10 does.
+Member reference_member(const Scene& scene, double wanted) {
+    const std::size_t n = scene.coordinates.size();
+    return {Family::lobatto, n <= some_coordinates ? 12 : 6,
+            n <= few_coordinates && wanted < extended_reach ? Precision::quadruple : Precision::extended};
+}
+
+// What is measured and on what machine: another text, other measurements.
+std::string subject_of(const Scene& scene, const Workshop& workshop, const Member& reference, double until) {
+    std::string text = measurements_version + workshop.digest(reference) + processor_identity() + exact_text(until);
+    for (const auto* values : {&scene.initial_position, &scene.initial_rate})
+        for (const GiNaC::ex& value : *values)
+            text += " " + exact_text(scene.evaluate(value, "an initial value").to_double());
+    for (const Parameter& parameter : scene.parameters)
+        text += " " + exact_text(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
+    return fmt::format("{} {} to t = {}", scene.name, sha256(text).substr(0, 16), exact_text(until));
+}
+
+}  // namespace
+
+double end_of(const Scene& scene) {
+    const double until = scene.evaluate(scene.run.until, "the end time").to_double();
+    if (!(until > 0))
+        throw InputError(
+            fmt::format("{}: the end time is {:.6g}, so there is nothing to measure; give `until` in [run], or --until",
+                        scene.path, until));
+    return until;
+}
+
+Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequest request)
+    : began_(std::chrono::steady_clock::now()),
+      scene_(scene),
+      request_(std::move(request)),
+      start_(scene),
+      workshop_(std::move(derivation)),
+      conserves_(workshop_.derivation().system.autonomous && !workshop_.derivation().system.has_forces()) {
+    Member reference = reference_member(scene, request_.wanted);
+    const double until = end_of(scene);
+    workshop_.order(reference);
+    for (const Member& member : request_.first) workshop_.order(member);
+    if (!request_.notebook.empty())
+        notebook_ = Notebook(request_.notebook, subject_of(scene_, workshop_, reference, until));
+    ReferenceRequest wish;
+    wish.until = until;
+    wish.wanted = request_.wanted;
+    wish.groups = unit_groups(scene_);
+    wish.interrupted = request_.interrupted;
+    const auto compute = [&] {
+        request_.say("compiling the reference in " + precision_name(reference.precision));
+        const Kernel exact = workshop_.kernel(reference);
+        request_.say("computing the reference in " + precision_name(reference.precision));
+        wish.seconds_limit = reference_share * std::max(left(), request_.seconds / 4);
+        reference_ = compute_reference(exact, start_, wish);
+        measurer_.emplace(reference_, start_, exact, conserves_, request_.interrupted);
+    };
+    try {
+        compute();
+    } catch (const TooSlow&) {
+        if (reference.precision == Precision::extended) throw;
+        reference.precision = Precision::extended;
+        compute();
+    }
+}
+
+double Laboratory::figure(const Measurement& measurement) const {
+    if (!is_chaotic()) return measurement.error;
+    return std::isfinite(measurement.energy_error) ? measurement.energy_error : 1 / measurement.reaches;
+}
+
+double Laboratory::fewest_steps() const {
+    return std::max(1.0, until() * reference_.frequency / longest_radians);
+}
+
+double Laboratory::elapsed() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+}
+
+void Laboratory::check_interruption() const {
+    if (request_.interrupted != nullptr && *request_.interrupted != 0) throw Interrupted();
+}
+
+Measurement Laboratory::measure(const Candidate& candidate, bool all) {
+    check_interruption();
+    const Measurement* const known = notebook_.find(candidate);
+    if (known != nullptr && !(all && knows_errors_only(*known))) return *known;
+    if (!knows_symmetries_ && candidate.member.precision == Precision::double_) {
+        knows_symmetries_ = true;
+        const Kernel kernel = workshop_.kernel(candidate.member);
+        const double step = reference_.until / static_cast<double>(candidate.steps);
+        const StartIn<double> start = start_in<double>(start_, kernel, step);
+        std::vector<std::string> names;
+        for (const Coordinate& coordinate : scene_.coordinates) names.push_back(coordinate.name);
+        measurer_->know_symmetries(find_symmetries(kernel, start.parameters, start.q, step, names));
+    }
+    Measurement measurement = measurer_->measure(workshop_.kernel(candidate.member), candidate, all);
+    measurement.compile_seconds = workshop_.compile_seconds(candidate.member);
+    return notebook_.add(measurement);
+}
+
+Measurement Laboratory::time_again(const Measurement& measurement, int repetitions) {
+    Measurement better = measurement;
+    for (int i = 0; i < repetitions; ++i) {
+        check_interruption();
+        const Timing timing =
+            measurer_->time_once(workshop_.kernel(measurement.candidate.member), measurement.candidate);
+        if (timing.complete) better.seconds = std::min(better.seconds, timing.seconds);
+    }
+    return notebook_.add(better);
+}
+
+}  // namespace lobatto

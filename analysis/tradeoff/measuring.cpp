@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/measuring.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <numeric>
+#include <set>
+#include <string>
+
+#include "analysis/accuracy/hardest_steps.hpp"
+#include "analysis/gradients.hpp"
+#include "runtime/measure/diagnostics.hpp"
+#include "runtime/measure/extrapolation.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr double lost = 0.01;           // of the amplitude: the motion is another one
+constexpr std::int64_t energies = 128;  // samples at which the energy is looked at
+constexpr int estimate_states = 64;     // that the estimate looks at
+constexpr double golden = 0.6180339887498949;
+constexpr std::int64_t looks = 1500;     // steps whose error is looked at
+constexpr int defect_limit = 32;         // coordinates; tangent maps of more take long
+constexpr double timing_seconds = 4e-3;  // of repetitions in all
+constexpr int most_repetitions = 5;
+constexpr double block_seconds = 0.05;  // between two looks at the interruption
+
+double processor_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// A run of the kernel with records at the samples, in blocks so that it can be interrupted.
+template <class real>
+struct TimedRun {
+    LoadedStepper<real> stepper;
+    StartIn<real> start;
+    real h;
+    std::vector<real> rows;  // meetings x (1 + 2n)
+    std::int64_t meetings, every;
+    double seconds = 0;
+    std::int64_t steps = 0, iterations = 0;
+    lobatto_status status = LOBATTO_OK;
+
+    TimedRun(const Kernel& kernel, const ExactStart& exact, const Candidate& candidate, double until, int samples)
+        : stepper(kernel),
+          h(static_cast<real>(until) / static_cast<real>(candidate.steps)),
+          meetings(std::gcd(candidate.steps, std::int64_t(samples))),
+          every(candidate.steps / meetings) {
+        start = start_in<real>(exact, kernel, h);
+        rows.resize(static_cast<std::size_t>(meetings) * (1 + 2 * start.q.size()));
+    }
+
+    void go(const Candidate& candidate, const volatile int* interrupted) {
+        const std::size_t columns = 1 + 2 * start.q.size();
+        seconds = 0;
+        steps = iterations = 0;
+        status = stepper.prepare(start.parameters, h);
+        if (status == LOBATTO_OK) status = stepper.start(0, start.q, start.p);
+        std::int64_t written = 0, block = std::min<std::int64_t>(candidate.steps, 4096);
+        while (status == LOBATTO_OK && steps < candidate.steps) {
+            if (interrupted != nullptr && *interrupted != 0) throw Interrupted();
+            lobatto_advance call{};
+            call.steps = std::min(block, candidate.steps - steps);
+            call.tolerance = candidate.tolerance;
+            call.record_every = every;
+            call.records = rows.data() + static_cast<std::size_t>(written) * columns;
+            call.capacity = meetings - written + 1;
+            const double began = processor_seconds();
+            status = stepper.advance(call);
+            const double took = processor_seconds() - began;
+            seconds += took;
+            steps += call.steps_done;
+            iterations += call.iterations;
+            written += call.records_written;
+            if (took < block_seconds / 4) block *= 2;
+        }
+        if (written < meetings && status == LOBATTO_OK) status = LOBATTO_NOT_FINITE;
+    }
+};
+
+// The slope of the straight line of least squares.
+double slope_of(const std::vector<double>& x, const std::vector<double>& y) {
+    const double count = static_cast<double>(x.size());
+    const double mean_x = std::accumulate(x.begin(), x.end(), 0.0) / count,
+                 mean_y = std::accumulate(y.begin(), y.end(), 0.0) / count;
+    double xx = 0, xy = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        xx += (x[i] - mean_x) * (x[i] - mean_x);
+        xy += (x[i] - mean_x) * (y[i] - mean_y);
+    }
+    return xx > 0 ? xy / xx : 0;
+}
+
+}  // namespace
+
+Measurer::Measurer(const Reference& reference, const ExactStart& start, Kernel exact, bool conserves,
+                   const volatile int* interrupted)
+    : reference_(reference),
+      start_(start),
+      exact_(std::move(exact)),
+      conserves_(conserves && exact_->has_energy != 0),
+      interrupted_(interrupted) {}
+
+template <class real>
+Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidate, bool all, Course* course) const {
+    TimedRun<real> run(kernel, start_, candidate, reference_.until, reference_.samples);
+    run.go(candidate, interrupted_);
+    Measurement result;
+    result.candidate = candidate;
+    result.complete = run.status == LOBATTO_OK;
+    result.seconds = run.seconds;
+    if (!result.complete) return result;
+    double spent = run.seconds;
+    const std::size_t n = reference_.n, columns = 1 + 2 * n;
+
+    const auto error_at = [&](std::int64_t meeting) {
+        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
+        const auto sample = static_cast<std::size_t>(meeting * reference_.samples / run.meetings);
+        const double* const high = reference_.high.data() + sample * 2 * n;
+        const double* const low = reference_.low.data() + sample * 2 * n;
+        double worst = 0;
+        for (std::size_t k = 0; k < 2 * n; ++k) {
+            using Wide = std::conditional_t<std::is_same_v<real, float>, double, real>;
+            const Wide difference =
+                (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
+            const double error = std::fabs(static_cast<double>(difference)) / reference_.scale[k];
+            if (!(error <= worst)) worst = error;
+        }
+        return worst;
+    };
+    result.reaches = reference_.until;
+    bool is_lost = false;
+    for (std::int64_t meeting = 1; meeting <= run.meetings; ++meeting) {
+        const double error = error_at(meeting);
+        if (!(error <= result.error)) result.error = error;
+        result.error_end = error;
+        const double time = reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings);
+        if (!is_lost && !(error < lost)) {
+            is_lost = true;
+            result.reaches = reference_.until * static_cast<double>(meeting - 1) / static_cast<double>(run.meetings);
+        }
+        if (course != nullptr) {
+            course->time.push_back(time);
+            course->error.push_back(error);
+        }
+    }
+    if (!std::isfinite(result.error)) result.complete = false;
+    result.iterations = static_cast<double>(run.iterations) / static_cast<double>(run.steps);
+    result.gradients =
+        gradients_of(kernel.table(), static_cast<double>(run.iterations), static_cast<double>(run.steps));
+    result.energy_error = result.drift = result.momentum_error = result.defect = std::nan("");
+    if (!all || !result.complete) return result;
+
+    for (int repetition = 0; repetition < most_repetitions && spent < timing_seconds; ++repetition) {
+        const Timing again = time_in<real>(kernel, candidate);
+        result.seconds = std::min(result.seconds, again.seconds);
+        spent += again.seconds;
+    }
+    // Energy and momenta in the reference's precision, of the start as rounded and of the states as they are.
+    using Wide = __float128;
+    std::vector<Wide> q(n), p(n);
+    const auto state_at = [&](std::int64_t meeting) {
+        for (std::size_t k = 0; k < n; ++k) {
+            q[k] = meeting == 0 ? run.start.q[k] : run.rows[static_cast<std::size_t>(meeting - 1) * columns + 1 + k];
+            p[k] =
+                meeting == 0 ? run.start.p[k] : run.rows[static_cast<std::size_t>(meeting - 1) * columns + 1 + n + k];
+        }
+    };
+    const auto energy_of = [&](auto type) {
+        using Exact = decltype(type);
+        LoadedStepper<Exact> stepper(exact_);
+        const StartIn<Exact> exact = start_in<Exact>(start_, exact_, static_cast<Exact>(run.h));
+        stepper.prepare(exact.parameters, static_cast<Exact>(run.h));
+        std::vector<double> times, errors;
+        Exact first = 0;
+        const std::int64_t every =
+            std::max<std::int64_t>(1, run.meetings / (course != nullptr ? run.meetings : energies));
+        for (std::int64_t meeting = 0; meeting <= run.meetings; meeting += every) {
+            state_at(meeting);
+            Exact energy = 0;
+            const double time = reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings);
+            if (stepper.energy(static_cast<Exact>(time), std::vector<Exact>(q.begin(), q.end()),
+                               std::vector<Exact>(p.begin(), p.end()), energy) != LOBATTO_OK)
+                return;
+            if (meeting == 0) first = energy;
+            times.push_back(time);
+            errors.push_back(static_cast<double>(energy - first) / reference_.energy_scale);
+        }
+        result.energy_error = 0;
+        for (const double error : errors) result.energy_error = std::max(result.energy_error, std::fabs(error));
+        result.drift = slope_of(times, errors);
+        if (course != nullptr) course->energy.assign(errors.begin() + 1, errors.end());
+    };
+    if (conserves_ && reference_.energy_scale > 0) {
+        if (reference_.precision == Precision::quadruple)
+            energy_of(__float128());
+        else
+            energy_of(static_cast<long double>(0));
+    }
+    if (!symmetries_.empty()) {
+        double worst = 0;
+        for (const Symmetry& symmetry : symmetries_) {
+            Wide first = 0;
+            double largest = 0, size = 0;
+            for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) {
+                state_at(meeting);
+                Wide momentum = 0;
+                for (std::size_t i = 0; i < n; ++i) {
+                    Wide direction = symmetry.d[i];
+                    for (std::size_t j = 0; j < n; ++j) direction += static_cast<Wide>(symmetry.B[i * n + j]) * q[j];
+                    momentum += p[i] * direction;
+                    size = std::max(size, std::fabs(static_cast<double>(p[i] * direction)));
+                }
+                if (meeting == 0) first = momentum;
+                largest = std::max(largest, std::fabs(static_cast<double>(momentum - first)));
+            }
+            if (size > 0) worst = std::max(worst, largest / size);
+        }
+        result.momentum_error = worst;
+    }
+    run.stepper.prepare(run.start.parameters, run.h);
+    if (kernel->has_tangent != 0 && static_cast<int>(n) <= defect_limit && conserves_ && candidate.tolerance == 0)
+        result.defect = static_cast<double>(symplectic_defect(run.stepper, run.start.q, run.start.p));
+    // As `lobatto run` does it: the start and some other states, at distances that do not go along with the motion's
+    // own.
+    run.stepper.prepare(run.start.parameters, run.h);
+    std::set<std::int64_t> places = {0};
+    for (int i = 1; i < estimate_states; ++i)
+        places.insert(static_cast<std::int64_t>(std::fmod(i * golden, 1.0) * static_cast<double>(run.meetings + 1)));
+    States<real> states;
+    const auto row_at = [&](std::int64_t meeting) {
+        state_at(meeting);
+        std::vector<real> row{run.h * static_cast<real>(meeting * run.every)};
+        for (const auto* part : {&q, &p})
+            for (const Wide value : *part) row.push_back(static_cast<real>(value));
+        return row;
+    };
+    for (const std::int64_t meeting : places) states.push_back(row_at(meeting));
+    const std::pair kind(candidate.member.family, candidate.member.points);
+    if (estimates_.count(kind) == 0) estimates_.emplace(kind, quadrature_of(candidate.member.method()));
+    const ErrorEstimate& estimate = estimates_.at(kind);
+    const bool energy_tells = conserves_ && candidate.member.family == Family::lobatto;
+    Evidence evidence = evidence_of(
+        run.stepper, states, run.start.parameters, run.h, reference_.scale, error_power(candidate.member.method()),
+        conserves_ ? energies_of(run.stepper, states) : std::vector<double>(), energy_tells);
+    HardestSteps<real> hardest;
+    for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) hardest.look(row_at(meeting), std::nanf(""));
+    evidence.certain = std::fmax(
+        evidence.certain, single_steps(run.stepper, hardest.states(), run.every, static_cast<real>(reference_.until),
+                                       run.start.parameters, run.h, reference_.scale)
+                              .error);
+    result.jump = evidence.jump;
+    result.growth = evidence.growth;
+    result.estimate = std::fmin(1, estimate.after(static_cast<double>(candidate.steps), reference_.until, evidence,
+                                                  rounding_of(candidate.member.precision) + candidate.tolerance));
+    return result;
+}
+
+template <class real>
+Timing Measurer::time_in(const Kernel& kernel, const Candidate& candidate) const {
+    TimedRun<real> run(kernel, start_, candidate, reference_.until, reference_.samples);
+    run.go(candidate, interrupted_);
+    return {run.status == LOBATTO_OK, run.seconds};
+}
+
+template <class real, class Exact>
+double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candidate) const {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    TimedRun<real> run(kernel, start_, candidate, reference_.until, 1);
+    run.every = std::max<std::int64_t>(1, candidate.steps / looks);
+    run.meetings = candidate.steps / run.every;
+    const std::size_t n = reference_.n, columns = 1 + 2 * n;
+    run.rows.resize(static_cast<std::size_t>(run.meetings) * columns);
+    run.go(candidate, interrupted_);
+    if (run.status != LOBATTO_OK) return infinity;
+
+    const auto until = static_cast<Exact>(reference_.until);
+    const StartIn<Exact> start = start_in<Exact>(start_, exact_, until);
+    LoadedStepper<Exact> stepper(exact_);
+    stepper.prepare(start.parameters, until);
+    const double tolerance = std::is_same_v<Exact, __float128> ? 1e-20 : 3e-17;
+    Extrapolation<Exact> way(stepper, std::vector<Exact>(reference_.scale.begin(), reference_.scale.end()),
+                             static_cast<Exact>(tolerance));
+    way.start(0, start.q, start.p);
+    double worst = 0;
+    for (std::int64_t meeting = 1; meeting <= run.meetings; ++meeting) {
+        if (interrupted_ != nullptr && *interrupted_ != 0) throw Interrupted();
+        if (!way.advance_to(until * static_cast<Exact>(meeting * run.every) / static_cast<Exact>(candidate.steps)))
+            return infinity;
+        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
+        for (std::size_t k = 0; k < 2 * n; ++k) {
+            const double error =
+                std::fabs(static_cast<double>(static_cast<Exact>(row[k]) - way.state()[k])) / reference_.scale[k];
+            if (!(error <= worst)) worst = error;
+        }
+    }
+    return worst;
+}
+
+double Measurer::error_on_steps(const Kernel& kernel, const Candidate& candidate) const {
+    return with_type_of(candidate.member.precision, [&](auto type) {
+        using real = decltype(type);
+        return reference_.precision == Precision::quadruple ? error_on_steps_in<real, __float128>(kernel, candidate)
+                                                            : error_on_steps_in<real, long double>(kernel, candidate);
+    });
+}
+
+Measurement Measurer::measure(const Kernel& kernel, const Candidate& candidate, bool all) const {
+    return with_type_of(candidate.member.precision,
+                        [&](auto type) { return measure_in<decltype(type)>(kernel, candidate, all, nullptr); });
+}
+
+Timing Measurer::time_once(const Kernel& kernel, const Candidate& candidate) const {
+    return with_type_of(candidate.member.precision,
+                        [&](auto type) { return time_in<decltype(type)>(kernel, candidate); });
+}
+
+Measurer::Course Measurer::course(const Kernel& kernel, const Candidate& candidate) const {
+    Course course;
+    with_type_of(candidate.member.precision,
+                 [&](auto type) { return measure_in<decltype(type)>(kernel, candidate, true, &course); });
+    return course;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/method_text.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <regex>
+#include <vector>
+
+#include "runtime/run/output.hpp"
+#include "runtime/run/partial_file.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::vector<std::string> method_lines(const Choice& choice) {
+    const Candidate& candidate = choice.measurement.candidate;
+    const bool lobatto = candidate.member.family == Family::lobatto;
+    std::vector<std::string> lines = {fmt::format("family = \"{}\"", word_of(candidate.member.family)),
+                                      fmt::format("{} = {}", lobatto ? "points" : "stages", candidate.member.points)};
+    if (candidate.member.arithmetic == StepArithmetic::clean) lines.push_back("arithmetic = \"clean\"");
+    if (candidate.tolerance > 0) lines.push_back("tolerance = " + exact_text(candidate.tolerance));
+    return lines;
+}
+
+// The lines of a TOML file, each with the table it stands in; lines inside a text of several lines belong to it.
+struct Line {
+    std::string text, table, key;  // key: what is set on this line; empty for comments, headers, and inner lines
+    bool header = false;
+};
+
+std::vector<Line> lines_of(const std::string& text) {
+    static const std::regex header(R"(^\s*\[\s*([A-Za-z_]+)\s*\]\s*(#.*)?$)"), key(R"x(^\s*"?([A-Za-z_]+)"?\s*=)x");
+    std::vector<Line> lines;
+    std::string table;
+    bool inside = false;  // of """ or '''
+    for (std::size_t begin = 0; begin < text.size();) {
+        const std::size_t end = std::min(text.find('\n', begin), text.size());
+        Line line{text.substr(begin, end - begin), table, "", false};
+        begin = end + 1;
+        std::smatch match;
+        if (!inside && std::regex_match(line.text, match, header)) {
+            table = line.table = match[1];
+            line.header = true;
+        } else if (!inside && std::regex_search(line.text, match, key)) {
+            line.key = match[1];
+        }
+        for (const char* quotes : {"\"\"\"", "'''"})
+            for (std::size_t at = line.text.find(quotes); at != std::string::npos; at = line.text.find(quotes, at + 3))
+                inside = !inside;
+        lines.push_back(line);
+    }
+    return lines;
+}
+
+}  // namespace
+
+std::string method_text(const Choice& choice) {
+    std::string text = "[method]\n";
+    for (const std::string& line : method_lines(choice)) text += line + '\n';
+    return text + fmt::format("\n[run]\nstep = {}\nuntil = {}\n", exact_text(choice.step()), exact_text(choice.until));
+}
+
+std::string stability_text(const Choice& choice) {
+    const double radians = choice.step() * choice.frequency;
+    if (!std::isfinite(choice.stability_limit)) return fmt::format("h omega = {:.3g}, stable for every step", radians);
+    return fmt::format("h omega = {:.3g} of at most {:.4g}, omega the largest frequency met{}", radians,
+                       choice.stability_limit, radians > choice.stability_limit ? "; it is met only for moments" : "");
+}
+
+std::string with_choice(const std::string& text, const Choice& choice, double error, bool until) {
+    std::vector<std::string> method = method_lines(choice);
+    method.front() +=
+        fmt::format(" # lobatto tune --error {:.2g}: {:.1g} to t = {:.6g}, {:.3g} ns a unit of time", error,
+                    choice.measurement.error, choice.until, choice.measurement.seconds / choice.until * 1e9);
+    std::string result;
+    bool has_method = false;
+    const std::vector<Line> lines = lines_of(text);
+    for (const Line& line : lines) {
+        if (line.header && line.table == "method") {
+            has_method = true;
+            result += line.text + '\n';
+            for (const std::string& added : method) result += added + '\n';
+            continue;
+        }
+        if (line.table == "method" && !line.key.empty()) continue;
+        if (line.header && line.table == "run") {
+            if (!has_method) {
+                result += "[method]\n";
+                for (const std::string& added : method) result += added + '\n';
+                result += '\n';
+                has_method = true;
+            }
+            result += line.text + '\n' + "step = " + exact_text(choice.step()) + '\n';
+            result += "error = " + exact_text(error) + '\n';
+            if (until) result += "until = " + exact_text(choice.until) + '\n';
+            continue;
+        }
+        const bool replaced =
+            line.table == "run" && (line.key == "step" || line.key == "steps_per_period" || line.key == "period" ||
+                                    line.key == "error" || (until && line.key == "until"));
+        if (!replaced) result += line.text + '\n';
+    }
+    return result;
+}
+
+void write_method(const Choice& choice, const Scene& scene, double error, bool until) {
+    const std::string text = with_choice(scene.source.content(), choice, error, until);
+    const Candidate& candidate = choice.measurement.candidate;
+    const Scene back = read_scene(Source(scene.path, text));
+    if (back.method.family != candidate.member.family || back.method.points != candidate.member.points ||
+        back.method.tolerance != candidate.tolerance || back.method.arithmetic != candidate.member.arithmetic ||
+        back.evaluate(back.run.step, "the step").to_double() != choice.step())
+        throw InputError(
+            fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "
+                        "unusually; copy the lines above",
+                        scene.path));
+    write_whole(scene.path, "the scene", text, "copy the lines above into it");
+}
+
+}  // namespace lobatto

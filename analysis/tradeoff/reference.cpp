@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "runtime/measure/extrapolation.hpp"
+#include "runtime/measure/frequency.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Numbers with many divisors, so that many numbers of steps meet many of the samples.
+constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
+constexpr double rough = 1e-6;            // tolerance of the first look
+constexpr double precise_factor = 6;      // what the precise way takes longer, at most, about
+constexpr double half = 0.5;              // of the seconds, for a first way; the rest is for finer steps
+constexpr double radians_of_step = 0.75;  // h omega of the family's first run
+constexpr int most_refinements = 4;
+constexpr int frequency_looks = 24;
+
+template <class real>
+class Computation {
+public:
+    Computation(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request)
+        : kernel_(kernel), request_(request), began_(Clock::now()), stepper_(kernel) {
+        n_ = static_cast<std::size_t>(kernel->coordinates);
+        const auto step = static_cast<real>(request.until / 1000);
+        start_ = start_in<real>(start, kernel, step);
+        stepper_.prepare(start_.parameters, step);
+        reference_.n = n_;
+        reference_.until = request.until;
+        reference_.precision = kernel->real_kind == LOBATTO_FLOAT128 ? Precision::quadruple : Precision::extended;
+    }
+
+    Reference compute() {
+        look();
+        const double tolerance = reference_.precision == Precision::quadruple ? 1e-22 : 3e-17;
+        const auto states = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
+        if (!states) throw ComputationError("the reference fails: its steps become too short");
+        keep(*states);
+        compare(*states);
+        reference_.seconds = seconds_since(began_);
+        return std::move(reference_);
+    }
+
+private:
+    using States = std::vector<real>;  // (samples + 1) x 2n
+
+    void check_interruption() const {
+        if (request_.interrupted != nullptr && *request_.interrupted != 0) throw Interrupted();
+    }
+
+    // For every group of coordinates one value, spread over its members.
+    template <class Value>
+    void spread(const Value& value, std::vector<real>& all) const {
+        for (const std::size_t part : {std::size_t(0), n_}) {
+            for (std::size_t k = 0; k < n_; ++k) {
+                real largest = 0;
+                for (std::size_t j = 0; j < n_; ++j)
+                    if (request_.groups[j] == request_.groups[k]) largest = std::max(largest, value(part + j));
+                all[part + k] = largest;
+            }
+        }
+    }
+
+    // With a rough tolerance: how far the motion goes, how fast it changes, how long a reference takes.
+    void look() {
+        std::vector<real> v, Lv, Lq;
+        if (stepper_.velocity(0, start_.q, start_.p, v) != LOBATTO_OK)
+            throw ComputationError("the formulas have no value at the start");
+        stepper_.slopes(0, start_.q, v, Lv, Lq);
+        scale_.assign(2 * n_, real(1));
+        const auto way = static_cast<real>(request_.until);
+        spread(
+            [&](std::size_t i) {
+                const real at_start = i < n_ ? start_.q[i] : start_.p[i - n_], rate = i < n_ ? v[i] : Lq[i - n_];
+                const real position = at_start < 0 ? -at_start : at_start, move = (rate < 0 ? -rate : rate) * way;
+                return std::max(position, std::min(move, real(1)));
+            },
+            scale_);
+        for (real& value : scale_)
+            if (!(value > real(1e-6))) value = real(1);
+        const int samples = sample_counts[std::size(sample_counts) - 2];
+        const auto began = Clock::now();
+        auto states = extrapolate(samples, static_cast<real>(rough), true);
+        if (!states)
+            throw ComputationError(
+                "the motion cannot be followed to the end: it runs into a singularity, or away to infinity");
+        const double seconds = seconds_since(began);
+        set_scale(*states, samples);
+        set_frequency(*states, samples);
+        // At least one macro step of some twenty slopes a sample.
+        const double at_least = 40 * seconds / static_cast<double>(std::max<std::int64_t>(evaluations_, 1));
+        const double step = step_seconds(), fewest = request_.until / static_cast<double>(step_of_family());
+        double least = 0;
+        for (const int count : sample_counts) {
+            least = std::max(precise_factor * seconds, at_least * count) + step * std::max(fewest, double(count));
+            reference_.samples = count;
+            if (least < half * request_.seconds_limit) return;
+        }
+        if (least > 1.5 * request_.seconds_limit) fail_slow(request_.until * request_.seconds_limit / least);
+    }
+
+    [[noreturn]] void fail_slow(double reached) const {
+        throw TooSlow(
+            fmt::format("a reference to t = {:.6g} takes longer than the {:.3g} s that the budget leaves for it; "
+                        "it would do to about t = {:.2g}. Give more time with --budget, or an earlier --until",
+                        request_.until, request_.seconds_limit, reached),
+            reached);
+    }
+
+    // Of one step of the kernel.
+    double step_seconds() {
+        if (stepper_.prepare(start_.parameters, step_of_family()) != LOBATTO_OK ||
+            stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
+            return 0;
+        lobatto_advance call{};
+        call.steps = 2;
+        const auto began = Clock::now();
+        stepper_.advance(call);
+        return seconds_since(began) / static_cast<double>(call.steps);
+    }
+
+    real step_of_family() const {
+        const double h = reference_.frequency > 0 ? radians_of_step / reference_.frequency : request_.until;
+        return static_cast<real>(std::min(h, request_.until));
+    }
+
+    std::optional<States> extrapolate(int samples, real tolerance, bool quick) {
+        Extrapolation<real> way(stepper_, scale_, tolerance);
+        way.start(0, start_.q, start_.p);
+        States states = way.state();
+        states.reserve(static_cast<std::size_t>(samples + 1) * 2 * n_);
+        for (int i = 1; i <= samples; ++i) {
+            check_interruption();
+            if (!way.advance_to(static_cast<real>(request_.until) * real(i) / real(samples))) return std::nullopt;
+            states.insert(states.end(), way.state().begin(), way.state().end());
+            if (seconds_since(began_) > (quick ? half : 2) * request_.seconds_limit)
+                fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
+        }
+        evaluations_ = way.evaluations();
+        return states;
+    }
+
+    void set_scale(const States& states, int samples) {
+        std::vector<real> least(2 * n_), most(2 * n_);
+        for (std::size_t k = 0; k < 2 * n_; ++k) least[k] = most[k] = states[k];
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            least[i % (2 * n_)] = std::min(least[i % (2 * n_)], states[i]);
+            most[i % (2 * n_)] = std::max(most[i % (2 * n_)], states[i]);
+        }
+        (void)samples;
+        spread([&](std::size_t i) { return (most[i] - least[i]) / 2; }, scale_);
+        for (real& value : scale_)
+            if (!(value > 0)) value = 1;
+    }
+
+    void set_frequency(const States& states, int samples) {
+        const std::vector<double> scale(scale_.begin(), scale_.end());
+        for (int look = 0; look <= frequency_looks; ++look) {
+            const int i = samples * look / frequency_looks;
+            const real* const row = states.data() + static_cast<std::size_t>(i) * 2 * n_;
+            const std::vector<real> q(row, row + n_), p(row + n_, row + 2 * n_);
+            const auto time = static_cast<real>(request_.until * i / samples);
+            const double frequency = largest_frequency(stepper_, time, q, p, scale);
+            if (frequency > reference_.frequency) reference_.frequency = frequency;
+            std::vector<real> v;
+            if (stepper_.velocity(time, q, p, v) != LOBATTO_OK) continue;
+            real product = 0;
+            for (std::size_t k = 0; k < n_; ++k) product += p[k] * v[k];
+            reference_.energy_scale = std::max(reference_.energy_scale, std::fabs(static_cast<double>(product)) / 2);
+            if (n_ > 64 && look >= 2) break;
+        }
+    }
+
+    void keep(const States& states) {
+        for (const real value : states) {
+            reference_.high.push_back(static_cast<double>(value));
+            reference_.low.push_back(static_cast<double>(value - static_cast<real>(reference_.high.back())));
+        }
+        for (const real value : scale_) reference_.scale.push_back(static_cast<double>(value));
+    }
+
+    // The family's own way with `ratio` steps between two samples; nothing when a step fails.
+    std::optional<std::vector<double>> disagreement_with(const States& states, std::int64_t ratio) {
+        const int samples = reference_.samples;
+        const real h = static_cast<real>(request_.until) / static_cast<real>(samples * ratio);
+        if (stepper_.prepare(start_.parameters, h) != LOBATTO_OK || stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
+            return std::nullopt;
+        std::vector<double> largest{0};
+        std::vector<real> q, p;
+        for (int i = 1; i <= samples; ++i) {
+            check_interruption();
+            lobatto_advance call{};
+            call.steps = ratio;
+            if (stepper_.advance(call) != LOBATTO_OK) return std::nullopt;
+            real time;
+            stepper_.state(time, q, p);
+            double worst = largest.back();
+            for (std::size_t k = 0; k < 2 * n_; ++k) {
+                const real difference = (k < n_ ? q[k] : p[k - n_]) - states[static_cast<std::size_t>(i) * 2 * n_ + k];
+                const double error = std::fabs(static_cast<double>(difference / scale_[k]));
+                if (!(error <= worst)) worst = error;
+            }
+            largest.push_back(worst);
+        }
+        return largest;
+    }
+
+    void compare(const States& states) {
+        const double interval = request_.until / reference_.samples;
+        auto ratio = static_cast<std::int64_t>(std::ceil(interval / static_cast<double>(step_of_family())));
+        double last = 0;
+        for (int refinement = 0; refinement <= most_refinements; ++refinement, ratio *= 2) {
+            const auto began = Clock::now();
+            const auto measured = disagreement_with(states, ratio);
+            last = seconds_since(began);
+            const double before = reference_.disagreement.empty() ? std::numeric_limits<double>::infinity()
+                                                                  : reference_.disagreement.back();
+            if (measured && measured->back() < before) {
+                reference_.disagreement = *measured;
+                reference_.first = fmt::format("{} with {} steps in {}", kernel_->method, ratio * reference_.samples,
+                                               precision_name(reference_.precision));
+            }
+            const double now = measured ? measured->back() : std::numeric_limits<double>::infinity();
+            if (now <= request_.wanted) break;
+            if (measured && before < std::numeric_limits<double>::infinity() && now > before / 4) break;
+            if (seconds_since(began_) + 2 * last > request_.seconds_limit) break;
+        }
+        if (reference_.disagreement.empty())
+            throw ComputationError("the reference fails: the steps of " + std::string(kernel_->method) +
+                                   " do not converge on this motion, however short");
+        reference_.second = "explicit extrapolation in " + precision_name(reference_.precision);
+    }
+
+    Kernel kernel_;
+    const ReferenceRequest& request_;
+    Clock::time_point began_;
+    LoadedStepper<real> stepper_;
+    std::size_t n_ = 0;
+    StartIn<real> start_;
+    std::vector<real> scale_;
+    std::int64_t evaluations_ = 0;
+    Reference reference_;
+};
+
+}  // namespace
+
+double Reference::trusted_until(double error) const {
+    for (int i = samples; i > 0; --i)
+        if (disagreement[static_cast<std::size_t>(i)] < error) return time(i);
+    return 0;
+}
+
+Reference compute_reference(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request) {
+    return kernel->real_kind == LOBATTO_FLOAT128 ? Computation<__float128>(kernel, start, request).compute()
+                                                 : Computation<long double>(kernel, start, request).compute();
+}
+
+}  // namespace lobatto

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/tradeoff/workshop.hpp"
+
+#include <algorithm>
+
+#include "analysis/kernel_of.hpp"
+#include "generator/pipeline.hpp"
+
+namespace lobatto {
+
+Workshop::Workshop(Derivation derivation) : derivation_(std::move(derivation)) {
+    for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+        workers_.emplace_back([this] { work(); });
+}
+
+Workshop::~Workshop() {
+    cancel();
+    {
+        const std::lock_guard lock(mutex_);
+        closing_ = true;
+    }
+    ordered_.notify_all();
+    for (std::thread& worker : workers_) worker.join();
+}
+
+void Workshop::cancel() {
+    const std::lock_guard lock(mutex_);
+    for (Item* item : queue_) item->cancelled = true;
+    queue_.clear();
+    for (auto item = items_.begin(); item != items_.end();)
+        item = item->second.cancelled ? items_.erase(item) : std::next(item);
+}
+
+void Workshop::order(const Member& member) {
+    if (is_ordered(member)) return;
+    EmitOptions options;
+    options.precision = member.precision;
+    const KernelSource source = emit(with_method(derivation_, member.method()), options);
+    Item item;
+    item.digest = source.digest;
+    item.translation = translation_of(source, member.precision);
+    {
+        const std::lock_guard lock(mutex_);
+        queue_.push_back(&items_.emplace(member, std::move(item)).first->second);
+    }
+    ordered_.notify_one();
+}
+
+bool Workshop::is_ready(const Member& member) const {
+    const auto item = items_.find(member);
+    const std::lock_guard lock(mutex_);
+    return item != items_.end() && item->second.ready;
+}
+
+std::size_t Workshop::waiting() const {
+    const std::lock_guard lock(mutex_);
+    return static_cast<std::size_t>(
+        std::count_if(items_.begin(), items_.end(), [](const auto& item) { return !item.second.ready; }));
+}
+
+Kernel Workshop::kernel(const Member& member) {
+    order(member);
+    Item& item = items_.at(member);
+    {
+        std::unique_lock lock(mutex_);
+        finished_.wait(lock, [&] { return item.ready; });
+    }
+    if (item.failure) std::rethrow_exception(item.failure);
+    if (!item.kernel) item.kernel = Kernel::load(item.compiled->object, item.digest);
+    return *item.kernel;
+}
+
+double Workshop::compile_seconds(const Member& member) const {
+    const std::lock_guard lock(mutex_);
+    const Item& item = items_.at(member);
+    return item.compiled ? item.compiled->seconds : 0;
+}
+
+void Workshop::work() {
+    while (true) {
+        Item* item = nullptr;
+        {
+            std::unique_lock lock(mutex_);
+            ordered_.wait(lock, [&] { return closing_ || !queue_.empty(); });
+            if (queue_.empty()) return;
+            item = queue_.front();
+            queue_.pop_front();
+        }
+        std::optional<Compiled> compiled;
+        std::exception_ptr failure;
+        try {
+            compiled = compile(item->translation);
+        } catch (...) {
+            failure = std::current_exception();
+        }
+        {
+            const std::lock_guard lock(mutex_);
+            item->compiled = std::move(compiled);
+            item->failure = failure;
+            item->ready = true;
+        }
+        finished_.notify_all();
+    }
+}
+
+}  // namespace lobatto

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The kernels of the family for one scene, compiled on all processors while others are measured.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "analysis/tradeoff/candidate.hpp"
+#include "generator/mechanics/derivation.hpp"
+#include "runtime/build/compile.hpp"
+#include "runtime/build/library.hpp"
+
+namespace lobatto {
+
+// For one thread; the compilers have their own.
+class Workshop {
+public:
+    explicit Workshop(Derivation derivation);
+    ~Workshop();  // waits for the compilers at work, a few seconds at most
+    Workshop(const Workshop&) = delete;
+    Workshop& operator=(const Workshop&) = delete;
+
+    const Derivation& derivation() const { return derivation_; }
+    unsigned threads() const { return static_cast<unsigned>(workers_.size()); }
+
+    // Writes the kernel and hands it to a compiler, unless that has been done.
+    void order(const Member& member);
+    bool is_ordered(const Member& member) const { return items_.count(member) != 0; }
+    bool is_ready(const Member& member) const;  // ordered, and compiled or found in the cache, or failed
+    std::size_t waiting() const;                // ordered and not ready
+    // Orders it if need be, and waits for it. Throws what compiling threw.
+    Kernel kernel(const Member& member);
+    double compile_seconds(const Member& member) const;  // of one that is ready; 0: found in the cache
+    const std::string& digest(const Member& member) const { return items_.at(member).digest; }
+    void cancel();  // what no compiler has begun is not compiled
+
+private:
+    struct Item {
+        std::string digest;
+        Translation translation;
+        std::optional<Compiled> compiled;
+        std::optional<Kernel> kernel;
+        std::exception_ptr failure;
+        bool ready = false, cancelled = false;
+    };
+    void work();
+
+    Derivation derivation_;
+    std::map<Member, Item> items_;
+    std::deque<Item*> queue_;
+    mutable std::mutex mutex_;
+    std::condition_variable ordered_, finished_;
+    bool closing_ = false;
+    std::vector<std::thread> workers_;
+};
+
+}  // namespace lobatto

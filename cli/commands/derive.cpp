@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto derive: the whole derivation of a scene, for people, for LaTeX or for machines.
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "cli/commands/commands.hpp"
+
+#include "cli/options/method.hpp"
+#include "generator/describe/describe.hpp"
+#include "generator/pipeline.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct DeriveCommand {
+    std::string scene;
+    MethodOption method;
+    bool latex = false;
+    bool json = false;
+};
+
+void derive_scene(const DeriveCommand& options) {
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    const Description description = describe(derive(scene));
+    std::cout << (options.latex ? latex_of(description) : options.json ? json_of(description) : text_of(description));
+}
+
+}  // namespace
+
+void add_derive(CLI::App& program) {
+    const auto options = std::make_shared<DeriveCommand>();
+    CLI::App* command =
+        program.add_subcommand("derive", "Show how the integrator of a scene follows from its Lagrangian");
+    command->add_option("scene", options->scene, "the scene file")->required();
+    options->method.add_to(*command);
+    CLI::Option* latex = command->add_flag("--latex", options->latex, "a complete LaTeX document");
+    command->add_flag("--json", options->json, "for machines (described in docs/derivation.md)")->excludes(latex);
+    command->footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");
+    command->callback([options] { derive_scene(*options); });
+}
+
+}  // namespace lobatto

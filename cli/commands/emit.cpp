@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto emit: a scene's kernel as a C++ header, and what each pass saved.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+
+#include "analysis/support_text.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
+#include "generator/method/splitting.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/build/compiler.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EmitCommand {
+    std::string scene;
+    std::string folder;
+    MethodOption method;
+    bool general = false;
+    Precision precision = Precision::double_;
+    bool standalone = false;
+    bool no_support = false;
+};
+
+[[noreturn]] void fail_to_write(const fs::path& path, const std::string& reason) {
+    throw MachineError(fmt::format("cannot write {}: {}", path.string(), reason));
+}
+
+// Under a name of its own first: whoever reads `path` sees the old text or the new one, never a part.
+void write_atomically(const fs::path& path, const std::string& text) {
+    std::string temporary = path.string() + ".XXXXXX";
+    const int file = ::mkstemp(temporary.data());
+    if (file < 0) fail_to_write(path, std::strerror(errno));
+    const auto give_up = [&](int error) {
+        ::unlink(temporary.c_str());
+        fail_to_write(path, std::strerror(error));
+    };
+    for (std::size_t done = 0; done < text.size();) {
+        const ssize_t count = ::write(file, text.data() + done, text.size() - done);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) {
+            const int error = errno;
+            ::close(file);
+            give_up(error);
+        }
+        done += static_cast<std::size_t>(count);
+    }
+    ::fchmod(file, 0644);
+    if (::close(file) != 0) give_up(errno);
+    if (std::rename(temporary.c_str(), path.c_str()) != 0) give_up(errno);
+}
+
+void print_report(const std::vector<PassReport>& report) {
+    fmt::print(std::cout, "{:<26}{:>11}{:>17}{:>11}{:>11}{:>8}   largest relative change of a value\n", "pass",
+               "additions", "multiplications", "divisions", "functions", "total");
+    for (const PassReport& row : report) {
+        const Operations& now = row.after;
+        const std::string change = &row == &report.front() ? ""
+                                   : row.disagreement == 0 ? "0"
+                                                           : fmt::format("{:.0e}", row.disagreement);
+        const std::string line = fmt::format("{:<26}{:>11}{:>17}{:>11}{:>11}{:>8}   {}", row.pass, now.additions,
+                                             now.multiplications, now.divisions, now.functions, now.total(), change);
+        fmt::print(std::cout, "{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+    }
+    fmt::print(std::cout, "(over all functions of the kernel; values compared at 60 digits)\n");
+}
+
+void print_use(const KernelSource& source, const EmitCommand& options) {
+    const bool quadruple = options.precision == Precision::quadruple;
+    const std::string include = options.standalone ? "" : options.no_support ? " -I runtime/kernel" : "";
+    fmt::print(std::cout,
+               "\nUse it:\n"
+               "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2{2} -I {3} program.cpp{4}\n"
+               "  lobatto::Stepper<lobatto::kernels::{0}> stepper;\n"
+               "  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .q, "
+               ".momentum(p)\n",
+               source.name, quadruple ? "gnu++" : "c++", include, shell_word(options.folder),
+               quadruple ? " -lquadmath" : "");
+}
+
+// The decimals of a splitting method must be enough for the number type.
+void check_digits(const Scene& scene, Precision precision) {
+    if (scene.method.family != Family::splitting) return;
+    const int known = splitting_of(scene.method.points).digits, wanted = precision == Precision::extended    ? 19
+                                                                         : precision == Precision::quadruple ? 32
+                                                                                                             : 0;
+    if (known < wanted)
+        throw InputError(fmt::format(
+            "{}: the coefficients of {} are known to {} digits, too few for this number type; choose double, "
+            "or Lobatto (--points 8)",
+            scene.path, scene.method.name(), known));
+}
+
+void emit_scene(const EmitCommand& options) {
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    check_digits(scene, options.precision);
+    const KernelSource source =
+        emit(derive(scene, options.general), {options.precision, options.standalone ? support_text() : std::string()});
+
+    std::error_code error;
+    fs::create_directories(options.folder, error);
+    if (error) fail_to_write(options.folder, error.message());
+    const fs::path path = fs::path(options.folder) / (source.name + ".hpp");
+    keep_scene(options.scene, path);
+    if (!options.standalone && !options.no_support) {
+        if (source.name == "kernel")
+            throw InputError(
+                fmt::format("{}: the kernel of this scene and its support header would both be kernel.hpp; "
+                            "rename the scene file, or give --standalone or --no-support",
+                            options.scene));
+        const fs::path support = fs::path(options.folder) / "kernel.hpp";
+        keep_scene(options.scene, support);
+        write_atomically(support, support_text());
+    }
+    write_atomically(path, source.header);
+    print_report(source.report);
+    fmt::print(std::cout, "\nWrote {}", path.string());
+    if (!options.standalone && !options.no_support)
+        fmt::print(std::cout, " and {}", (fs::path(options.folder) / "kernel.hpp").string());
+    fmt::print(std::cout, "\n");
+    print_use(source, options);
+}
+
+}  // namespace
+
+void add_emit(CLI::App& program) {
+    const auto options = std::make_shared<EmitCommand>();
+    CLI::App* command = program.add_subcommand("emit", "Write the integrator of a scene as a C++ header");
+    command->add_option("scene", options->scene, "the scene file")->required();
+    command->add_option("-o,--output", options->folder, "folder for NAME.hpp and the kernel.hpp that it includes")
+        ->required()
+        ->type_name("FOLDER");
+    options->method.add_to(*command);
+    command->add_flag("--general", options->general,
+                      "use nothing of what the scene's structure allows, for comparison");
+    const std::map<std::string, Precision> precisions = {{"float", Precision::single},
+                                                         {"double", Precision::double_},
+                                                         {"long-double", Precision::extended},
+                                                         {"quadruple", Precision::quadruple}};
+    command->add_option("--precision", options->precision, "float, double (default), long-double or quadruple")
+        ->transform(CLI::CheckedTransformer(precisions).description(""))
+        ->type_name("TYPE");
+    CLI::Option* standalone =
+        command->add_flag("--standalone", options->standalone, "one file that carries kernel.hpp inside");
+    command->add_flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
+        ->excludes(standalone);
+    command->footer("Example:\n  lobatto emit scenes/pendulum.toml -o kernels");
+    command->callback([options] { emit_scene(*options); });
+}
+
+}  // namespace lobatto

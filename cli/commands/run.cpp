@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto run: a scene from text to trajectory, and what there is to say about it.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/accuracy/step_judge.hpp"
+#include "analysis/accuracy/watch.hpp"
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "analysis/stability/linear_departure.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
+#include "cli/options/resume.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/print/progress.hpp"
+#include "cli/print/summary.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+#include "runtime/measure/diagnostics.hpp"
+#include "runtime/run/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct RunOptions {
+    std::string scene;
+    std::string output;  // empty: out/NAME.csv
+    MethodOption method;
+    bool general = false;
+    Overrides overrides;
+    bool resume = false;
+    bool quiet = false;
+};
+
+TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
+    TrajectoryHeader header;
+    header.scene = scene.title.empty() ? scene.name : scene.title;
+    header.method = fmt::format("{}, h = {}", scene.method.name(), exact_text(request.step));
+    header.kernel = source.digest;
+    for (std::size_t i = 0; i < scene.parameters.size(); ++i)
+        header.parameters.emplace_back(scene.parameters[i].name, request.parameters[i]);
+    header.columns = {{"t", ""}};
+    for (const Coordinate& coordinate : scene.coordinates)
+        header.columns.emplace_back(coordinate.name, coordinate.unit);
+    if (scene.outputs.momenta)
+        for (const Coordinate& coordinate : scene.coordinates) header.columns.emplace_back("p_" + coordinate.name, "");
+    header.energy = scene.outputs.energy;
+    if (header.energy) header.columns.emplace_back("H", "");
+    return header;
+}
+
+// Of the file beside it with the events: their numbers, then the state as in the trajectory.
+TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
+    if (header.energy) header.columns.pop_back();
+    header.energy = false;
+    header.columns.insert(header.columns.begin(), {"event", ""});
+    for (const Event& event : scene.outputs.events) header.events.push_back(event.text);
+    return header;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult& result) {
+    if (kernel.form == LOBATTO_LINEAR_MAP) return "none: the step is a linear map";
+    if (kernel.unknowns == 0) return "none: the step is explicit";
+    if (kernel.linear != 0) return "none: the equations of a step are linear";
+    return fmt::format("{:.2f} per step, at most {}",
+                       static_cast<double>(result.iterations) / static_cast<double>(result.steps_done),
+                       result.iterations_most);
+}
+
+std::string defect_text(const LoadedStepper<double>& stepper, const TrajectoryRequest& request) {
+    try {
+        return fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p));
+    } catch (const ComputationError&) {
+        return "not measured: the first step has no derivative in this precision";
+    }
+}
+
+// The stepper is prepared.
+void print_table(const Derivation& derivation, const Scene& scene, const LoadedStepper<double>& stepper,
+                 const TrajectoryRequest& request, const TrajectoryResult& result, const Watch& watch) {
+    const std::string of_all = result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
+    print_row("steps",
+              fmt::format("{}{}, h = {:.6g}, to t = {:.6g}", result.steps_done, of_all, request.step, result.time));
+    if (result.steps_done == 0) return;
+    const lobatto_kernel& kernel = stepper.kernel().table();
+    print_row("time per step", duration(result.seconds / static_cast<double>(result.steps_done)));
+    print_row("iterations", iterations_text(kernel, result));
+    const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
+    if (scene.outputs.energy) {
+        const double H0 = std::fabs(result.energy_start);
+        const bool relative = conserves && H0 > 0;
+        print_row(conserves ? "energy error" : "energy change",
+                  fmt::format("{:.2g} at most{}", result.energy_error_largest,
+                              relative ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
+    }
+    if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
+        print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
+    if (kernel.has_tangent != 0 &&
+        !derivation.system.has_forces())  // of the first step, its equations solved to rounding
+        print_row("symplectic defect",
+                  request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
+                                        : defect_text(stepper, request));
+    if (const auto error = watch.position_error()) {
+        const std::string& unit = scene.coordinates.front().unit;
+        print_row("position error",
+                  fmt::format("{:.2g}{} at most, against the exact {}solution", *error, unit.empty() ? "" : " " + unit,
+                              watch.is_elliptic() ? "elliptic " : ""));
+    }
+}
+
+// `counts`: of the states, then of each kind of event.
+void print_events(const std::vector<Event>& events, const std::vector<double>& counts, const std::string& path) {
+    for (std::size_t i = 0; i < events.size(); ++i)
+        print_row(i == 0 ? "events" : "", fmt::format("{} of '{}'{}", counts[1 + i], events[i].text,
+                                                      i + 1 < events.size() ? "" : ", in " + path));
+}
+
+// Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
+std::string event_path(const RunOptions& options, const Scene& scene) {
+    std::error_code ignored;
+    const bool beside = options.output.empty() || !std::filesystem::exists(options.output, ignored) ||
+                        std::filesystem::is_regular_file(options.output, ignored);
+    std::string path = output_path(beside ? options.output : "", scene.name + ".csv");
+    if (path.ends_with(".csv")) path.resize(path.size() - 4);
+    return path + ".events.csv";
+}
+
+void run(const RunOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    Derivation derivation = derive(scene, options.general);
+    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
+    const KernelSource source = emit(derivation);
+    const double derivation_seconds = seconds_since(start);
+    apply(options.overrides, scene);  // after the derivation: one kernel serves all values
+    const Steps steps = steps_of(scene, options.overrides);
+    Compiled compiled;
+    const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
+    LoadedStepper<double> stepper(kernel);
+    TrajectoryRequest request = request_of(scene, steps.count, stepper);
+    const std::string path = output_path(options.output, scene.name + ".csv");
+    const std::size_t event_kinds = scene.outputs.events.size();
+    keep_scene(scene.path, path);
+    if (event_kinds > 0) keep_scene(scene.path, event_path(options, scene));
+    if (!options.quiet) {
+        fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, source.digest, derivation_seconds,
+                   compiled.from_cache ? "found compiled in the cache"
+                                       : fmt::format("compiled in {:.2f} s", compiled.seconds));
+    }
+
+    const TrajectoryHeader header = header_of(scene, source, request);
+    const std::string run = identity_of(request, header, compiled.object);
+    std::vector<double> velocity;
+    stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
+    Watch watch(scene, derivation.structure, stepper, velocity);
+    StepJudge judge(scene);
+    EnergyWatch energy_watch(derivation, kernel);
+    std::vector<double> counts(1 + event_kinds, 0);  // of the states and of each kind of event
+    std::optional<Checkpoint> from;
+    if (options.resume) {
+        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.seen().size() + 1);
+        if (from) {
+            const auto by_watch = from->watched.begin() + std::ssize(counts),
+                       by_energy = by_watch + std::ssize(watch.seen()) + 1,
+                       by_judge = by_energy + std::llround(*(by_energy - 1));
+            std::copy(from->watched.begin(), by_watch, counts.begin());
+            watch.go_on_after({by_watch, by_energy - 1});
+            energy_watch.go_on_after({by_energy, by_judge});
+            judge.go_on_after({by_judge, from->watched.end()});
+            request.from = &from->halfway;
+        }
+        if (!options.quiet)
+            print_row("resumed", from ? fmt::format("at t = {:.6g}, after {} steps", from->halfway.result.time,
+                                                    from->halfway.result.steps_done)
+                                      : "nothing was left: from the start");
+    }
+    TrajectoryFile file(path, header, from ? from->files[0] : Written());
+    std::optional<TrajectoryFile> event_file;
+    if (event_kinds > 0) {
+        event_file.emplace(event_path(options, scene), event_header_of(scene, header),
+                           from ? from->files[1] : Written());
+        request.events = [&](const EventRecords& records) {
+            event_file->write(records);
+            for (std::int64_t i = 0; i < records.count; ++i)
+                ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
+        };
+    }
+    const bool keeps_checkpoints = file.is_regular() && (!event_file || event_file->is_regular());
+    if (keeps_checkpoints) {
+        if (!from) remove_checkpoint(path);  // of a run that has just lost its files
+        request.checkpoint = [&](const Halfway& halfway) {
+            Checkpoint checkpoint{run, halfway, {file.written()}, counts};
+            file.sync();
+            if (event_file) {
+                event_file->sync();
+                checkpoint.files.push_back(event_file->written());
+            }
+            const std::vector<double> by_energy = energy_watch.seen();
+            for (const std::vector<double>& seen :
+                 {watch.seen(), {static_cast<double>(by_energy.size())}, by_energy, judge.seen()})
+                checkpoint.watched.insert(checkpoint.watched.end(), seen.begin(), seen.end());
+            write_checkpoint(checkpoint_path(path), checkpoint);
+        };
+    }
+    request.sink = [&](const Records& records) {
+        file.write(records);
+        watch.look(records);
+        judge.look(records);
+        energy_watch.look(records);
+        counts[0] += static_cast<double>(records.count);
+    };
+    TrajectoryResult result;
+    {
+        Progress progress(request.steps);
+        if (!options.quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
+        const Interruption interruption;
+        request.interrupted = interruption.flag();
+        result = integrate(kernel, request);
+    }
+    watch.look_at_end(result);
+    file.finish();
+    if (event_file) event_file->finish();
+    if (keeps_checkpoints && !result.interrupted) remove_checkpoint(path);
+
+    std::optional<StepJudge::Judgement> judgement;
+    std::string departure;
+    if (result.status == LOBATTO_OK && result.steps_done > 1) {
+        judgement = judge.judge(derivation, kernel, request, result);
+        if (!result.interrupted && judgement->is_lost() && !derivation.system.linear &&
+            !EnergyWatch::can_watch(derivation))
+            departure = StepJudge::loss(*judgement, request, result);
+        for (const std::string& warning : StepJudge::warnings(*judgement, scene.run.error))
+            if (departure.empty()) fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+    }
+    if (!options.quiet) {
+        print_table(derivation, scene, stepper, request, result, watch);
+        if (judgement) print_row("estimated error", judgement->text());
+        print_events(scene.outputs.events, counts, event_file ? event_path(options, scene) : "");
+        print_row("trajectory", fmt::format("{}, {} {}", path, counts[0], counts[0] == 1 ? "state" : "states"));
+        if (!steps.reaches_end)
+            fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
+    }
+    if (result.status != LOBATTO_OK) {
+        throw ComputationError(
+            fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
+    }
+    if (!result.interrupted && departure.empty()) departure = energy_watch.departure(derivation, kernel, request);
+    if (!result.interrupted && departure.empty())
+        departure = linear_departure(derivation, scene, kernel, request, result);
+    if (!departure.empty())
+        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, path));
+    if (scene.outputs.energy && !std::isfinite(result.energy_error_largest)) {
+        throw ComputationError(
+            std::isfinite(result.energy_start)
+                ? fmt::format("{}: the energy became infinite or not a number: the motion grows without bound, or has "
+                              "gone where the Lagrangian is not real. Try a smaller step, such as h = {:.6g}, an "
+                              "earlier end, or start elsewhere. What was computed is in {}.",
+                              scene.path, request.step / 2, path)
+                : fmt::format("{}: the energy of the start is too large for a number, though the motion is not. Try "
+                              "other units, or energy = false under [output]. What was computed is in {}.",
+                              scene.path, path));
+    }
+    if (result.interrupted) {
+        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, path,
+                   keeps_checkpoints ? " The same command with --resume goes on from there." : "");
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+}
+
+}  // namespace
+
+void add_run(CLI::App& program) {
+    CLI::App* command =
+        program.add_subcommand("run", "Derive, compile and run a scene; write its trajectory and say how good it is");
+    const auto options = std::make_shared<RunOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
+    options->method.add_to(*command);
+    command->add_flag("--general", options->general,
+                      "use nothing of what the scene's structure allows, for comparison");
+    add_step_option(*command, options->overrides);
+    add_until_option(*command, options->overrides);
+    command->add_option("--every", options->overrides.every, "Keep every EVERY-th state");
+    add_set_option(*command, options->overrides);
+    command->add_flag(
+        "--resume", options->resume,
+        "go on where the same run was interrupted or killed; its files get the bytes they would have had");
+    command->add_flag("--quiet", options->quiet, "Print nothing but warnings and errors");
+    command->footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
+    command->callback([options] { run(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto stability: which steps keep a motion bounded, exactly, and what a scene's step does.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+
+#include "analysis/stability/chart.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
+#include "cli/print/drawing.hpp"
+#include "cli/print/stability_text.hpp"
+#include "generator/formula/source.hpp"
+#include "generator/method/splitting_stability.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::vector<Method> all_methods() {
+    std::vector<Method> methods;
+    for (int points = 2; points <= 12; ++points) methods.push_back({Family::lobatto, points});
+    for (int stages = 1; stages <= 10; ++stages) methods.push_back({Family::gauss, stages});
+    return methods;
+}
+
+struct StabilityCommand {
+    std::optional<std::string> scene;
+    std::string chart;
+    MethodOption method;
+    Overrides overrides;
+    bool json = false;
+};
+
+namespace fs = std::filesystem;
+
+// Before anything is computed.
+fs::path chart_path(const std::string& given, const std::string& scene) {
+    const fs::path path = given;
+    if (path.extension() != ".svg" || path.stem().empty())
+        throw InputError(fmt::format("--chart {}: the chart is an SVG file; give it a name that ends in .svg", given));
+    if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder))
+        throw InputError(fmt::format("--chart {}: there is no folder {}; make it first", given, folder.string()));
+    keep_scene(scene, given);
+    return path;
+}
+
+// In words: exact polynomials of coefficients with 15 digits would fill pages.
+std::string text_of_splitting(const Method& method) {
+    std::string text = fmt::format("{} (order {})\n\nBounded where |trace| < 2 (D36); by h*omega, from 0:\n",
+                                   method.name(), method.order());
+    for (const UnstableSteps& steps : unstable_steps(quadrature_of(method))) {
+        text += fmt::format("  stable   to {:.10f}\n", steps.from);
+        if (std::isfinite(steps.to))
+            text += fmt::format("  unstable to {:.10f}; growth a step: up to about 1 + {:.2g}\n", steps.to,
+                                std::expm1(steps.rate));
+        else
+            text += "  unstable beyond, as far as is looked\n";
+    }
+    return text;
+}
+
+void show_members(const StabilityCommand& options) {
+    if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
+        throw InputError("--chart, --step and --set belong to a scene; name one");
+    if (options.method.tolerance || options.method.arithmetic)
+        throw InputError("--tolerance and --arithmetic belong to a scene; name one");
+    const std::optional<Method> member = options.method.member();
+    if (member && member->family == Family::splitting) {
+        if (options.json) throw InputError("--json is of Lobatto and Gauss, whose limits are exact; leave it out");
+        std::cout << text_of_splitting(*member);
+        return;
+    }
+    const std::vector<Method> methods = member ? std::vector{*member} : all_methods();
+    std::vector<Stability> members;
+    for (const Method& method : methods) members.push_back(stability(quadrature_of(method)));
+    std::cout << (options.json ? json_of(members) : members.size() == 1 ? text_of(members.front()) : text_of(members));
+}
+
+void show_scene(const StabilityCommand& options) {
+    const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart, *options.scene);
+    Scene scene = read_scene(*options.scene);
+    options.method.apply(scene);
+    if (scene.method.family == Family::splitting)
+        throw InputError(
+            fmt::format("{}: what is exact here is of Lobatto and Gauss; choose one (--points 4), or ask for "
+                        "the limits of the method alone: lobatto stability --splitting {}",
+                        scene.path, scene.method.points));
+    const StabilityReport report = stability_report(std::move(scene), options.overrides);
+    if (!chart.empty())
+        draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),
+             stability_chart(report), 900, 640, "leave --chart out");
+    std::cout << (options.json ? json_of(report) : text_of(report));
+}
+
+}  // namespace
+
+void add_stability(CLI::App& program) {
+    const auto options = std::make_shared<StabilityCommand>();
+    CLI::App* command = program.add_subcommand(
+        "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
+    command->add_option("scene", options->scene, "the scene file (default: none, every member of both families)");
+    options->method.add_to(*command);
+    add_step_option(*command, options->overrides);
+    add_set_option(*command, options->overrides);
+    command->add_option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
+    command->add_flag("--json", options->json, "for machines (described in docs/stability.md)");
+    command->footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
+    command->callback([options] { options->scene ? show_scene(*options) : show_members(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto sweep: one scene, many starts and parameters, one table of what becomes of them.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/accuracy/sweep_watch.hpp"
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
+#include "cli/options/vary.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/print/progress.hpp"
+#include "cli/print/summary.hpp"
+#include "cli/print/sweep_table.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/ensemble.hpp"
+#include "runtime/run/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t failures_told = 5;
+constexpr std::size_t coordinates_told = 3;  // at most, in the summary
+constexpr double most_memory = 4e9;          // bytes of kept states
+const char* const reason[] = {"reached the end",
+                              "not converged",
+                              "not finite",
+                              "singular Jacobian",
+                              "singular mass matrix",
+                              "t + h equals t",
+                              "not supported by the kernel",
+                              "energy off: beyond stability, or past a singularity"};
+constexpr int departed = 7;
+
+struct SweepOptions {
+    std::string scene;
+    std::vector<std::string> vary;
+    std::string output;  // empty: out/NAME.sweep.csv
+    std::string format;  // empty: told by the name of the output
+    MethodOption method;
+    Overrides overrides;
+    std::optional<std::int64_t> steps;
+    int threads = 0;
+    bool quiet = false;
+};
+
+struct Failure {
+    std::int64_t index, steps_done;
+    int status;
+    double time;
+};
+
+std::string counted(std::int64_t count, const std::string& one, const std::string& many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
+// "q = 0.5, omega = 2"
+std::string values_of(const Grid& grid, std::int64_t trajectory) {
+    std::string text;
+    for (std::size_t a = 0; a < grid.axes().size(); ++a)
+        text += fmt::format("{}{} = {:.6g}", a == 0 ? "" : ", ", grid.axes()[a].name, grid.value(trajectory, a));
+    return text;
+}
+
+SweepTable::Format format_of(const SweepOptions& options) {
+    if (options.format.empty())
+        return options.output.ends_with(".npy") ? SweepTable::Format::npy : SweepTable::Format::csv;
+    return options.format == "csv" ? SweepTable::Format::csv : SweepTable::Format::npy;
+}
+
+// Initial values are written q(0), as other columns hold q at the time t. A name of the scene keeps its column; ours
+// gives way to it, as in steps_.
+std::vector<Column> columns_of(const Scene& scene, const Grid& grid) {
+    std::vector<Column> columns;
+    const auto own = [&](std::string name, bool whole) {
+        const auto taken = [&] {
+            const auto is_named = [&](const auto& named) { return named.name == name; };
+            return std::any_of(scene.coordinates.begin(), scene.coordinates.end(), is_named) ||
+                   std::any_of(scene.parameters.begin(), scene.parameters.end(), is_named);
+        };
+        while (taken()) name += '_';
+        columns.push_back({name, "", whole});
+    };
+    own("index", true);
+    for (const Axis& axis : grid.axes()) {
+        if (axis.role == Axis::Role::parameter)
+            columns.push_back({axis.name, scene.parameters[axis.index].unit});
+        else
+            columns.push_back(
+                {axis.name + "(0)", axis.role == Axis::Role::position ? scene.coordinates[axis.index].unit : ""});
+    }
+    own("status", true);
+    own("steps", true);
+    columns.push_back({"t", ""});
+    for (const Coordinate& coordinate : scene.coordinates) columns.push_back({coordinate.name, coordinate.unit});
+    if (scene.outputs.momenta)
+        for (const Coordinate& coordinate : scene.coordinates) columns.push_back({"p_" + coordinate.name, ""});
+    if (scene.outputs.energy) own("energy_error", false);
+    return columns;
+}
+
+std::vector<std::string> comments_of(const Scene& scene, const KernelSource& source, const EnsembleRequest& request,
+                                     const Grid& grid) {
+    std::vector<std::string> comments{"lobatto sweep", "scene: " + (scene.title.empty() ? scene.name : scene.title),
+                                      fmt::format("method: {}, h = {}", scene.method.name(), exact_text(request.step)),
+                                      "kernel: " + source.digest};
+    std::vector<std::string> parameters, statuses;
+    EnsembleStart first;
+    grid.start(0, first);
+    for (std::size_t i = 0; i < scene.parameters.size(); ++i) {
+        const auto varies = [&](const Axis& axis) { return axis.role == Axis::Role::parameter && axis.index == i; };
+        if (std::none_of(grid.axes().begin(), grid.axes().end(), varies))
+            parameters.push_back(fmt::format("{} = {}", scene.parameters[i].name, exact_text(first.parameters[i])));
+    }
+    if (!parameters.empty()) comments.push_back(fmt::format("parameters: {}", fmt::join(parameters, ", ")));
+    for (const Axis& axis : grid.axes()) comments.push_back(fmt::format("vary: {} = {}", axis.name, axis.written));
+    for (int status = 0; status <= departed; ++status)
+        if (status != LOBATTO_UNSUPPORTED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
+    comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
+    return comments;
+}
+
+// The states of one trajectory; only the last of them can be one at which it failed.
+void write(SweepTable& table, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
+           const EnsembleTrajectory& trajectory, int status) {
+    const Records& kept = trajectory.kept;
+    const int numbers = scene.outputs.momenta ? kept.columns : 1 + (kept.columns - 1) / 2;
+    for (std::int64_t i = 0; i < kept.count; ++i) {
+        const bool last = i + 1 == kept.count;
+        table.add(trajectory.index);
+        for (std::size_t a = 0; a < grid.axes().size(); ++a) table.add(grid.value(trajectory.index, a));
+        table.add(static_cast<std::int64_t>(last ? status : LOBATTO_OK));
+        table.add(last ? trajectory.steps_done : i * request.every);
+        for (int column = 0; column < numbers; ++column) table.add(kept.rows[i * kept.columns + column]);
+        if (scene.outputs.energy) table.add(kept.energy[i] - trajectory.energy_start);
+        table.end_row();
+    }
+}
+
+std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleResult& result, std::int64_t departures,
+                          const std::vector<Failure>& failures) {
+    std::vector<std::string> reasons;
+    std::int64_t failed = 0;
+    for (std::size_t status = 1; status < result.count_of.size(); ++status) {
+        if (result.count_of[status] == 0) continue;
+        failed += result.count_of[status];
+        reasons.push_back(fmt::format("{} {}", result.count_of[status], reason[status]));
+    }
+    if (departures > 0) reasons.push_back(fmt::format("{} {}", departures, reason[departed]));
+    failed += departures;
+    std::string text = fmt::format("{}: {} of {} failed: {}. The others went on. {}:", scene.path, failed,
+                                   counted(result.trajectories, "trajectory", "trajectories"), fmt::join(reasons, ", "),
+                                   failed > std::ssize(failures) ? "The first of them" : "They are");
+    for (const Failure& failure : failures) {
+        text += fmt::format("\n  trajectory {}, {}: {}", failure.index, values_of(grid, failure.index),
+                            reason[failure.status]);
+        if (failure.status != departed)
+            text += fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
+    }
+    return text + "\nTry a smaller --step, or leave these values out.";
+}
+
+std::string spread_text(const Spread& spread) {
+    return fmt::format("{:.6g} to {:.6g}, mean {:.6g}, rms {:.6g}", spread.least, spread.largest, spread.mean,
+                       spread.rms);
+}
+
+void print_table(const Derivation& derivation, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
+                 const EnsembleResult& result, std::int64_t departures, int kernel_lanes) {
+    const std::int64_t failed = result.trajectories - result.count_of[LOBATTO_OK] + departures;
+    const std::string of_all = result.interrupted ? fmt::format(" of {}", request.count) : "";
+    print_row("trajectories", fmt::format("{}{}{}", result.trajectories, of_all,
+                                          failed == 0 ? "" : fmt::format(", {} failed", failed)));
+    print_row("steps", fmt::format("{} each, h = {:.6g}, to t = {:.6g}", request.steps, request.step,
+                                   static_cast<double>(request.steps) * request.step));
+    print_row("threads",
+              fmt::format("{}, {} each", result.threads,
+                          kernel_lanes == 0 ? "one trajectory at a time" : counted(result.lanes, "lane", "lanes")));
+    if (result.steps_done > 0) {
+        const auto steps = static_cast<double>(result.steps_done);
+        print_row("speed", fmt::format("{:.3g} steps per second", steps / result.seconds));
+        print_row("time per step", duration(result.processor_seconds / steps) + " of a processor, for one trajectory");
+    }
+    if (scene.outputs.energy && result.energy_error_index >= 0) {
+        const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
+        print_row(conserves ? "energy error" : "energy change",
+                  fmt::format("{:.2g} at most, of trajectory {}, {}", result.energy_error_largest,
+                              result.energy_error_index, values_of(grid, result.energy_error_index)));
+        print_row("  at the end",
+                  fmt::format("{:.2g} to {:.2g}, mean {:.2g}, rms {:.2g}", result.energy_error.least,
+                              result.energy_error.largest, result.energy_error.mean, result.energy_error.rms));
+    }
+    if (result.count_of[LOBATTO_OK] == 0 || scene.coordinates.size() > coordinates_told) return;
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k)
+        print_row(scene.coordinates[k].name + " at the end", spread_text(result.q[k]));
+    for (std::size_t k = 0; k < scene.coordinates.size() && scene.outputs.momenta; ++k)
+        print_row("p_" + scene.coordinates[k].name + " at the end", spread_text(result.p[k]));
+}
+
+// The one step size and number of steps of all trajectories.
+Steps steps_of(const SweepOptions& options, Scene& scene) {
+    if (!options.steps) return steps_of(scene, options.overrides);
+    if (*options.steps < 0) throw InputError(fmt::format("--steps: {} is not a number of steps", *options.steps));
+    scene.run.until = scene.run.step * GiNaC::numeric(static_cast<long>(*options.steps));
+    return steps_of(scene, options.overrides);
+}
+
+void refuse_too_much(const Grid& grid, const Kernel& kernel, const EnsembleRequest& request) {
+    const double steps = static_cast<double>(request.count) * static_cast<double>(request.steps);
+    if (steps > 9e18)
+        throw InputError(fmt::format(
+            "--vary: {} of {} steps are {:.3g} steps, too many to count; vary less, or make the end time smaller",
+            counted(request.count, "trajectory", "trajectories"), request.steps, steps));
+    const double memory = memory_of(kernel, request);
+    if (grid.count() > 0 && memory > most_memory)
+        throw InputError(fmt::format(
+            "--every: the states that trajectories keep while they wait for their turn would need {:.3g} GB of memory; "
+            "give a larger number of steps, or fewer --threads",
+            memory / 1e9));
+}
+
+void sweep(const SweepOptions& options) {
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    const Scene as_written = scene;  // one kernel serves all values
+    scene.outputs.dense = 0;
+    apply(options.overrides, scene);
+    const Grid grid(scene, options.vary);
+    const Steps steps = steps_of(options, scene);
+
+    Derivation derivation = derive(as_written);
+    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
+    const KernelSource source = emit(derivation);
+    EnsembleRequest request;
+    request.count = grid.count();
+    request.start = [&](std::int64_t index, EnsembleStart& start) { grid.start(index, start); };
+    request.from_velocities = scene.start == Start::velocity;
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = steps.count;
+    request.tolerance = scene.method.tolerance;
+    request.every = options.overrides.every.value_or(0);
+    request.threads = options.threads;
+    // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
+    // number of them changes what a trajectory becomes.
+    const std::int64_t together = scene.coordinates.size() > 2 ? std::min<std::int64_t>(request.count, 8)
+                                                               : request.count / thread_count(options.threads);
+    const Kernel kernel = ensemble_kernel_of(source, Precision::double_, together);
+    refuse_too_much(grid, kernel, request);
+
+    const SweepTable::Format format = format_of(options);
+    const std::string path =
+        output_path(options.output, scene.name + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
+    keep_scene(scene.path, path);
+    SweepTable table(path, format, comments_of(scene, source, request, grid), columns_of(scene, grid));
+    std::vector<Failure> failures;
+    SweepWatch watch(derivation, source, kernel, request);
+    std::int64_t departures = 0;
+    request.sink = [&](const EnsembleTrajectory& trajectory) {
+        const bool departs = trajectory.status == LOBATTO_OK && watch.departs(trajectory);
+        departures += departs ? 1 : 0;
+        if (trajectory.status == LOBATTO_OK) watch.look(trajectory);
+        const int status = departs ? departed : trajectory.status;
+        write(table, scene, grid, request, trajectory, status);
+        if (status == LOBATTO_OK || failures.size() == failures_told) return;
+        const double time = trajectory.kept.rows[(trajectory.kept.count - 1) * trajectory.kept.columns];
+        failures.push_back({trajectory.index, trajectory.steps_done, status, time});
+    };
+    EnsembleResult result;
+    {
+        Progress progress(request.count * request.steps);
+        if (!options.quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
+        const Interruption interruption;
+        request.interrupted = interruption.flag();
+        result = integrate(kernel, request);
+    }
+    table.finish();
+    if (const std::string warning = watch.warning(); !warning.empty())
+        fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+
+    if (!options.quiet) {
+        fmt::print("{}: kernel {}\n", scene.path, source.digest);
+        print_table(derivation, scene, grid, request, result, departures, kernel->lanes);
+        print_row("table", fmt::format("{}, {}", path, counted(table.rows(), "row", "rows")));
+        if (!steps.reaches_end)
+            fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
+        for (const Axis& axis : grid.axes()) {
+            if (axis.role != Axis::Role::parameter) continue;
+            const Parameter& parameter = scene.parameters[axis.index];
+            if (scene.run.step.has(parameter.symbol) || scene.run.until.has(parameter.symbol))
+                fmt::print("The step and the end time are those of {} = {:.6g} for all trajectories.\n",
+                           parameter.written, scene.evaluate(parameter.value, parameter.name).to_double());
+        }
+    }
+    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || departures > 0;
+    if (result.interrupted) {
+        fmt::print(stderr, "lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n",
+                   result.trajectories, request.count, path);
+        if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, departures, failures));
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+    if (failed)
+        throw ComputationError(failures_text(scene, grid, result, departures, failures) +
+                               fmt::format(" What was computed is in {}.", path));
+}
+
+}  // namespace
+
+void add_sweep(CLI::App& program) {
+    CLI::App* command = program.add_subcommand(
+        "sweep", "Run a scene from many starts and with many parameters at once; write what becomes of them");
+    const auto options = std::make_shared<SweepOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command
+        ->add_option("--vary", options->vary,
+                     "Values of an initial position, velocity or momentum or of a parameter: NAME=FROM:TO:COUNT, both "
+                     "ends included; NAME=FROM:TO:COUNT:log, in equal ratios; NAME=a,b,c. Repeated: all combinations")
+        ->required()
+        ->allow_extra_args(false);
+    command->add_option("-o,--output", options->output, "Table (default: out/NAME.sweep.csv)");
+    command
+        ->add_option("--format", options->format,
+                     "csv, or binary: an array of NumPy (default: binary when the table is named .npy)")
+        ->check(CLI::IsMember({"csv", "binary"}));
+    options->method.add_to(*command);
+    add_step_option(*command, options->overrides);
+    CLI::Option* until = add_until_option(*command, options->overrides);
+    command->add_option("--steps", options->steps, "Number of steps, instead of an end time")->excludes(until);
+    command->add_option("--every", options->overrides.every,
+                        "Keep the start, every EVERY-th state and the last one (default: the last one alone)");
+    add_set_option(*command, options->overrides);
+    command->add_option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
+        ->check(CLI::Range(1, 1024));
+    command->add_flag("--quiet", options->quiet, "Print nothing but errors");
+    command->footer(
+        "Example:\n  lobatto sweep scenes/pendulum.toml --vary q=0:3:1000 --vary omega=1,2,5 --until 10 -o table.npy");
+    command->callback([options] { sweep(*options); });
+}
+
+}  // namespace lobatto

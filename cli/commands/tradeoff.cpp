@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto tradeoff: what accuracy costs on a scene, measured over the family.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <optional>
+
+#include "analysis/tradeoff/exploration.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/budget.hpp"
+#include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/print/say.hpp"
+#include "cli/print/tradeoff_page.hpp"
+#include "cli/print/tradeoff_pictures.hpp"
+#include "cli/print/tradeoff_report.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/partial_file.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct TradeoffOptions {
+    std::string scene;
+    std::string output;  // a folder; empty: out/NAME.tradeoff
+    BudgetOption budget;
+    Overrides overrides;
+};
+
+void write(const std::string& path, const std::string& text) {
+    write_whole(path, "the result", text);
+}
+
+void tradeoff(const TradeoffOptions& options) {
+    const double seconds = options.budget.seconds();
+    const Scene written = read_scene(options.scene);
+    Scene scene = written;
+    apply(options.overrides, scene);
+    end_of(scene);
+    const std::string folder = output_folder(options.output, scene.name + ".tradeoff");
+
+    const Interruption interruption;
+    Say say;
+    LaboratoryRequest request;
+    request.seconds = seconds;
+    request.notebook = folder + "/measurements.jsonl";
+    request.first = first_of_tour();
+    request.interrupted = interruption.flag();
+    request.say = [&](const std::string& what) { say(what); };
+    bool interrupted = false;
+    std::optional<Laboratory> begun;
+    try {
+        begun.emplace(derive(written), scene, request);
+        explore(*begun);
+    } catch (const Interrupted&) {
+        interrupted = true;
+    } catch (const ComputationError& failure) {
+        throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
+    }
+    say.clear();
+    if (interrupted && (!begun || begun->notebook().all().empty())) {
+        fmt::print(stderr,
+                   "lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+    Laboratory& laboratory = *begun;
+    if (laboratory.notebook().all().empty())
+        throw ComputationError(fmt::format(
+            "{}: nothing could be measured within {:.3g} s; give more time with --budget", scene.path, seconds));
+    fmt::print(
+        "{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, laboratory.notebook().all().size(),
+        laboratory.notebook().found() > 0 ? fmt::format(" ({} of an earlier run)", laboratory.notebook().found()) : "",
+        laboratory.until(), laboratory.elapsed(), reference_text(laboratory), front_table(laboratory));
+    write(folder + "/tradeoff.csv", csv_of(laboratory));
+    const std::string json = json_of(laboratory);
+    write(folder + "/tradeoff.json", json);
+    fmt::print("\n{}", calibration_text(calibration_of(laboratory)));
+    if (!interrupted) {
+        const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
+        write(folder + "/report.html", report_page(laboratory, folder, pictures, json));
+        fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
+                   fmt::join(pictures, ".svg, "));
+    } else {
+        fmt::print(stderr,
+                   "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
+        throw CLI::RuntimeError(interrupted_exit);
+    }
+}
+
+}  // namespace
+
+void add_tradeoff(CLI::App& program) {
+    CLI::App* command = program.add_subcommand(
+        "tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
+    const auto options = std::make_shared<TradeoffOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command->add_option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");
+    options->budget.add_to(*command);
+    add_until_option(*command, options->overrides);
+    add_set_option(*command, options->overrides);
+    command->footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
+    command->callback([options] { tradeoff(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto tune: the cheapest method and step that keep a promised accuracy.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+
+#include "analysis/tradeoff/choice.hpp"
+#include "analysis/tradeoff/method_text.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/budget.hpp"
+#include "cli/options/overrides.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/print/say.hpp"
+#include "cli/print/summary.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct TuneOptions {
+    std::string scene;
+    std::string error;
+    BudgetOption budget;
+    Overrides overrides;
+    bool write = false;
+};
+
+double error_of(const TuneOptions& options) {
+    char* rest = nullptr;
+    const double error = std::strtod(options.error.c_str(), &rest);
+    if (rest == options.error.c_str() || *rest != '\0')
+        throw InputError(fmt::format("--error: '{}' is not a number; write 1e-8", options.error));
+    if (!(error >= least_error && error <= largest_error))
+        throw InputError(fmt::format(
+            "--error: {} cannot be promised; it is relative to the amplitude of the motion, at most {}, and double "
+            "precision holds nothing below {:.0e}",
+            options.error, largest_error, least_error));
+    return error;
+}
+
+void print(const Choice& choice, const Scene& scene, double error) {
+    const Measurement& m = choice.measurement;
+    fmt::print("{}: error at most {:.2g} to t = {:.6g}, relative to the amplitude of the motion\n\n{}\n", scene.path,
+               error, choice.until, method_text(choice));
+    print_row("predicted error", fmt::format("{:.2g}: measured against {}, which is known to {:.1g}", m.error,
+                                             choice.reference, choice.uncertainty));
+    print_row("cost", fmt::format("{} to the end, {:.3g} ns and {:.3g} gradients a unit of time", duration(m.seconds),
+                                  m.seconds / choice.until * 1e9, m.gradients / choice.until));
+    print_row("stability", stability_text(choice));
+    if (std::isfinite(m.energy_error))
+        print_row("energy error", fmt::format("{:.2g} of the energy of motion", m.energy_error));
+    print_row("searched", fmt::format("{} members of the family{}, {:.1f} s", choice.members,
+                                      choice.complete ? "" : "; with more time (--budget) there might be a faster one",
+                                      choice.seconds));
+}
+
+void tune(const TuneOptions& options) {
+    const double error = error_of(options);
+    const Scene written = read_scene(options.scene);
+    Scene scene = written;
+    apply(options.overrides, scene);
+    const Interruption interruption;
+    Say say;
+    ChoiceRequest request;
+    request.error = error;
+    request.seconds = options.budget.seconds();
+    request.interrupted = interruption.flag();
+    request.say = [&](const std::string& what) { say(what); };
+    try {
+        const Choice choice = choose(derive(written), scene, request);
+        say.clear();
+        print(choice, scene, error);
+        if (options.write) {
+            write_method(choice, scene, error, !options.overrides.until.empty());
+            fmt::print("\nwritten into {}\n", scene.path);
+        }
+    } catch (const Interrupted&) {
+        say.clear();
+        fmt::print(stderr, "lobatto: interrupted; nothing was chosen.\n");
+        throw CLI::RuntimeError(interrupted_exit);
+    } catch (const ComputationError& failure) {
+        throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
+    }
+}
+
+}  // namespace
+
+void add_tune(CLI::App& program) {
+    CLI::App* command =
+        program.add_subcommand("tune", "Choose the cheapest method and step that keep a promised accuracy");
+    const auto options = std::make_shared<TuneOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    command
+        ->add_option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
+        ->required();
+    add_until_option(*command, options->overrides);
+    options->budget.add_to(*command);
+    add_set_option(*command, options->overrides);
+    command->add_flag("--write", options->write, "Write the method and the step into the scene file");
+    command->footer("Example:\n  lobatto tune scenes/pendulum.toml --error 1e-8 --until 1000");
+    command->callback([options] { tune(*options); });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto verify: everything that can be checked of a scene without a paper, from the quadrature to the running kernel.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/exact_start.hpp"
+#include "analysis/kernel_of.hpp"
+#include "cli/commands/commands.hpp"
+#include "cli/options/method.hpp"
+#include "generator/check/check.hpp"
+#include "generator/method/splitting.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/diagnostics.hpp"
+#include "runtime/measure/promises.hpp"
+#include "runtime/measure/symmetry.hpp"
+#include "runtime/run/trajectory.hpp"
+
+namespace lobatto {
+
+namespace {
+
+struct VerifyOptions {
+    std::string scene;
+    MethodOption method;
+};
+
+struct Row {
+    std::string claim, measured, bound;
+    bool holds = false;
+    std::string meaning;  // of a failure
+};
+
+std::string number(double x) {
+    return fmt::format("{:.2g}", x);
+}
+
+Row row_of(const Check& check) {
+    return {check.claim, check.exact ? (check.holds ? "0" : "not 0") : number(check.measured),
+            check.exact ? "exact" : number(check.bound), check.holds, check.meaning};
+}
+
+Row at_most(const std::string& claim, double measured, double bound, const std::string& meaning) {
+    return {claim, number(measured), number(bound), measured <= bound, meaning};
+}
+
+// The scene's start, parameters and step in the kernel's number type.
+template <class real>
+struct Start : StartIn<real> {
+    real step;
+};
+
+template <class real>
+Start<real> start_with_step(const ExactStart& start, const GiNaC::numeric& step, const Kernel& kernel) {
+    const real h = number_of<real>(step);
+    return {start_in<real>(start, kernel, h), h};
+}
+
+constexpr std::int64_t short_run = 1000, long_run = 20000;  // steps
+constexpr std::size_t tangent_limit = 32;                   // coordinates; beyond, matrices of 2n x 2n take too long
+
+// Of whole systems, not of single numbers.
+Row not_promised(const std::string& claim, const std::string& why) {
+    return {claim, "not promised", why, true, ""};
+}
+
+// The states at each hundredth step of a short run, as far as it goes.
+std::vector<std::pair<std::vector<double>, std::vector<double>>> states_along(const Kernel& kernel,
+                                                                              const Start<double>& start) {
+    std::vector<std::pair<std::vector<double>, std::vector<double>>> states;
+    TrajectoryRequest request;
+    request.parameters = start.parameters;
+    request.q = start.q;
+    request.p = start.p;
+    request.step = start.step;
+    request.steps = short_run;
+    request.every = short_run / 10;
+    const std::size_t n = start.q.size();
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) {
+            const double* const row = records.rows + i * records.columns + 1;
+            states.push_back({{row, row + n}, {row + n, row + 2 * n}});
+        }
+    };
+    const TrajectoryResult result = integrate(kernel, request);
+    if (result.steps_done == 0) throw ComputationError(explain_stop(result, request));
+    states.pop_back();  // a step that fails may come after the last
+    return states;
+}
+
+template <class real>
+double worst_defect(const Kernel& kernel, const Start<real>& start,
+                    const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states) {
+    LoadedStepper<real> stepper(kernel);
+    stepper.prepare(start.parameters, start.step);
+    real worst = 0;
+    for (const auto& [q, p] : states) {
+        const real defect = symplectic_defect<real>(stepper, {q.begin(), q.end()}, {p.begin(), p.end()});
+        if (!(defect <= worst)) worst = defect;
+    }
+    return static_cast<double>(worst);
+}
+
+// Over as many steps as rounding allows to say something.
+template <class real>
+Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& precision, bool symplectic) {
+    Return result;
+    // Each step costs a product of 2n x 2n matrices and the solution of N equations with 2n right sides.
+    const double products = sizeof(real) == sizeof(double) ? 2e9 : 4e7, rows = 2 * static_cast<double>(start.q.size()),
+                 N = kernel->unknowns;
+    const auto most = static_cast<std::int64_t>(products / (rows * rows * rows + N * N * (rows + N / 3)));
+    for (std::int64_t steps = std::clamp<std::int64_t>(most, 10, short_run); steps > 0; steps /= 2) {
+        result = there_and_back(kernel, start.parameters, start.q, start.p, start.step, steps, symplectic);
+        if (result.rounding < 1e-6) break;
+    }
+    Row row = at_most(fmt::format("{} steps and back, {}", result.steps, precision), result.distance, result.rounding,
+                      "the step is not its own inverse with -h, or so long that it jumps over a singularity");
+    if (result.rests && row.holds) {
+        row.bound = "at rest";
+    } else if (!(result.rounding < 1e-6)) {
+        row.holds = false;
+        row.meaning = "rounding swamps even one step; the step is too long for this motion";
+    }
+    return row;
+}
+
+void momenta(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start, const Scene& scene) {
+    std::vector<std::string> names;
+    for (const Coordinate& coordinate : scene.coordinates) names.push_back(coordinate.name);
+    const auto symmetries = find_symmetries(kernel, start.parameters, start.q, start.step, names);
+    if (symmetries.empty()) rows.push_back({"no linear symmetry, no momentum to conserve", "none found", "", true, ""});
+    std::vector<Row> found;
+    double worst = 0, bound = 0;
+    const std::string meaning = "the momentum that belongs to this symmetry is not conserved";
+    for (const Symmetry& symmetry : symmetries) {
+        const auto [steps, variation] =
+            momentum_variation(kernel, symmetry, start.parameters, start.q, start.p, start.step, short_run);
+        worst = std::max(worst, variation);
+        bound = 8 * 0x1p-53 * static_cast<double>(steps);  // each step rounds a few times, at worst always the same way
+        constexpr std::size_t longest = 60;                // characters of a momentum
+        const std::string momentum =
+            symmetry.momentum.size() > longest ? symmetry.momentum.substr(0, longest) + "..." : symmetry.momentum;
+        found.push_back(at_most(symmetry.kind + ": " + momentum, variation, bound, meaning));
+    }
+    constexpr std::size_t most_rows = 6;
+    if (found.size() > most_rows)
+        found = {at_most(fmt::format("momenta of {} linear symmetries", found.size()), worst, bound, meaning)};
+    rows.insert(rows.end(), found.begin(), found.end());
+}
+
+void energy(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start) {
+    const EnergyDrift drift = energy_drift(kernel, start.parameters, start.q, start.p, start.step, long_run);
+    const std::string claim = fmt::format("energy drift in {} steps", drift.steps);
+    if (!std::isfinite(drift.drift)) {
+        rows.push_back({claim, "energy too large", "not judged", true, ""});
+        return;
+    }
+    if (!drift.bounded || drift.chaotic) {
+        rows.push_back({claim, drift.bounded ? "motion chaotic" : "motion unbounded", "not judged", true, ""});
+        return;
+    }
+    // A steady drift moves the mean by half the swing.
+    rows.push_back(
+        at_most(claim, drift.drift, drift.swing / 4 + drift.rounding, "the energy drifts: its error grows with time"));
+}
+
+Row order(const Convergence& convergence, const Kernel& kernel) {
+    const bool holds = bears_out(convergence, kernel->order, kernel->linear != 0);
+    const std::string bound = fmt::format("{} {}", kernel->linear ? "at least" : "about", kernel->order);
+    if (convergence.below_rounding) return {"order of convergence", "below rounding", "not judged", holds, ""};
+    return {"order of convergence", convergence.exact ? "exact" : fmt::format("{:.2f}", convergence.order), bound,
+            holds, "the error of this motion does not shrink with the step as the method's order says"};
+}
+
+void print(const std::vector<Row>& rows, const Convergence& convergence) {
+    std::size_t widest = 0;
+    for (const Row& row : rows) widest = std::max(widest, row.claim.size());
+    fmt::print("  {:<{}}  {:>16}  {:>10}\n", "claim", widest, "measured", "bound");
+    for (const Row& row : rows)
+        fmt::print("  {:<{}}  {:>16}  {:>10}  {}\n", row.claim, widest, row.measured, row.bound,
+                   row.holds ? "ok" : "FAILED");
+    if (convergence.rows.empty()) return;
+    fmt::print("\nThe error over {:.4g} time units, in quadruple precision:\n  {:>12}  {:>12}  {:>6}\n",
+               convergence.duration, "step", "error", "order");
+    for (const ConvergenceRow& row : convergence.rows)
+        fmt::print("  {:>12.6g}  {:>12.3e}  {:>6}\n", row.step, row.error,
+                   &row == &convergence.rows.front() ? "" : fmt::format("{:.2f}", row.order));
+}
+
+void verify(const VerifyOptions& options) {
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    const bool with_tangent = scene.coordinates.size() <= tangent_limit;
+    scene.outputs.energy = true;
+    scene.outputs.tangent = with_tangent;
+    const ExactStart exact_start(scene);
+    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
+    if (!step.is_positive())
+        throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
+    const Derivation derivation = derive(scene);
+    Programs programs = build_programs(derivation);
+    EmitOptions emit_options;
+    const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
+    emit_options.precision = Precision::quadruple;
+    const Kernel exact_kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
+    optimise(programs);
+
+    fmt::print("{}: {} ({})\n", options.scene, scene.title, scene.method.name());
+    std::vector<Row> rows;
+    for (const auto& checks :
+         {check_quadrature(derivation.quadrature), check_equations(derivation), check_programs(derivation, programs)})
+        for (const Check& check : checks) rows.push_back(row_of(check));
+
+    const auto start = start_with_step<double>(exact_start, step, kernel);
+    const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
+    const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
+    const auto states = states_along(kernel, start);
+    const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
+                                    [](const GiNaC::ex& force) { return !force.is_zero(); });
+    if (with_tangent) {
+        const std::string not_symplectic = "the step does not preserve phase-space areas";
+        if (forced) {
+            rows.push_back(not_promised("symplectic step", "forces"));
+        } else {
+            rows.push_back(
+                at_most("symplectic defect, double", worst_defect(kernel, start, states), 1e-14, not_symplectic));
+            rows.push_back(at_most("symplectic defect, quadruple", worst_defect(exact_kernel, exact, states), 1e-30,
+                                   not_symplectic));
+        }
+        rows.push_back(at_most("tangent map against differences",
+                               tangent_defect(exact_kernel, quadruple_start, start.step), 1e-18,
+                               "the tangent map is not the derivative of the step"));
+        rows.push_back(reversal(kernel, start, "double", !forced));
+        rows.push_back(reversal(exact_kernel, exact, "quadruple", !forced));
+    } else {
+        rows.push_back({"symplectic step, reversal", "left out", fmt::format("n > {}", tangent_limit), true, ""});
+    }
+    const double of_decimals =
+        scene.method.family == Family::splitting ? 100 * std::pow(10.0, -splitting_of(scene.method.points).digits) : 0;
+    const Convergence convergence = measure_order(exact_kernel, quadruple_start, start.step, of_decimals);
+    rows.push_back(order(convergence, exact_kernel));
+    momenta(rows, kernel, start, scene);
+    const std::string energy_claim = "H in double against quadruple";
+    const double defect = energy_defect(kernel, exact_kernel, start.parameters, start.step, states);
+    if (std::isnan(defect))
+        rows.push_back({energy_claim, "energy too large", "not judged", true, ""});
+    else
+        rows.push_back(at_most(energy_claim, defect, 1e-10,
+                               "terms of the energy cancel and take its digits with them; write the potential without "
+                               "differences of nearly equal terms"));
+    if (forced || !derivation.system.autonomous)
+        rows.push_back(not_promised("bounded energy error", forced ? "forces" : "time"));
+    else
+        energy(rows, kernel, start);
+
+    print(rows, convergence);
+    for (const Row& row : rows)
+        if (!row.holds)
+            throw ComputationError(fmt::format("{}: the check '{}' fails: {}.", scene.path, row.claim, row.meaning));
+}
+
+}  // namespace
+
+void add_verify(CLI::App& program) {
+    CLI::App* command = program.add_subcommand(
+        "verify", "Check a scene's equations, its emitted code and the promises of its integrator");
+    const auto options = std::make_shared<VerifyOptions>();
+    command->add_option("scene", options->scene, "Scene file")->required();
+    options->method.add_to(*command);
+    command->footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
+    command->callback([options] { verify(*options); });
+}
+
+}  // namespace lobatto

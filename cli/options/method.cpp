@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/options/method.hpp"
+
+#include <cstdlib>
+#include <string>
+
+#include "generator/formula/source.hpp"
+#include "generator/method/splitting.hpp"
+
+namespace lobatto {
+
+void MethodOption::add_members_to(CLI::App& command) {
+    CLI::Option* lobatto = command.add_option("--points", points, "Lobatto with this many points: order 2 points - 2");
+    CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
+    lobatto->check(CLI::Range(2, 12));
+    gauss->check(CLI::Range(1, 10))->excludes(lobatto);
+}
+
+void MethodOption::add_to(CLI::App& command) {
+    add_members_to(command);
+    command
+        .add_option("--splitting", splitting,
+                    "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
+        ->check(CLI::IsMember(splitting_stages()))
+        ->excludes(command.get_option("--points"))
+        ->excludes(command.get_option("--stages"));
+    command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
+        ->check([](const std::string& text) {
+            const double value = std::strtod(text.c_str(), nullptr);
+            return value > 0 && value <= 1e-3 ? ""
+                                              : "the tolerance is " + text +
+                                                    "; it must be above 0 and at most 0.001; leave it out to iterate "
+                                                    "to rounding";
+        });
+    command
+        .add_option("--arithmetic", arithmetic,
+                    "plain, or clean: rounding errors grow like a random walk only (slower)")
+        ->check(CLI::IsMember({"plain", "clean"}));
+}
+
+void MethodOption::apply(Scene& scene) const {
+    Method& method = scene.method;
+    if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
+    if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
+    if (tolerance) {
+        if (method.arithmetic == StepArithmetic::clean)
+            throw InputError(scene.path +
+                             ": clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave "
+                             "out --tolerance, or add --arithmetic plain");
+        if (method.family == Family::splitting)
+            throw InputError(scene.path + ": splitting methods iterate nothing; leave out --tolerance");
+        method.tolerance = *tolerance;
+    }
+    // The scene's has no meaning with --arithmetic clean or --splitting.
+    if (method.arithmetic == StepArithmetic::clean || method.family == Family::splitting) method.tolerance = 0;
+}
+
+std::optional<Method> MethodOption::member() const {
+    if (points) return Method{Family::lobatto, *points};
+    if (stages) return Method{Family::gauss, *stages};
+    if (splitting) return Method{Family::splitting, *splitting};
+    return std::nullopt;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Where results go.
+#include "cli/options/output_path.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <filesystem>
+
+#include "generator/formula/source.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/partial_file.hpp"
+
+namespace lobatto {
+
+std::string output_path(const std::string& given, const std::string& name) {
+    if (!given.empty()) return given;
+    std::error_code error;
+    std::filesystem::create_directory("out", error);
+    if (error)
+        throw MachineError(
+            fmt::format("cannot create the folder out here: {}. Choose another place with -o", error.message()));
+    return "out/" + name;
+}
+
+std::string output_folder(const std::string& given, const std::string& name) {
+    const std::string folder = output_path(given, name);
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error)
+        throw MachineError(
+            fmt::format("cannot create the folder {}: {}. Choose another place with -o", folder, error.message()));
+    if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0) fail_to_write("results", folder, errno);
+    return folder;
+}
+
+void keep_scene(const std::string& scene, const std::string& path) {
+    std::error_code none;
+    // Regular files only: a terminal is good as both.
+    for (const char* ending : {"", ".partial"})
+        if (std::filesystem::is_regular_file(path + ending, none) &&
+            std::filesystem::equivalent(path + ending, scene, none))
+            throw InputError(
+                fmt::format("{}: the result would overwrite the scene {}; give it another name", path, scene));
+}
+
+}  // namespace lobatto

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/options/resume.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "generator/formula/source.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::string list(const std::vector<double>& values) {
+    std::string text;
+    for (const double value : values) text += (text.empty() ? "" : " ") + exact_text(value);
+    return text;
+}
+
+}  // namespace
+
+std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader& header, const std::string& object) {
+    return fmt::format(
+        "# lobatto {}\n{}positions: {}\nmomenta: {}\nsteps: {}\nevery: {}\ndense: {}\ntolerance: {}\ncompiled kernel: "
+        "{}\n",
+        LOBATTO_VERSION, text_of(header), list(request.q), list(request.p), request.steps, request.every, request.dense,
+        exact_text(request.tolerance), std::filesystem::path(object).stem().string());
+}
+
+void remove_checkpoint(const std::string& trajectory) {
+    std::error_code none;
+    std::filesystem::remove(checkpoint_path(trajectory), none);
+}
+
+std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std::string& run, const Kernel& kernel,
+                                        std::size_t files, std::size_t watched) {
+    const std::string path = checkpoint_path(trajectory);
+    std::optional<Checkpoint> found = read_checkpoint(path);
+    if (!found) return found;
+    if (const std::string what = difference(found->run, run); !what.empty())
+        throw InputError(
+            fmt::format("{} belongs to another run: {}. Give that run's options, or run without --resume to begin anew",
+                        path, what));
+    const auto n = static_cast<std::size_t>(kernel->coordinates);
+    const TrajectoryResult& result = found->halfway.result;
+    if (found->files.size() != files || found->watched.size() < watched ||
+        std::ssize(found->halfway.stepper) != kernel->stepper_bytes || result.q.size() != n || result.p.size() != n)
+        throw MachineError(
+            fmt::format("cannot go on from {}: it is damaged. Run without --resume to begin anew", path));
+    return found;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Takes a stopped run up again: its files, its checkpoint beside them, and whether they belong to the run at hand.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "runtime/build/library.hpp"
+#include "runtime/run/checkpoint.hpp"
+#include "runtime/run/output.hpp"
+
+namespace lobatto {
+
+// What a run is: two runs of which this is the same have the same bytes. `object`: the compiled kernel.
+std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader& header, const std::string& object);
+
+inline std::string checkpoint_path(const std::string& trajectory) {
+    return trajectory + ".checkpoint";
+}
+void remove_checkpoint(const std::string& trajectory);
+
+// The checkpoint beside the trajectory; nothing when there is none. InputError when it is another run's, MachineError
+// when it cannot be used. `files`, `watched`: how many files and, at least, other numbers the run has.
+std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std::string& run, const Kernel& kernel,
+                                        std::size_t files, std::size_t watched);
+
+}  // namespace lobatto

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Drawings as SVG files, through gnuplot.
+#include "cli/print/drawing.hpp"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "runtime/build/process.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/partial_file.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// Colours that stay apart for every eye and in grey (Okabe and Ito).
+const char* const style = R"(
+set datafile separator ","
+set border 3 lc rgb "#444444" lw 1.2
+set tics nomirror out scale 0.6 tc rgb "#222222"
+set grid lc rgb "#e4e4e4" lw 1 lt 1
+set style line 1 lc rgb "#999999" lw 2
+set style line 2 lc rgb "#0072b2" lw 2 pt 7 ps 0.75
+set style line 3 lc rgb "#d55e00" lw 2 pt 8 ps 1.3
+set style line 4 lc rgb "#009e73" lw 2 pt 4 ps 0.9
+set style line 12 lc rgb "#0072b2" lw 2 dt 3
+set style line 13 lc rgb "#d55e00" lw 2 dt 3
+set style line 14 lc rgb "#009e73" lw 2 dt 3
+set key outside top center horizontal maxrows 1 reverse Left samplen 2 width -1
+)";
+
+constexpr int not_found = 127;  // exit code of env
+
+// A new folder for the files of one drawing, under a name that no text of others is part of; goes with its contents.
+class Workplace {
+public:
+    Workplace(const std::string& folder, const std::string& picture, const std::string& otherwise)
+        : path_(folder + "/.lobatto-drawing-XXXXXX") {
+        if (::mkdtemp(path_.data()) == nullptr) fail_to_write("the picture", picture, errno, otherwise);
+    }
+    ~Workplace() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    Workplace(const Workplace&) = delete;
+    Workplace& operator=(const Workplace&) = delete;
+
+    std::string operator/(const char* file) const { return path_ + "/" + file; }
+    std::string name() const { return std::filesystem::path(path_).filename(); }
+
+private:
+    std::string path_;
+};
+
+}  // namespace
+
+void draw(const std::string& folder, const std::string& name, const std::string& script, int width, int height,
+          const std::string& without) {
+    const std::string path = (std::filesystem::path(folder) / (name + ".svg")).string();
+    const std::string otherwise = without.empty() ? elsewhere : without;
+    const Workplace workplace(folder, path, otherwise);
+    write_whole(workplace / "script", "the picture's script",
+                fmt::format("set terminal svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb "
+                            "\"white\"{}set output \"{}/picture\"\n{}",
+                            width, height, style, workplace.name(), script),
+                otherwise);
+    ProcessRequest request;
+    request.arguments = {"/usr/bin/env", "gnuplot", workplace.name() + "/script"};
+    request.folder = folder;
+    request.environment = {{"LC_ALL", "C"}};
+    const ProcessResult result = run_process(request);
+    if (result.exit_code == not_found)
+        throw MachineError(fmt::format("cannot draw {}: gnuplot is missing. Install it (apt install gnuplot-nox){}",
+                                       path, without.empty() ? "" : ", or " + without));
+    std::ifstream file(workplace / "picture", std::ios::binary);
+    const std::string picture(std::istreambuf_iterator<char>(file), {});
+    // On a full disk gnuplot leaves a part of it, and is content.
+    if (!result.succeeded() || !picture.ends_with("</svg>\n\n"))
+        throw MachineError(fmt::format("gnuplot could not draw {}: {}", path,
+                                       !result.output.empty() ? result.output
+                                       : result.succeeded()   ? "the picture is not whole. Is the disk full?"
+                                                              : "no message"));
+    write_whole(path, "the picture", picture, otherwise);
+}
+
+std::string gnuplot_text(const std::string& text) {
+    std::string result = "'";
+    for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
+    return result + "'";
+}
+
+}  // namespace lobatto

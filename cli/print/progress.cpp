@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/print/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <string>
+
+namespace lobatto {
+
+namespace {
+
+std::string duration(double seconds) {
+    const long whole = std::lround(seconds);
+    if (whole < 60) return fmt::format("{} s", whole);
+    if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace
+
+Progress::Progress(std::int64_t total)
+    : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()) {}
+
+Progress::~Progress() {
+    if (shown_) fmt::print(stderr, "\r\033[K");
+}
+
+void Progress::show(std::int64_t done) {
+    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    if (!on_terminal_ || elapsed < 1 || done <= 0) return;
+    shown_ = true;
+    constexpr int width = 40;
+    const double fraction = static_cast<double>(done) / static_cast<double>(total_);
+    const int filled = static_cast<int>(fraction * width);
+    fmt::print(stderr, "\r\033[K[{:#<{}}{:.<{}}] {:3.0f} %, {} left", "", filled, "", width - filled,
+               std::floor(fraction * 100), duration(elapsed * (1 - fraction) / fraction));
+    std::fflush(stderr);
+}
+
+}  // namespace lobatto

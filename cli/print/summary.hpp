@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What is said of a computation when it has ended: a line for each fact.
+#pragma once
+
+#include <string>
+
+namespace lobatto {
+
+void print_row(const std::string& label, const std::string& value);
+
+// Three digits and a unit.
+std::string duration(double seconds);
+
+}  // namespace lobatto

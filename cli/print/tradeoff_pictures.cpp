@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/print/tradeoff_pictures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "analysis/tradeoff/exploration.hpp"
+#include "cli/print/drawing.hpp"
+
+namespace lobatto {
+
+namespace {
+
+const char* const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};  // Okabe and Ito
+constexpr int most_curves = 12;                                                                    // of members
+constexpr double targets[] = {1e-3, 1e-6, 1e-9, 1e-12};                                            // of courses
+
+std::string name_of(const Member& member) {
+    const std::string name = Candidate{member, 0, 0}.name();
+    return member.precision == Precision::double_ ? name : name + ", " + precision_name(member.precision);
+}
+
+// What is on the axis of errors.
+std::string figure_name(const Laboratory& laboratory) {
+    if (!laboratory.is_chaotic()) return "largest error, relative to the amplitude of the motion";
+    return laboratory.conserves() ? "largest energy error, relative" : "1 / time until which the motion is followed";
+}
+
+void draw_work_precision(const Laboratory& laboratory, const std::string& folder) {
+    std::map<Member, std::vector<const Measurement*>> members;
+    for (const auto& [key, m] : laboratory.notebook().all())
+        if (m.complete && m.candidate.tolerance == 0 && laboratory.figure(m) < 0.3 && laboratory.figure(m) > 0)
+            members[m.candidate.member].push_back(&m);
+    const std::vector<Measurement> front = pareto_front(laboratory);
+    // Those that are most often the best, then those of which most is known.
+    const auto merit = [&](const Member& member) {
+        return std::pair(std::count_if(front.begin(), front.end(),
+                                       [&](const Measurement& m) { return m.candidate.member == member; }),
+                         members.at(member).size());
+    };
+    std::vector<const Member*> shown;
+    for (const auto& [member, list] : members) shown.push_back(&member);
+    std::stable_sort(shown.begin(), shown.end(),
+                     [&](const Member* a, const Member* b) { return merit(*a) > merit(*b); });
+    if (shown.size() > most_curves) shown.resize(most_curves);
+    std::sort(shown.begin(), shown.end(), [](const Member* a, const Member* b) { return *a < *b; });
+    const double until = laboratory.until();
+    std::string data, curves;
+    const auto add = [&](std::vector<const Measurement*> list, const std::string& style, const std::string& title) {
+        std::sort(list.begin(), list.end(),
+                  [](const auto* a, const auto* b) { return a->candidate.steps < b->candidate.steps; });
+        const std::string name = fmt::format("$m{}", std::count(data.begin(), data.end(), '$'));
+        data += name + " << END\n";
+        for (const Measurement* m : list)
+            data += fmt::format("{:.4e},{:.4e}\n", laboratory.figure(*m), m->seconds / until * 1e9);
+        data += "END\n";
+        curves +=
+            fmt::format("{}{} using 1:2 {} title \"{}\"", curves.empty() ? "plot " : ", \\\n     ", name, style, title);
+    };
+    std::vector<const Measurement*> best;
+    for (const Measurement& m : front)
+        if (laboratory.figure(m) < 0.3 && laboratory.figure(m) > 0) best.push_back(&m);
+    if (best.empty()) return;
+    std::sort(best.begin(), best.end(), [](const auto* a, const auto* b) { return a->seconds < b->seconds; });
+    int number = 0;
+    for (const Member* member : shown) {
+        const int dashes = member->family == Family::lobatto ? 1 : member->family == Family::gauss ? 2 : 3;
+        add(members.at(*member),
+            fmt::format("with linespoints lc rgb \"{}\" lw 1.5 dt {} pt {} ps 0.6", colours[number % 6], dashes,
+                        4 + (number + number / 6) % 6),  // no colour has the same points twice
+            name_of(*member));
+        ++number;
+    }
+    data += "$front << END\n";
+    for (const Measurement* m : best)
+        data += fmt::format("{:.4e},{:.4e}\n", laboratory.figure(*m), m->seconds / until * 1e9);
+    data += "END\n";
+    curves += ", \\\n     $front using 1:2 with lines lc rgb \"#000000\" lw 4 title \"the best of all\"";
+    draw(folder, "work_precision",
+         fmt::format("{}set logscale xy\nset xrange [*:*] reverse\nset format \"10^{{%T}}\"\n"
+                     "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
+                     "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds a unit of time\"\n{}\n",
+                     data, gnuplot_text(laboratory.scene().title), figure_name(laboratory), curves),
+         960, 560);
+}
+
+// For some decades the cheapest way.
+std::vector<Measurement> representatives(const Laboratory& laboratory) {
+    std::vector<Measurement> chosen;
+    for (const double target : targets)
+        for (const Measurement& m : pareto_front(laboratory))
+            if (laboratory.figure(m) <= target) {
+                if (m.candidate.member.precision == Precision::double_ &&
+                    (chosen.empty() || chosen.back().candidate.key() != m.candidate.key()))
+                    chosen.push_back(m);
+                break;
+            }
+    return chosen;
+}
+
+void draw_course(const std::string& folder, const std::string& name, const std::string& label,
+                 const std::vector<std::string>& titles, const std::vector<std::vector<double>>& times,
+                 const std::vector<std::vector<double>>& values) {
+    std::string data, curves;
+    for (std::size_t i = 0; i < titles.size(); ++i) {
+        if (values[i].empty()) continue;
+        data += fmt::format("$c{} << END\n", i);
+        for (std::size_t j = 0; j < values[i].size(); ++j)
+            if (std::fabs(values[i][j]) > 0)
+                data += fmt::format("{:.6g},{:.4e}\n", times[i][j], std::fabs(values[i][j]));
+        data += "END\n";
+        curves += fmt::format("{}$c{} using 1:2 with lines lc rgb \"{}\" lw 1.5 title \"{}\"",
+                              curves.empty() ? "plot " : ", \\\n     ", i, colours[i % 6], titles[i]);
+    }
+    if (curves.empty()) return;
+    draw(folder, name,
+         fmt::format("{}set logscale y\nset format y \"10^{{%T}}\"\n"
+                     "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
+                     "set xlabel \"time\"\nset ylabel \"{}\"\n{}\n",
+                     data, label, curves),
+         960, 400);
+}
+
+}  // namespace
+
+std::vector<std::string> draw_pictures(Laboratory& laboratory, const std::string& folder) {
+    draw_work_precision(laboratory, folder);
+    std::vector<std::string> names = {"work_precision"}, titles;
+    std::vector<std::vector<double>> times, errors, energies;
+    for (const Measurement& m : representatives(laboratory)) {
+        const Measurer::Course course =
+            laboratory.measurer().course(laboratory.workshop().kernel(m.candidate.member), m.candidate);
+        titles.push_back(fmt::format("{}, h = {:.3g}", m.candidate.name(),
+                                     laboratory.until() / static_cast<double>(m.candidate.steps)));
+        times.push_back(course.time);
+        errors.push_back(course.error);
+        energies.push_back(course.energy);
+    }
+    if (titles.empty()) return names;
+    draw_course(folder, "error", "error", titles, times, errors);
+    names.push_back("error");
+    if (laboratory.conserves() && !energies.front().empty()) {
+        draw_course(folder, "energy", "energy error", titles, times, energies);
+        names.push_back("energy");
+    }
+    return names;
+}
+
+}  // namespace lobatto

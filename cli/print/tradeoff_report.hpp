@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What the measurements say: a table for the terminal, CSV and JSON for machines, pictures and a page for people.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/tradeoff/calibration.hpp"
+#include "analysis/tradeoff/laboratory.hpp"
+
+namespace lobatto {
+
+// What is to be said before any number: what the errors are errors of.
+std::string reference_text(const Laboratory& laboratory);
+
+// How the estimates of the error follow the true one here.
+Calibration calibration_of(const Laboratory& laboratory);
+
+// Pareto's front, thinned to about two rows a decade.
+std::vector<Measurement> front_rows_of(const Laboratory& laboratory);
+std::string front_table(const Laboratory& laboratory);
+
+std::string csv_of(const Laboratory& laboratory);
+std::string json_of(const Laboratory& laboratory);
+
+}  // namespace lobatto

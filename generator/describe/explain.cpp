@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What was found of a system and how a step is taken, in words for a newcomer.
+#include "generator/describe/explain.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/formula/expansion.hpp"
+#include "generator/programs/programs.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+constexpr int most_swept = 16;  // coordinates of the general form: `most_full` of base/contract.hpp
+
+bool holds_any(const SparseMatrix& matrix, const std::vector<GiNaC::symbol>& symbols) {
+    return std::any_of(matrix.entries().begin(), matrix.entries().end(), [&](const auto& entry) {
+        return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return entry.second.has(s); });
+    });
+}
+
+bool has_linear_terms(const System& system) {
+    GiNaC::exmap at_rest;
+    for (const auto& velocity : system.v) at_rest[velocity] = 0;
+    return std::any_of(system.momentum.begin(), system.momentum.end(), [&](const ex& p) {
+        try {
+            return !expanded(p.subs(at_rest, GiNaC::subs_options::no_pattern)).is_zero();
+        } catch (const std::domain_error&) {  // infinite at rest, or 0^0
+            return true;
+        }
+    });
+}
+
+// Points of a step where positions are unknown: of a general step all control points but the first.
+int unknown_points(const Derivation& d) {
+    if (d.structure.is_explicit) return 0;
+    if (d.structure.form != Form::general) return d.quadrature.points - 2;
+    return d.scene.method.family == Family::lobatto ? d.scene.method.points - 1 : d.scene.method.points;
+}
+
+std::string points_text(int count) {
+    return count == 1 ? "the point" : fmt::format("the {} points", count);
+}
+
+// x, y, z and 9 more
+std::string names_of(const Derivation& d, const std::vector<int>& coordinates) {
+    std::string text;
+    for (std::size_t i = 0; i < coordinates.size(); ++i) {
+        if (i == 4 && coordinates.size() > 5) return text + fmt::format(" and {} more", coordinates.size() - i);
+        text += (i == 0 ? "" : ", ") + d.scene.coordinates[static_cast<std::size_t>(coordinates[i])].written;
+    }
+    return text;
+}
+
+}  // namespace
+
+std::string kind_of(const Derivation& derivation) {
+    const System& system = derivation.system;
+    std::string text;
+    const bool linear_terms = has_linear_terms(system);
+    if (holds_any(system.momentum_v, system.v))
+        text = "Not quadratic in the velocities, as in relativity";
+    else if (holds_any(system.momentum_v, system.q))
+        text = "Quadratic in the velocities, with masses that depend on the position";
+    else if (holds_any(system.momentum_v, {system.t}))
+        text = "Quadratic in the velocities, with masses that depend on the time";
+    else
+        text = linear_terms ? "Quadratic in the velocities, with constant masses"
+                            : "Kinetic minus potential energy, with constant masses";
+    if (linear_terms && !holds_any(system.momentum_v, system.v))
+        text += ", and terms linear in them, as of magnetic fields and rotating frames";
+    if (!system.autonomous) text += "; the time itself occurs";
+    std::vector<int> forced;
+    for (std::size_t k = 0; k < system.outer_force.size(); ++k)
+        if (!system.outer_force[k].is_zero()) forced.push_back(static_cast<int>(k));
+    if (!forced.empty()) text += "; beside L, forces act on " + names_of(derivation, forced);
+    return text + ".";
+}
+
+std::string form_of(const Derivation& derivation) {
+    const int points = unknown_points(derivation);
+    switch (derivation.structure.form) {
+        case Form::linear_map:
+            return "one matrix takes positions and momenta from one step to the next; nothing is solved for";
+        case Form::separable:
+            if (points == 0) return "explicit: the end of a step follows from its beginning without equations";
+            return fmt::format("the positions at {} inside it are solved for; its end follows from them",
+                               points_text(points));
+        case Form::general:
+            return points == 1 ? "the positions at its end are solved for"
+                               : fmt::format(
+                                     "the positions at {} after its beginning are solved for, the last of them "
+                                     "its end",
+                                     points_text(points));
+    }
+    throw std::logic_error("form_of: no such form");
+}
+
+int unknowns_of(const Derivation& derivation) {
+    int unknowns = 0;
+    for (const GroupSolve& solve : solves_of(derivation)) unknowns += solve.unknowns;
+    return unknowns;
+}
+
+std::vector<GroupSolve> solves_of(const Derivation& derivation) {
+    const Structure& structure = derivation.structure;
+    if (structure.form == Form::linear_map) return {};
+    const bool general = structure.form == Form::general;
+    const int points = unknown_points(derivation);
+    // One multiplier a cyclic coordinate with Lobatto: its momentum may sway within a step.
+    const int multipliers = general && derivation.scene.method.family == Family::lobatto
+                                ? static_cast<int>(structure.routhian.cyclic.size())
+                                : 0;
+    std::vector<GroupSolve> solves;
+    for (const Group& group : structure.groups) {
+        GroupSolve solve;
+        for (const int k : group.coordinates)
+            solve.coordinates.push_back(general ? structure.routhian.active[static_cast<std::size_t>(k)] : k);
+        solve.unknowns = points * static_cast<int>(group.coordinates.size()) + multipliers;
+        solve.band =
+            multipliers > 0 ? solve.unknowns - 1 : std::min((group.bandwidth + 1) * points, solve.unknowns) - 1;
+        const bool free = !general && std::none_of(structure.entries.begin(), structure.entries.end(),
+                                                   [&](const auto& e) { return e.first == group.coordinates.front(); });
+        solve.method = free || solve.unknowns == 0                                 ? "nothing to solve"
+                       : structure.unrolled && solve.unknowns <= closed_form_limit ? "closed formula"
+                       : structure.unrolled || 3 * solve.band >= solve.unknowns    ? "full matrix"
+                                                                                   : "banded matrix";
+        if (solve.unknowns > 0) solves.push_back(solve);
+    }
+    return solves;
+}
+
+long elimination_of(const Derivation& derivation) {
+    const bool factored = derivation.structure.linear || derivation.structure.absorbed;  // once for all
+    long multiplications = 0;
+    for (const GroupSolve& solve : solves_of(derivation)) {
+        const long N = solve.unknowns, band = solve.band;
+        if (solve.method == "nothing to solve") continue;
+        if (solve.method == "banded matrix")
+            multiplications += (factored ? 0 : 2 * N * band * band) + 3 * N * band;
+        else
+            multiplications += (factored ? 0 : N * N * N / 3) + N * N;
+    }
+    return multiplications;
+}
+
+std::string solver_text(const Derivation& derivation) {
+    const std::vector<GroupSolve> solves = solves_of(derivation);
+    if (solves.empty()) return "";
+    const auto words = [](const GroupSolve& solve) {
+        const std::string equations =
+            solve.unknowns == 1 ? "one equation" : fmt::format("{} equations", solve.unknowns);
+        if (solve.method == "nothing to solve") return std::string("nothing to solve: the motion is uniform");
+        if (solve.method == "closed formula") return equations + ", by a closed formula";
+        if (solve.method == "full matrix") return equations + ", as a full matrix";
+        return fmt::format("{}, as a band of {} diagonals", equations, 2 * solve.band + 1);
+    };
+    std::vector<std::pair<std::string, std::vector<int>>> kinds;  // groups solved alike, together
+    for (const GroupSolve& solve : solves) {
+        const std::string text = words(solve);
+        auto known = std::find_if(kinds.begin(), kinds.end(), [&](const auto& kind) { return kind.first == text; });
+        if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
+        known->second.push_back(solve.coordinates.front());
+    }
+    const bool swept = !derivation.structure.general &&
+                       (derivation.structure.form == Form::separable || derivation.system.n <= most_swept);
+    std::string text = derivation.structure.linear ? "once a step, without iteration; "
+                       : swept                     ? "by sweeps over all points at once; where they do not contract, "
+                                                   : "";
+    if (!derivation.structure.linear)
+        text +=
+            derivation.structure.absorbed ? "by iterations with one matrix for all steps; " : "by Newton's iteration; ";
+    if (solves.size() == 1) return text + kinds.front().first;
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+        const auto& [how, list] = kinds[i];
+        text += i == 0 ? "" : "; ";
+        text += list.size() == 1 ? "for the group of " + names_of(derivation, list) + " "
+                                 : fmt::format("for each of {} groups ", list.size());
+        text += how;
+    }
+    return text;
+}
+
+}  // namespace lobatto

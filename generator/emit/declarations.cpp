@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The functions of a kernel: how each is declared and what its comment says.
+#include "generator/emit/declarations.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace lobatto {
+
+namespace {
+
+const char* const in = "const real*";
+const char* const out = "real*";
+
+const std::vector<Declaration>& separable() {
+    static const std::vector<Declaration> table = {
+        {"energy",
+         "(D3) Hamiltonian H(q, p) = p^T M^-1 p / 2 + V(q); q, p: n.",
+         "real",
+         {{in, "q"}, {in, "p"}},
+         true,
+         true},
+        {"momentum", "(D2) p = dL/dq' = M q'; n each.", "void", {{in, "velocity"}, {out, "p"}}, false, true},
+        {"velocity", "(D2) q' = M^-1 p; n each.", "void", {{in, "p"}, {out, "velocity"}}, false, true},
+        {"node",
+         "(D1) At one node: W = M^-1 grad V(q), n, and S = the entries of M^-1 V''(q) listed in entry_row, "
+         "entry_column.",
+         "void",
+         {{in, "q"}, {out, "W"}, {out, "S"}},
+         true,
+         true},
+        {"acceleration", "(D1) W = M^-1 grad V(q) alone; n.", "void", {{in, "q"}, {out, "W"}}, true, true},
+        {"remainder",
+         "(D31) R = W - D q, D the part of W's derivative that is taken into the stage map; n.",
+         "void",
+         {{in, "q"}, {out, "R"}},
+         true,
+         true},
+        {"drift",
+         "(D11) v = u - h b_1 W0 and base_i = q + h c_i v, i = 2 ... s, node-major.",
+         "void",
+         {{in, "q"}, {in, "u"}, {in, "W0"}, {out, "v"}, {out, "base"}}},
+        {"simple_start",
+         "(D14) First guess with constant acceleration: Q_i = base_i - h^2 (sum_j A_ij) W0.",
+         "void",
+         {{in, "base"}, {in, "W0"}, {out, "Q"}}},
+        {"extrapolated_start",
+         "(D15) First guess from the polynomial through the accelerations of the step before (s nodes): Q_i = base_i - "
+         "h^2 sum_j (A E)_ij W_before_j.",
+         "void",
+         {{in, "base"}, {in, "W_before"}, {out, "Q"}}},
+        {"residual",
+         "(D12) Interior discrete Euler-Lagrange equations, solved form: F_i = Q_i - base_i + h^2 sum_j A_ij W_j; N.",
+         "void",
+         {{in, "base"}, {in, "Q"}, {in, "W"}, {out, "F"}}},
+        {"jacobian", "(D13) J = dF/dQ = I + h^2 A (x) S; N x N, row-major.", "void", {{in, "S"}, {out, "J"}}},
+        {"correction",
+         "(D14) Newton's correction delta = -J^-1 F; false when J is singular.",
+         "bool",
+         {{in, "base"}, {in, "Q"}, {in, "W"}, {in, "S"}, {out, "delta"}}},
+        {"carry",
+         "The accelerations at Q + delta, to first order: W_j += S_j delta_j.",
+         "void",
+         {{in, "S"}, {in, "delta"}, {out, "W"}}},
+        {"arrive", "(D16) q1 = base_s - h^2 sum_j b_j (1 - c_j) W_j.", "void", {{in, "base"}, {in, "W"}, {out, "q1"}}},
+        {"finish",
+         "(D17) u1 = v - h sum_j b_j W_j - h b_s W1, with u = M^-1 p.",
+         "void",
+         {{in, "v"}, {in, "W"}, {in, "W1"}, {out, "u1"}}},
+        {"propagate",
+         "(D20) The whole step: (q1, p1) = Phi (q, p) + shift, as (q, p) + (Phi - I) (q, p) + shift.",
+         "void",
+         {{in, "q"}, {in, "p"}, {out, "q1"}, {out, "p1"}},
+         false,
+         true},
+        {"quadratic_part",
+         "(D31) S0 = the part of M^-1 V'' that does not depend on q; its entries as those of S.",
+         "void",
+         {{out, "S0"}}},
+        {"event",
+         "What the scene's events watch, at a state.",
+         "void",
+         {{in, "q"}, {in, "velocity"}, {out, "value"}},
+         true},
+    };
+    return table;
+}
+
+const std::vector<Declaration>& general() {
+    static const std::vector<Declaration> table = {
+        {"energy",
+         "(D26) Energy H = velocity . dL/dvelocity - L; q, velocity: n.",
+         "real",
+         {{in, "q"}, {in, "velocity"}},
+         true,
+         true},
+        {"momentum", "(D2) p = dL/dvelocity; n each.", "void", {{in, "q"}, {in, "velocity"}, {out, "p"}}, true, true},
+        {"legendre",
+         "(D27) p and its derivative M in the velocity, the entries listed in mass_row, mass_column.",
+         "void",
+         {{in, "q"}, {in, "velocity"}, {out, "p"}, {out, "M"}},
+         true,
+         true},
+        {"stage",
+         "(D35) Lv = dL/dvelocity, Lq = dL/dq + F, n each, and M = dLv/dvelocity as in legendre.",
+         "void",
+         {{in, "q"}, {in, "velocity"}, {out, "Lv"}, {out, "Lq"}, {out, "M"}},
+         true,
+         true},
+        {"slopes",
+         "Lv = dL/dvelocity and Lq = dL/dq + F; n each.",
+         "void",
+         {{in, "q"}, {in, "velocity"}, {out, "Lv"}, {out, "Lq"}},
+         true,
+         true},
+        {"node",
+         "(D25) At one node, z = (velocities, positions of the active coordinates, momenta of the cyclic ones): g = "
+         "dR/dz, with the force beside dR/dq, and the entries of H = dg/dz listed in entry_row, entry_column.",
+         "void",
+         {{in, "z"}, {out, "g"}, {out, "H"}},
+         true,
+         true},
+        {"slope", "(D25) g alone.", "void", {{in, "z"}, {out, "g"}}, true, true},
+        {"event",
+         "What the scene's events watch, at a state.",
+         "void",
+         {{in, "q"}, {in, "velocity"}, {out, "value"}},
+         true},
+    };
+    return table;
+}
+
+}  // namespace
+
+const std::vector<Declaration>& declarations(Form form) {
+    return form == Form::general ? general() : separable();
+}
+
+bool is_member_name(const std::string& name) {
+    static const std::set<std::string> members = {"name",
+                                                  "digest",
+                                                  "method",
+                                                  "form",
+                                                  "autonomous",
+                                                  "has_energy",
+                                                  "has_tangent",
+                                                  "events",
+                                                  "angles",
+                                                  "coordinates",
+                                                  "points",
+                                                  "order",
+                                                  "unknowns",
+                                                  "linear",
+                                                  "unrolled",
+                                                  "absorbed",
+                                                  "clean",
+                                                  "is_explicit",
+                                                  "row_reach",
+                                                  "unit_masses",
+                                                  "in_passing",
+                                                  "drift_length",
+                                                  "any_number",
+                                                  "costly",
+                                                  "diagonal_part",
+                                                  "has_remainder",
+                                                  "neighbours",
+                                                  "parameter_count",
+                                                  "entries",
+                                                  "entry_row",
+                                                  "entry_column",
+                                                  "c",
+                                                  "b",
+                                                  "A",
+                                                  "E",
+                                                  "B",
+                                                  "D",
+                                                  "control",
+                                                  "extrapolation",
+                                                  "nodes",
+                                                  "controls",
+                                                  "active",
+                                                  "active_index",
+                                                  "cyclic",
+                                                  "cyclic_index",
+                                                  "mass_entries",
+                                                  "mass_row",
+                                                  "mass_column",
+                                                  "position",
+                                                  "group_count",
+                                                  "group_first",
+                                                  "group_bandwidth",
+                                                  "legendre_polynomial",
+                                                  "integration",
+                                                  "reach",
+                                                  "ahead",
+                                                  "event_direction",
+                                                  "parameter",
+                                                  "prepare",
+                                                  "Parameters",
+                                                  "Coefficients",
+                                                  "real"};
+    const auto is_function = [&](Form form) {
+        return std::any_of(declarations(form).begin(), declarations(form).end(),
+                           [&](const Declaration& declaration) { return declaration.program == name; });
+    };
+    return members.contains(name) || is_function(Form::separable) || is_function(Form::general);
+}
+
+}  // namespace lobatto

@@ -1,0 +1,485 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Graph to C++ text: the only file that prints C++.
+#include "generator/emit/kernel.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <set>
+
+#include "generator/emit/declarations.hpp"
+#include "generator/emit/function_text.hpp"
+#include "generator/emit/looped.hpp"
+#include "generator/emit/tables.hpp"
+#include "generator/graph/optimise.hpp"
+#include "generator/mechanics/derivation.hpp"
+#include "generator/programs/identifier.hpp"
+#include "generator/programs/programs.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::string digest_of(const std::string& text) {
+    std::uint64_t hash = 14695981039346656037u;  // FNV-1a
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+    return fmt::format("{:016x}", hash);
+}
+
+// Text that may stand in a // comment: one line, printable.
+std::string comment_safe(const std::string& text) {
+    std::string safe;
+    for (const char c : text) safe += static_cast<unsigned char>(c) < 32 || c == 127 ? ' ' : c;
+    while (!safe.empty() && (safe.back() == '\\' || safe.back() == ' ')) safe.pop_back();
+    return safe;
+}
+
+// What `whole` costs, about, in additions: as one program, or as `part` of each repeated formula, row by row.
+double cost_of(const Programs& programs, const Structure& structure, const std::string& whole,
+               const std::string& part) {
+    double sum = 0;
+    for (const Program& program : programs.programs) {
+        if (program.name != whole && !program.name.ends_with(part)) continue;
+        std::vector<Id> values;
+        for (const Output& output : program.outputs) values.push_back(output.value);
+        const Operations operations = count(programs.graph, programs.graph.topological(values));
+        double rows = 1;
+        for (std::size_t e = 0; e < structure.elements.repeated.size(); ++e)
+            if (program.name == fmt::format("element_{}{}", e + 1, part))
+                rows = static_cast<double>(structure.elements.repeated[e].rows.size());
+        sum += rows * static_cast<double>(operations.additions + operations.multiplications + 8 * operations.divisions +
+                                          16 * operations.functions);
+    }
+    return sum;
+}
+
+// Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
+// and five products for each of them (measured).
+bool is_costly(const Programs& programs, const Structure& structure) {
+    const double evaluation = cost_of(programs, structure, "acceleration", "_slope"),
+                 with_slopes = cost_of(programs, structure, "node", "_node");
+    return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
+}
+
+// Whether sweeps are solved by accelerations alone, without what is taken into the stage map. Passes may change what is
+// costly: a program that was left out before them stays so.
+bool takes_remainder(const Programs& programs, const Structure& structure) {
+    const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
+                                      [](const Program& program) { return program.name == "remainder"; });
+    return is_there && !structure.looped && !structure.is_explicit && !structure.clean &&
+           !is_costly(programs, structure);
+}
+
+// What sweeps evaluate at the nodes of a step.
+const char* swept_function(Form form) {
+    return form == Form::general ? "stage" : "node";
+}
+
+// The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered. Not
+// those beside a quotient whose divisor moves with the same: in sin(r)/r both must come from the same digits of r.
+std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
+    std::vector<Id> values;
+    for (const Output& output : program.outputs) values.push_back(output.value);
+    const auto moving_below = [&graph](Id id) {
+        std::set<Id> inputs;
+        for (const Id one : graph.topological({id}))
+            if (graph[one].op == Op::input && graph[one].stage > Stage::step_size && graph.input_of(one).code != "time")
+                inputs.insert(one);
+        return inputs;
+    };
+    const std::vector<Id> all = graph.topological(values);
+    std::set<Id> dividing;
+    for (const Id id : all) {
+        const Node& node = graph[id];
+        if ((node.op == Op::power && node.index < 0) || node.op == Op::raise || node.op == Op::log)
+            dividing.merge(moving_below(node.operands[0]));
+    }
+    std::map<Id, int> halves, angles;
+    for (const Id id : all) {
+        if (graph[id].op != Op::pair_sine && graph[id].op != Op::pair_cosine) continue;
+        const Id pair = graph[id].operands[0];
+        const std::set<Id> inputs = moving_below(pair);
+        const auto divides = [&dividing](Id input) { return dividing.contains(input); };
+        if (++halves[pair] == 2 && !inputs.empty() && std::none_of(inputs.begin(), inputs.end(), divides))
+            angles.emplace(pair, static_cast<int>(angles.size()));
+    }
+    return angles;
+}
+
+class Emitter {
+public:
+    Emitter(const Derivation& derivation, const Programs& programs, const EmitOptions& options)
+        : d_(derivation),
+          p_(programs),
+          options_(options),
+          hoisted_(programs),
+          looped_(derivation, programs, options.precision, [this](Id id) { return name_of(id); }),
+          n_(derivation.system.n) {
+        for (const Program& program : p_.programs)
+            if (program.name == swept_function(d_.structure.form) && has_near_angles())
+                angles_ = angles_of(p_.graph, program);
+    }
+
+    std::string header(const std::string& name, const std::string& digest,
+                       const std::vector<PassReport>& report) const {
+        std::string text = preamble(name, report);
+        text += "#pragma once\n\n";
+        if (options_.precision == Precision::quadruple) text += "#define LOBATTO_USE_FLOAT128\n";
+        text += options_.standalone_support.empty() ? "#include \"kernel.hpp\"\n" : options_.standalone_support;
+        text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
+        text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
+                tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
+                coefficients() + prepare(name);
+        for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
+        for (const Declaration& declaration : declarations(d_.structure.form)) text += function(declaration);
+        if (is_map() && n_ > 1)
+            text +=
+                "\n    // (D20) The whole step: (q1, p1) = Phi (q, p) + shift.\n"
+                "    template <class given, class number>\n"
+                "    static void propagate(const CoefficientsOf<given>& k, const number* q, const number* p, number* "
+                "q1, "
+                "number* p1) {\n"
+                "        lobatto::apply_map<coordinates>(k.Phi_minus_I, q, p, q1, p1);\n    }\n";
+        if (is_map() && !forced())
+            text +=
+                "\n    // (D21) The energy that the steps conserve exactly, nearly h times H(q, p); q, p: n.\n"
+                "    template <class given, class number>\n"
+                "    static number discrete_energy(const CoefficientsOf<given>& k, const number* q, const number* p) "
+                "{\n"
+                "        return lobatto::discrete_energy<coordinates>(k.Phi_minus_I, q, p);\n    }\n";
+        text += "};\n\n}  // namespace lobatto::kernels\n";
+        return text;
+    }
+
+private:
+    std::string preamble(const std::string& name, const std::vector<PassReport>& report) const {
+        const Operations& now = report.back().after;
+        std::string text = "// SPDX-License-Identifier: MIT\n";
+        text += fmt::format("// {}: {}.\n", name, comment_safe(d_.scene.title));
+        text +=
+            "// Written by Lobatto from a scene file; edit the scene, not this file. Formula numbers (D..): "
+            "docs/derivation.md.\n//\n";
+        text += wrapped("// Lagrangian   L = " + comment_safe(d_.scene.lagrangian_text), "//                  ");
+        text += fmt::format("// Method       {}: order {}, {}\n", d_.quadrature.method.name(), d_.quadrature.order(),
+                            forced() ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
+        text += "// Coordinates  ";
+        for (int k = 0; k < n_; ++k) {
+            const Coordinate& coordinate = d_.scene.coordinates[static_cast<std::size_t>(k)];
+            text += fmt::format("{}q[{}] = {}{}", k > 0 ? ", " : "", k, coordinate.name,
+                                coordinate.unit.empty() ? "" : " [" + comment_safe(coordinate.unit) + "]");
+        }
+        text += "\n";
+        for (const Finding& finding : d_.structure.findings)
+            if (finding.holds)
+                text += wrapped(fmt::format("// Structure    {}: {}", finding.name, comment_safe(finding.reason)),
+                                "//              ");
+        text += fmt::format(
+            "// Operations   {} in all, {} as derived: {} additions, {} multiplications, {} divisions, {} functions\n",
+            now.total(), report.front().after.total(), now.additions, now.multiplications, now.divisions,
+            now.functions);
+        return text;
+    }
+
+    // Accelerations of few operations are put where they are used: a call would cost as much. So is a stage that gives
+    // angles near: at the start of a step nothing else is asked of it.
+    bool is_put_in_place(const Declaration& declaration) const {
+        const std::string name = declaration.program;
+        if (name == "stage") return takes_angles(declaration);
+        return d_.structure.form == Form::separable && !d_.structure.looped &&
+               (name == "node" || name == "acceleration" || name == "remainder") &&
+               cost_of(p_, d_.structure, "node", "_node") <= 200;
+    }
+
+    std::string costs() const {
+        if (d_.structure.form != Form::separable) return "";
+        const bool costly = is_costly(p_, d_.structure), remainder = takes_remainder(p_, d_.structure);
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool has_remainder = {};", remainder),
+                           remainder ? "forces without the part in the stage map are a function of their own"
+                                     : "forces have no function without a part") +
+               fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", costly),
+                           costly ? "forces are evaluated less often for having second derivatives"
+                                  : "second derivatives would cost more than the evaluations they save");
+    }
+
+    // Whether sweeps evaluate a function that is written out, in packs of double: where angles may be near others.
+    bool has_near_angles() const {
+        const Structure& structure = d_.structure;
+        if (structure.looped || options_.precision != Precision::double_) return false;
+        const bool is_swept = structure.form == Form::separable && !structure.is_explicit && !structure.clean;
+        return structure.form == Form::general || (is_swept && is_costly(p_, d_.structure));
+    }
+    std::string near_angles() const {
+        if (is_map()) return "";
+        const std::string comment =
+            angles_.empty() ? "nothing that sweeps evaluate takes its sines and cosines from those of angles near"
+                            : fmt::format("whose sines and cosines {} is given, anew or from those of angles near",
+                                          swept_function(d_.structure.form));
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr int angles = {};", angles_.size()),
+                           comment);
+    }
+    bool takes_angles(const Declaration& declaration) const {
+        return !angles_.empty() && std::string(declaration.program) == swept_function(d_.structure.form);
+    }
+
+    std::string parameters() const {
+        std::string text = "\n    // Values of the scene; change them before prepare().\n    struct Parameters {\n";
+        std::vector<std::string> lines;
+        std::size_t widest = 0;
+        for (const Parameter& parameter : d_.scene.parameters) {
+            Graph graph;
+            const Id value =
+                graph.constant(cln::the<cln::cl_R>(d_.scene.evaluate(parameter.value, parameter.name).to_cl_N()));
+            lines.push_back(fmt::format("real {} = {};", identifier(parameter.name),
+                                        formula(graph, value, Notation::cpp, {}, options_.precision)));
+            widest = std::max(widest, lines.back().size());
+        }
+        for (std::size_t i = 0; i < lines.size(); ++i) {
+            const std::string unit = comment_safe(d_.scene.parameters[i].unit);
+            text += unit.empty()
+                        ? fmt::format("        {}\n", lines[i])
+                        : fmt::format("        {:<{}}  // [{}]\n", lines[i], std::min<std::size_t>(widest, 60), unit);
+        }
+        text += "    };\n    static real& parameter(Parameters& p, int index) {\n";
+        if (d_.scene.parameters.empty()) {
+            text +=
+                "        (void)p;\n        (void)index;\n        static real none = 0;\n        return none;\n    }\n";
+            return text;
+        }
+        text += "        switch (index) {\n";
+        for (std::size_t i = 0; i + 1 < d_.scene.parameters.size(); ++i)
+            text += fmt::format("            case {}: return p.{};\n", i, identifier(d_.scene.parameters[i].name));
+        text += fmt::format("            default: return p.{};\n        }}\n    }}\n",
+                            identifier(d_.scene.parameters.back().name));
+        return text;
+    }
+
+    std::string coefficients() const {
+        std::string text =
+            "\n    // What depends on parameters and step size only, computed once by prepare().\n    template <class "
+            "number>\n    struct CoefficientsOf {\n";
+        std::size_t widest = 0;
+        for (const Id id : hoisted_.order) widest = std::max(widest, hoisted_.names.at(id).size());
+        widest = std::min<std::size_t>(widest, 20);
+        for (const Id id : hoisted_.order) {
+            const std::string line = fmt::format("        {:<{}}", "number " + hoisted_.names.at(id) + ";", widest + 8);
+            const Op op = p_.graph[id].op;
+            text +=
+                op == Op::input
+                    ? line.substr(0, line.find(';') + 1) + "\n"
+                    : wrapped(line + "  // " +
+                                  formula(p_.graph, id, Notation::text, [&](Id other) { return field_name(other); }),
+                              "        //     ");
+        }
+        if (d_.structure.looped) text += looped_.fields();
+        if (is_map())
+            text +=
+                fmt::format("        number Phi_minus_I[{}];  // what a step adds: rows q1, p1; columns q, p, shift\n",
+                            2 * n_ * (2 * n_ + 1));
+        return text + "    };\n    using Coefficients = CoefficientsOf<real>;\n";
+    }
+
+    std::string field_name(Id id) const {
+        const auto field = hoisted_.names.find(id);
+        return field == hoisted_.names.end() ? "" : field->second;
+    }
+
+    std::string prepare(const std::string& name) const {
+        std::vector<Statement> statements;
+        std::string pivots, finite, determinant;
+        for (const Id id : hoisted_.order) {
+            statements.push_back({"k." + hoisted_.names.at(id), id});
+            finite += (finite.empty() ? "k." : ", k.") + hoisted_.names.at(id);
+        }
+        for (const Program& program : p_.programs) {
+            if (program.name == "prepare") {
+                int index = 0;
+                for (const Output& output : program.outputs) {
+                    const std::string pivot = fmt::format("pivot_{}", ++index);
+                    statements.push_back({"const real " + pivot, output.value});
+                    pivots += (pivots.empty() ? "" : " || ") + pivot + " == real(0)";
+                }
+            } else if (program.name == "prepare_map") {
+                for (const Output& output : program.outputs) {
+                    statements.push_back({output.target, output.value});
+                    if (output.target.rfind("const real delta", 0) == 0 && !p_.graph.is_constant(output.value))
+                        determinant = output.target.substr(std::string("const real ").size());
+                    if (output.target.rfind("k.", 0) == 0) finite += (finite.empty() ? "" : ", ") + output.target;
+                }
+            }
+        }
+        if (d_.structure.looped)
+            for (const Statement& statement : looped_.prepared()) statements.push_back(statement);
+        const auto names = [&](Id id) -> std::string {
+            const Node& node = p_.graph[id];
+            if (node.op != Op::input) return "";
+            return node.stage == Stage::parameter ? "p." + p_.graph.input_of(id).code : p_.graph.input_of(id).code;
+        };
+        FunctionText body(p_, statements, names, options_.precision, Stage::constant);
+        std::string text = body.lines();
+        if (d_.structure.looped) text += looped_.after_prepare();
+        if (!pivots.empty())
+            text += wrapped("        if (" + pivots + ") return Status::singular_mass;", "            ");
+        if (!determinant.empty())
+            text += fmt::format("        if ({} == real(0)) return Status::singular_jacobian;\n", determinant);
+        text += wrapped(
+            "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
+            "            ");
+        if (is_map() && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi_minus_I);\n";
+        if (is_map() && n_ > 1)
+            text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
+        else
+            text += "        return Status::ok;\n";
+        return "\n    // Values of stage parameter and step size.\n" +
+               signature("Status", "prepare", {{"const Parameters&", "p"}, {"real", "h"}, {"Coefficients&", "k"}},
+                         text) +
+               text + "    }\n";
+    }
+
+    // A parameter that the body does not use is left without a name; a default follows the name.
+    static std::string signature(const std::string& result, const std::string& name,
+                                 const std::vector<std::pair<std::string, const char*>>& parameters,
+                                 const std::string& body) {
+        std::string text;
+        for (const auto& [type, parameter] : parameters) {
+            text += (text.empty() ? "" : ", ") + type;
+            const std::string name_and_default = parameter;
+            if (mentions(body, name_and_default.substr(0, name_and_default.find(' ')))) text += " " + name_and_default;
+        }
+        return wrapped(fmt::format("    static {} {}({}) {{", result, name, text),
+                       std::string(name.size() + result.size() + 13, ' '));
+    }
+
+    // How a function reaches a value that it does not compute.
+    std::string name_of(Id id) const {
+        const std::string field = field_name(id);
+        if (!field.empty()) return "k." + field;
+        return p_.graph[id].op == Op::input ? p_.graph.input_of(id).code : "";
+    }
+
+    std::string body(const Declaration& declaration) const {
+        const std::string name = declaration.program;
+        if (d_.structure.looped && name != "event") return looped_.body(name);
+        if (name == "remainder" && !takes_remainder(p_, d_.structure)) return "";
+        const auto program =
+            std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
+        if (program == p_.programs.end()) return "";
+        std::vector<Statement> statements;
+        for (const Output& output : program->outputs) statements.push_back({output.target, output.value});
+        const auto names = [this](Id id) { return name_of(id); };
+        const std::string text =
+            FunctionText(p_, statements, names, options_.precision, Stage::step_size, declaration.any_number, false,
+                         takes_angles(declaration) ? angles_ : std::map<Id, int>())
+                .lines();
+        return name == "correction" ? with_solves(text) : text;
+    }
+
+    std::string function(const Declaration& declaration) const {
+        const std::string text = body(declaration);
+        if (text.empty()) return "";
+        const bool any = declaration.any_number;
+        const auto type = [any](const std::string& of) {
+            return any && of.find("real") != std::string::npos
+                       ? of.substr(0, of.find("real")) + "number" + of.substr(of.find("real") + 4)
+                       : of;
+        };
+        std::vector<std::pair<std::string, const char*>> parameters{
+            {any ? "const CoefficientsOf<given>&" : "const Coefficients&", "k"}};
+        if (declaration.takes_time && !d_.system.autonomous) parameters.emplace_back(type("real"), "time");
+        if (takes_how(declaration)) {
+            parameters.emplace_back("const Position", "q");
+            parameters.emplace_back("const Slope", "W");
+        } else {
+            for (const auto& [of, parameter] : declaration.parameters) parameters.emplace_back(type(of), parameter);
+        }
+        if (takes_angles(declaration)) parameters.emplace_back("Angles", "angle = {}");
+        return "\n" + wrapped(std::string("    // ") + declaration.comment, "    //     ") +
+               (takes_how(declaration)
+                    ? "    template <class how = lobatto::OneByOne, class given, class Position, "
+                      "class Slope,\n              class number = lobatto::element_of<Position>>\n    LOBATTO_INLINE\n"
+                : takes_angles(declaration)
+                    ? "    template <class given, class number, class Angles = lobatto::AnglesAnew>\n"
+                : any ? "    template <class given, class number>\n"
+                      : "") +
+               (is_put_in_place(declaration) ? "    LOBATTO_INLINE\n" : "") +
+               signature(type(declaration.result), declaration.program, parameters, text) + text + "    }\n";
+    }
+
+    std::string row_function(const RowFunction& row) const {
+        std::vector<std::pair<std::string, const char*>> parameters{{"const CoefficientsOf<given>&", "k"}};
+        if (!d_.system.autonomous) parameters.emplace_back("clock", "time");
+        parameters.emplace_back(fmt::format("lobatto::Rows<number, {}, in_lanes>&", row.variables), "rows");
+        return fmt::format(
+                   "\n    // What {} gives for a row, or for rows side by side.\n"
+                   "    template <class given, {}class number, bool in_lanes>\n",
+                   row.name, d_.system.autonomous ? "" : "class clock, ") +
+               "    LOBATTO_INLINE\n" + signature("void", row.name, parameters, row.body) + row.body + "    }\n";
+    }
+
+    // The eliminations that the closed forms leave, after the statements that fill them.
+    std::string with_solves(const std::string& statements) const {
+        std::string before, after;
+        for (const Solve& solve : p_.solves) {
+            const std::size_t N = solve.unknowns.size();
+            before += fmt::format("        real J{}[{}];\n", solve.mark, N * N);
+            if (solve.mark.empty())
+                return before + statements + fmt::format("        return lobatto::solve<{}, 1>(J, delta);\n", N);
+            before += fmt::format("        real delta{}[{}];\n", solve.mark, N);
+            after += fmt::format("        if (!lobatto::solve<{0}, 1>(J{1}, delta{1})) return false;\n", N, solve.mark);
+            for (std::size_t i = 0; i < N; ++i)
+                after += fmt::format("        delta[{}] = delta{}[{}];\n", solve.unknowns[i], solve.mark, i);
+        }
+        const std::size_t last = statements.rfind("        return ");
+        if (last == std::string::npos) return before + statements + after + "        return true;\n";
+        return before + statements.substr(0, last) + after + statements.substr(last);
+    }
+    bool takes_how(const Declaration& declaration) const {
+        return d_.structure.neighbours && has_lanes(options_.precision) &&
+               std::string(declaration.program) == "acceleration";
+    }
+    bool forced() const {
+        return std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
+                           [](const GiNaC::ex& force) { return !force.is_zero(); });
+    }
+    bool is_map() const { return d_.structure.form == Form::linear_map; }
+
+    const Derivation& d_;
+    const Programs& p_;
+    const EmitOptions& options_;
+    Hoisted hoisted_;
+    LoopedText looped_;
+    int n_;
+    std::map<Id, int> angles_;  // of the function that sweeps evaluate, where they may be near others
+};
+
+// Where the Stepper of a kernel is; as stepping_of in runtime/kernel/base/contract.hpp.
+std::string stepper_of(const Structure& structure) {
+    if (structure.form == Form::linear_map) return "steppers/linear.hpp";
+    if (structure.form == Form::general) return "steppers/general.hpp";
+    return structure.clean         ? "steppers/clean.hpp"
+           : structure.is_explicit ? "steppers/splitting.hpp"
+                                   : "steppers/separable.hpp";
+}
+
+}  // namespace
+
+KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options) {
+    KernelSource source;
+    source.form = derivation.structure.form;
+    source.stepper = stepper_of(derivation.structure);
+    source.name =
+        is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
+    if (!takes_remainder(programs, derivation.structure))
+        std::erase_if(programs.programs, [](const Program& program) { return program.name == "remainder"; });
+    source.report = optimise(programs);
+    const Emitter emitter(derivation, programs, options);
+    // The digest of the text with the digest left out, put in its place.
+    source.header = emitter.header(source.name, "", source.report);
+    source.digest = digest_of(source.header);
+    const std::string empty = "digest = \"\"";
+    source.header.replace(source.header.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
+    return source;
+}
+
+}  // namespace lobatto

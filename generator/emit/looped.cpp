@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Kernels with loops over repeated terms: their tables and the bodies of their functions.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/emit/looped.hpp"
+#include "generator/emit/tables.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::string element_name(std::size_t number) {
+    return fmt::format("element_{}", number + 1);
+}
+
+std::string indented(const std::string& lines) {
+    std::string text;
+    std::size_t begin = 0;
+    while (begin < lines.size()) {
+        const std::size_t end = lines.find('\n', begin) + 1;
+        text += "    " + lines.substr(begin, end - begin);
+        begin = end;
+    }
+    return text;
+}
+
+const char* const over_coordinates = "        for (int i = 0; i < coordinates; ++i) ";
+
+}  // namespace
+
+LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, Precision precision, Naming names)
+    : d_(derivation),
+      p_(programs),
+      precision_(precision),
+      names_(std::move(names)),
+      general_(derivation.structure.form == Form::general),
+      neighbours_(derivation.structure.neighbours && has_lanes(precision)) {}
+
+const Program& LoopedText::program(const std::string& name) const {
+    return *std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
+}
+
+std::string LoopedText::tables() const {
+    std::string text;
+    const auto& entries = d_.structure.entries;
+    std::map<std::pair<int, int>, int> place;
+    if (general_) {
+        for (const auto& [entry, value] : d_.structure.routhian.second.entries())
+            place.emplace(entry, static_cast<int>(place.size()));
+    } else {
+        for (const auto& entry : entries) place.emplace(entry, static_cast<int>(place.size()));
+    }
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        const std::string name = element_name(number);
+        std::vector<int> variables, positions;
+        const auto pairs = pairs_of(element);
+        for (const auto& row : element.rows) {
+            variables.insert(variables.end(), row.begin(), row.end());
+            for (const auto& [i, j] : pairs) positions.push_back(place.at({row[i], row[j]}));
+        }
+        text += wrapped(fmt::format("    // {} = {} for {} rows of x (numbers in {}): which ones, and which entries of "
+                                    "the second derivatives they add to.",
+                                    name, canonical_text(element.term), element.rows.size(), general_ ? "z" : "q"),
+                        "    //     ");
+        text += integer_table(name + "_x", variables) + integer_table(name + "_entry", positions);
+        if (neighbours_) {
+            std::vector<int> runs;
+            for (const RowRun& run : runs_of(element)) runs.insert(runs.end(), {run.begin, run.count});
+            text +=
+                "    // Runs of rows, (first, how many), in which each variable is the one of the row before plus "
+                "one.\n" +
+                integer_table(name + "_run", runs);
+        }
+        if (!element.a.empty() && !has_parameters(element)) {
+            std::vector<GiNaC::ex> values;
+            for (std::size_t j = 0; j < element.a.size(); ++j)
+                for (const auto& row : element.coefficients) values.push_back(row[j]);
+            text += number_table(name + "_a", values, precision_);
+        }
+    }
+    if (general_) {
+        std::vector<int> from;
+        for (const auto& [entry, value] : d_.system.momentum_v.entries()) from.push_back(place.at(entry));
+        text += "    // Where in H the entries of M stand.\n" + integer_table("mass_from", from);
+    }
+    return text;
+}
+
+std::string LoopedText::fields() const {
+    std::string text;
+    if (!general_) text += "        number mass[coordinates], inverse_mass[coordinates];\n";
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        if (!element.a.empty() && has_parameters(element))
+            text +=
+                fmt::format("        number {}_a[{}];\n", element_name(number), element.rows.size() * element.a.size());
+    }
+    return text;
+}
+
+std::vector<Statement> LoopedText::prepared() const {
+    std::vector<Statement> result;
+    const auto append = [&](const std::string& name) {
+        const std::vector<Output>& outputs = program(name).outputs;
+        const bool one = outputs.size() == 1 && d_.system.n > 1;
+        for (std::size_t i = 0; i < outputs.size(); ++i)
+            result.push_back({one ? "const real every_" + name : fmt::format("k.{}[{}]", name, i), outputs[i].value});
+    };
+    if (!general_) {
+        append("mass");
+        append("inverse_mass");
+    }
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number)
+        append(element_name(number) + "_a");
+    return result;
+}
+
+std::string LoopedText::after_prepare() const {
+    std::string text;
+    if (general_) return text;
+    for (const char* name : {"mass", "inverse_mass"})
+        if (program(name).outputs.size() == 1 && d_.system.n > 1)
+            text += fmt::format("{}k.{}[i] = every_{};\n", over_coordinates, name, name);
+    return text +
+           "        for (const real& inverse : k.inverse_mass)\n"
+           "            if (!lobatto::is_finite(inverse)) return Status::singular_mass;\n";
+}
+
+std::string LoopedText::statements(const std::string& name, const std::string& indent) const {
+    std::vector<Statement> list;
+    for (const Output& output : program(name).outputs) list.push_back({output.target, output.value});
+    const std::string lines = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+    return indent.empty() ? lines : indented(lines);
+}
+
+// The rows of all elements, for the programs of one part: "node", "slope", "energy".
+std::string LoopedText::loops(const std::string& part, const char* variables) const {
+    std::string text;
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        const std::string name = element_name(number);
+        const bool exists = std::any_of(p_.programs.begin(), p_.programs.end(),
+                                        [&](const Program& p) { return p.name == name + "_" + part; });
+        if (!exists || program(name + "_" + part).outputs.empty()) continue;
+        const std::string inside = statements(name + "_" + part, "    ");
+        std::string begin;
+        for (std::size_t j = 0; j < element.x.size(); ++j) {
+            const std::string index = fmt::format("i{}", j), value = fmt::format("x{}", j);
+            const std::string place = fmt::format("{}_x[r * {} + {}]", name, element.x.size(), j);
+            if (mentions(inside, index)) begin += fmt::format("            const int {} = {};\n", index, place);
+            if (mentions(inside, value))
+                begin += fmt::format("            const auto {} = {}[{}];\n", value, variables,
+                                     mentions(inside, index) ? index : place);
+        }
+        for (std::size_t j = 0; j < element.a.size(); ++j) {
+            const std::string value = fmt::format("a{}", j);
+            if (mentions(inside, value))
+                begin += fmt::format("            const auto {} = {}{}_a[{} + r];\n", value,
+                                     has_parameters(element) ? "k." : "", name, j * element.rows.size());
+        }
+        text += fmt::format("        for (int r = 0; r < {}; ++r) {{  // {}\n{}{}        }}\n", element.rows.size(),
+                            name, begin, inside);
+    }
+    return text;
+}
+
+// Of an element's program the outputs stand in W[i0], W[i1], ...
+static std::size_t variable_of(const Output& output) {
+    return std::stoul(output.target.substr(output.target.find("[i") + 2));
+}
+
+std::vector<RowFunction> LoopedText::row_functions() const {
+    std::vector<RowFunction> result;
+    for (std::size_t number = 0; neighbours_ && number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        if (element.x.empty()) continue;
+        const std::string name = element_name(number);
+        std::vector<Statement> list;
+        std::string takes;
+        for (const Output& output : program(name + "_slope").outputs) {
+            list.push_back({fmt::format("rows.result[{}]", variable_of(output)), output.value});
+            if (output.target.ends_with("-="))
+                takes += fmt::format("        rows.takes[{}] = true;\n", variable_of(output));
+        }
+        const std::string inside =
+            FunctionText(p_, list, names_, precision_, Stage::step_size, true, true).lines() + takes;
+        std::string begin;
+        for (std::size_t j = 0; j < element.x.size(); ++j)
+            if (const std::string value = fmt::format("x{}", j); mentions(inside, value))
+                begin += fmt::format("        const auto {} = rows.x[{}];\n", value, j);
+        for (std::size_t j = 0; j < element.a.size(); ++j)
+            if (const std::string value = fmt::format("a{}", j); mentions(inside, value))
+                begin += fmt::format("        const auto {} = rows.of({}{}_a + {});\n", value,
+                                     has_parameters(element) ? "k." : "", name, j * element.rows.size());
+        result.push_back({name, static_cast<int>(element.x.size()), begin + inside});
+    }
+    return result;
+}
+
+// W = M^-1 grad V along the rows, in the way `how`.
+std::string LoopedText::along_rows() const {
+    const std::string time = d_.system.autonomous ? "" : "time, ";
+    const Walls& walls = d_.structure.walls;
+    std::string text;
+    bool is_first = true;
+    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
+        const Element& element = d_.structure.elements.repeated[number];
+        if (element.x.empty()) continue;  // a constant that repeats: of the energy, not of the forces
+        const std::string name = element_name(number);
+        const bool sets = is_first && covers(element, d_.system.n);
+        std::string hung;
+        if (number == walls.element) {
+            if (walls.before) hung = ", lobatto::wall_before";
+            if (walls.behind) hung += hung.empty() ? ", lobatto::wall_behind" : " | lobatto::wall_behind";
+        }
+        if (is_first && !sets) text += "        how::template clear<coordinates>(W);\n";
+        is_first = false;
+        text += wrapped(fmt::format("        how::template {}<coordinates, {}, {}_x, {}_run{}>(q, W, [&](auto& rows) "
+                                    "LOBATTO_FORMULA {{ {}(k, {}rows); }});",
+                                    sets ? "set_rows" : "add_rows", element.x.size(), name, name, hung, name, time),
+                        "            ");
+    }
+    std::vector<Statement> list;
+    for (const Output& output : program(walls.before || walls.behind ? "inside_slope" : "rest_slope").outputs)
+        list.push_back(
+            {"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W) +=", output.value});
+    text += FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+    return has_unit_masses(d_.system) ? text : text + "        how::template scale<coordinates>(W, k.inverse_mass);\n";
+}
+
+std::string LoopedText::body(const std::string& function) const {
+    const std::string coordinates = over_coordinates;
+    const std::string clear_entries = "        for (int e = 0; e < entries; ++e) ";
+    const std::string time = d_.system.autonomous ? "" : "time, ";
+    if (!general_) {
+        const std::string clear = coordinates + "W[i] = number(0);\n",
+                          scale = coordinates + "W[i] *= k.inverse_mass[i];\n";
+        if (function == "node")
+            return clear + clear_entries + "S[e] = number(0);\n" + loops("node", "q") + statements("rest_node", "") +
+                   scale + clear_entries + "S[e] *= k.inverse_mass[entry_row[e]];\n";
+        if (function == "acceleration" && neighbours_) return along_rows();
+        if (function == "acceleration") return clear + loops("slope", "q") + statements("rest_slope", "") + scale;
+        if (function == "quadratic_part")
+            return !d_.structure.absorbed && !d_.structure.diagonal_part
+                       ? ""
+                       : clear_entries + "S0[e] = real(0);\n" + loops("quadratic", "q") +
+                             statements("rest_quadratic", "") + clear_entries +
+                             "S0[e] *= k.inverse_mass[entry_row[e]];\n";
+        if (function == "energy" && d_.scene.outputs.energy)
+            return "        number sum = number(0);\n" + coordinates +
+                   "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + loops("energy", "q") +
+                   statements("rest_energy", "") + "        return sum;\n";
+        if (function == "momentum") return coordinates + "p[i] = k.mass[i] * velocity[i];\n";
+        if (function == "velocity") return coordinates + "velocity[i] = k.inverse_mass[i] * p[i];\n";
+        return "";
+    }
+    const std::string clear = "        for (int i = 0; i < 2 * coordinates; ++i) g[i] = number(0);\n";
+    const std::string join = "        number z[2 * coordinates];\n" + coordinates + "z[i] = velocity[i];\n" +
+                             coordinates + "z[coordinates + i] = q[i];\n";
+    const std::string slope = join + "        number g[2 * coordinates];\n        slope(k, " + time + "z, g);\n";
+    if (function == "node")
+        return clear + clear_entries + "H[e] = number(0);\n" + loops("node", "z") + statements("rest_node", "");
+    if (function == "slope") return clear + loops("slope", "z") + statements("rest_slope", "");
+    if (function == "slopes")
+        return slope + coordinates + "Lv[i] = g[i];\n" + coordinates + "Lq[i] = g[coordinates + i];\n";
+    if (function == "momentum") return slope + coordinates + "p[i] = g[i];\n";
+    if (function == "legendre")
+        return join + "        number g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
+               coordinates + "p[i] = g[i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
+    if (function == "stage")
+        return join + "        number g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
+               coordinates + "Lv[i] = g[i];\n" + coordinates +
+               "Lq[i] = g[coordinates + i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
+    if (function == "energy" && d_.scene.outputs.energy)
+        return join + "        number sum = number(0);\n" + loops("energy", "z") + statements("rest_energy", "") +
+               "        return sum;\n";
+    return "";
+}
+
+}  // namespace lobatto

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The constants of a kernel: shapes, claims, quadrature tables, and the order in which unknowns are solved.
+#include "generator/emit/tables.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/emit/function_text.hpp"
+#include "generator/mechanics/derivation.hpp"
+
+namespace lobatto {
+
+namespace {
+
+void line(std::string& text, const std::string& declaration, const std::string& comment) {
+    text += fmt::format("    {:<42}  // {}\n", "static constexpr " + declaration + ";", comment);
+}
+
+// Rows and columns of a sparse matrix.
+std::string places(const std::string& of, const std::vector<std::pair<int, int>>& entries) {
+    std::vector<int> rows, columns;
+    for (const auto& [row, column] : entries) {
+        rows.push_back(row);
+        columns.push_back(column);
+    }
+    return integer_table(of + "_row", rows) + integer_table(of + "_column", columns);
+}
+
+std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
+    std::vector<std::pair<int, int>> result;
+    for (const auto& [place, value] : matrix.entries()) result.push_back(place);
+    return result;
+}
+
+std::string separable_shapes(const Structure& structure, const System& system, int nodes, Precision precision) {
+    std::string text;
+    line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
+    line(text, fmt::format("bool is_explicit = {}", structure.is_explicit),
+         structure.is_explicit ? "kicks and drifts in turn" : "the inner nodes are solved for");
+    if (structure.form == Form::separable) {
+        line(text, fmt::format("bool unrolled = {}", structure.unrolled),
+             structure.unrolled ? "every node and coordinate is written out" : "loops over nodes and coordinates");
+        line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part),
+             structure.diagonal_part ? "taken into the stage map: the constant part of M^-1 V''"
+                                     : "nothing is taken into the stage map");
+        line(text, fmt::format("bool neighbours = {}", structure.neighbours && has_lanes(precision)),
+             structure.neighbours ? "formulas go along neighbouring coordinates, which lie in lanes"
+                                  : "coordinates are taken one by one");
+        if (structure.neighbours && has_lanes(precision)) {
+            line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
+                 "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
+            const bool in_passing = is_one_pass(structure.elements, structure.walls, system.q);
+            const bool unit_masses = has_unit_masses(system);
+            line(text, fmt::format("bool unit_masses = {}", unit_masses),
+                 unit_masses ? "forces are accelerations" : "forces are divided by them");
+            line(text, fmt::format("bool in_passing = {}", in_passing),
+                 in_passing ? "coordinates may move one after another, each as soon as its force is known"
+                            : "coordinates move when all forces are known");
+        }
+        line(text, fmt::format("bool clean = {}", structure.clean),
+             structure.clean ? "round-off-clean steps" : "steps as fast as can be");
+        line(text, fmt::format("bool absorbed = {}", structure.absorbed),
+             structure.absorbed ? "Newton's iteration has the Jacobian of V's quadratic part"
+                                : "Newton's iteration has its own Jacobians");
+    }
+    line(text, fmt::format("int entries = {}", structure.entries.size()), "of M^-1 V'' that are not identically zero");
+    return text + places("entry", structure.entries);
+}
+
+std::string general_shapes(const Derivation& d) {
+    const Routhian& routhian = d.structure.routhian;
+    const auto entries = places_of(routhian.second), mass = places_of(d.system.momentum_v);
+    std::string text;
+    line(text, fmt::format("int nodes = {}", d.quadrature.nodes.size()), "of the quadrature");
+    line(text, fmt::format("int controls = {}", d.quadrature.control.size()), "control points, both ends included");
+    line(text, fmt::format("int active = {}", routhian.active.size()), "coordinates that are solved for");
+    text += integer_table("active_index", routhian.active);
+    line(text, fmt::format("int cyclic = {}", routhian.cyclic.size()), "coordinates whose momenta are constant");
+    text += integer_table("cyclic_index", routhian.cyclic);
+    line(text, fmt::format("int entries = {}", entries.size()), "of H = d2R/dzdz that are not identically zero");
+    text += places("entry", entries);
+    line(text, fmt::format("int mass_entries = {}", mass.size()), "of M = d2L/dvdv that are not identically zero");
+    return text + places("mass", mass);
+}
+
+// Where the unknowns of each coordinate stand, and the groups that are solved by themselves.
+std::string order_of_unknowns(const Structure& structure) {
+    std::vector<int> position, first{0}, bandwidth;
+    for (const Group& group : structure.groups) {
+        for (std::size_t i = 0; i < group.coordinates.size(); ++i) {
+            const auto place = static_cast<std::size_t>(group.coordinates[i]);
+            if (position.size() <= place) position.resize(place + 1);
+            position[place] = first.back() + static_cast<int>(i);
+        }
+        first.push_back(first.back() + static_cast<int>(group.coordinates.size()));
+        bandwidth.push_back(group.bandwidth);
+    }
+    std::string text = "    // Unknowns of coordinate a stand at position[a]; groups are solved by themselves.\n";
+    text += integer_table("position", position);
+    line(text, fmt::format("int group_count = {}", structure.groups.size()), "groups of coupled coordinates");
+    return text + integer_table("group_first", first) + integer_table("group_bandwidth", bandwidth);
+}
+
+std::string vector_text(const std::string& name, const std::vector<GiNaC::ex>& values, Precision precision,
+                        std::string& exact) {
+    Graph graph;
+    std::string numbers;
+    for (const GiNaC::ex& value : values) {
+        const Id id = graph.from(value, {});
+        const cln::cl_R number = graph.evaluate({}, {id})[static_cast<std::size_t>(id)];
+        numbers += (numbers.empty() ? "" : ", ") + formula(graph, graph.constant(number), Notation::cpp, {}, precision);
+        exact += (exact.empty() ? "" : "; ") + formula(graph, id, Notation::text);
+    }
+    return wrapped(fmt::format("    static constexpr real {}[{}] = {{{}}};", name,
+                               std::max<std::size_t>(values.size(), 1), numbers),
+                   "        ");
+}
+
+class Tables {
+public:
+    Tables(Precision precision, bool shows_exact) : precision_(precision), shows_exact_(shows_exact) {}
+
+    std::string vector(const char* name, const std::vector<GiNaC::ex>& values, const std::string& comment) const {
+        std::string exact;
+        const std::string text = vector_text(name, values, precision_, exact);
+        return wrapped(
+                   "    // " + comment + (shows_exact_ && exact.size() < 1000 && !exact.empty() ? ": " + exact : ""),
+                   "    //     ") +
+               text;
+    }
+    std::string matrix(const char* name, const GiNaC::matrix& values, const std::string& comment) const {
+        std::vector<GiNaC::ex> flat;
+        for (unsigned i = 0; i < values.rows(); ++i)
+            for (unsigned j = 0; j < values.cols(); ++j) flat.push_back(values(i, j));
+        return vector(name, flat, comment + ", row-major");
+    }
+
+private:
+    Precision precision_;
+    bool shows_exact_;
+};
+
+}  // namespace
+
+std::string integer_table(const std::string& name, const std::vector<int>& values) {
+    std::string numbers;
+    for (const int value : values) numbers += (numbers.empty() ? "" : ", ") + std::to_string(value);
+    return wrapped(fmt::format("    static constexpr int {}[{}] = {{{}}};", name,
+                               std::max<std::size_t>(values.size(), 1), numbers),
+                   "        ");
+}
+
+std::string number_table(const std::string& name, const std::vector<GiNaC::ex>& values, Precision precision) {
+    std::string exact;
+    return vector_text(name, values, precision, exact);
+}
+
+const char* type_name(Precision precision) {
+    switch (precision) {
+        case Precision::single:
+            return "float";
+        case Precision::double_:
+            return "double";
+        case Precision::extended:
+            return "long double";
+        default:
+            return "__float128";
+    }
+}
+
+std::string shapes(const Derivation& d, Precision precision, const std::string& name, const std::string& digest) {
+    const Structure& structure = d.structure;
+    const Outputs& outputs = d.scene.outputs;
+    static constexpr const char* forms[] = {"linear_map", "separable", "general"};
+    const int controls = static_cast<int>(d.quadrature.control.size());
+    const bool multiplier = d.scene.method.family == Family::lobatto;
+    const int unknowns = structure.form == Form::linear_map || structure.is_explicit ? 0
+                         : structure.form == Form::separable
+                             ? d.system.n * (d.quadrature.points - 2)
+                             : static_cast<int>(structure.routhian.active.size()) * (controls - 1) +
+                                   (multiplier ? static_cast<int>(structure.routhian.cyclic.size()) : 0);
+    std::string text = fmt::format("    using real = {};\n\n", type_name(precision));
+    text += fmt::format(
+        "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n"
+        "    static constexpr const char* method = \"{}\";\n",
+        name, digest, d.quadrature.method.name());
+    line(text, fmt::format("lobatto::Form form = lobatto::Form::{}", forms[static_cast<int>(structure.form)]),
+         "how a step is taken");
+    line(text, fmt::format("int coordinates = {}", d.system.n), "n");
+    line(text, fmt::format("int order = {}", d.quadrature.order()), "of accuracy in h");
+    line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
+    line(text, fmt::format("bool any_number = {}", !structure.general),
+         structure.general ? "Newton's iteration alone"
+                           : "formulas of a state are templates on the type of its numbers: sweeps first");
+    line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
+    line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
+    line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");
+    line(text, fmt::format("bool has_tangent = {}", has_tangent(d)), "the derivative of a step");
+    line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size()), "in the order of the scene");
+    line(text, fmt::format("int events = {}", outputs.events.size()), "that are watched for");
+    std::vector<int> directions;
+    for (const Event& event : outputs.events) directions.push_back(event.direction);
+    text += integer_table("event_direction", directions);
+    if (structure.form == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
+    text += separable_shapes(structure, d.system, d.quadrature.points, precision);
+    const bool solves = structure.form == Form::separable && !structure.unrolled && !structure.is_explicit;
+    return solves ? text + order_of_unknowns(structure) : text;
+}
+
+bool has_unit_masses(const System& system) {
+    for (int i = 0; i < system.n; ++i)
+        if (!(system.mass(i, i) - 1).is_zero()) return false;
+    return true;
+}
+
+bool has_lanes(Precision precision) {
+    return precision == Precision::single || precision == Precision::double_;
+}
+
+bool has_tangent(const Derivation& d) {
+    return d.scene.outputs.tangent && d.system.n <= tangent_limit;
+}
+
+std::string tables(const Derivation& d, Precision precision) {
+    const Quadrature& rule = d.quadrature;
+    const Tables table(precision, !rule.is_explicit());  // of published decimals: their fractions tell nothing
+    if (rule.is_explicit()) {
+        std::vector<GiNaC::ex> drifts;
+        for (std::size_t i = 0; i + 1 < rule.c.size(); ++i) drifts.push_back(rule.c[i + 1] - rule.c[i]);
+        return "\n" + table.vector("c", rule.c, "nodes, in units of the step") +
+               table.vector("b", rule.b, "kicks at the nodes") +
+               table.vector("drift_length", drifts, "between neighbouring nodes");
+    }
+    if (d.structure.form != Form::general) {
+        std::string text = "\n" + table.vector("c", rule.c, "nodes on [0, 1]") +
+                           table.vector("b", rule.b, "their weights") +
+                           table.matrix("A", rule.A, "stage map A_ij over the interior nodes");
+        if (d.structure.form == Form::separable)
+            text +=
+                table.matrix("E", rule.E, "extrapolation from the nodes of one step to the interior nodes of the next");
+        return text;
+    }
+    return "\n" + table.vector("c", rule.nodes, "quadrature nodes on [0, 1]") +
+           table.vector("b", rule.weights, "their weights") + table.vector("control", rule.control, "control points") +
+           table.matrix("B", rule.B, "basis polynomials at the nodes, nodes x controls") +
+           table.matrix("D", rule.D, "their slopes, nodes x controls") +
+           table.matrix("extrapolation", rule.extrapolation, "basis polynomials at 1 + control points") +
+           table.vector("legendre_polynomial", rule.legendre, "the Legendre polynomial orthogonal to all slopes") +
+           table.matrix("integration", rule.integration, "from 0 to the nodes, over the polynomials on the nodes") +
+           table.matrix("reach", rule.reach, "the same to the control points after the first") +
+           table.matrix("ahead", rule.ahead, "the polynomials on the nodes at 1 + nodes");
+}
+
+}  // namespace lobatto

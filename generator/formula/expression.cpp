@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Walks the tree of a formula, with a value for each index; what cannot be computed is refused where it stands.
+#include "generator/formula/expression.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+namespace lobatto {
+namespace {
+
+using GiNaC::ex;
+using GiNaC::ex_to;
+using GiNaC::is_a;
+using GiNaC::numeric;
+using Kind = Syntax::Kind;
+
+class Evaluator {
+public:
+    Evaluator(const Source& source, Work& work, Names* names, bool motion_allowed)
+        : source_(source), work_(work), names_(names), motion_allowed_(motion_allowed) {}
+
+    // The indices a formula has, by name and value; and how to speak of it.
+    struct Frame {
+        const std::string& formula;
+        std::vector<std::pair<std::string, long>> indices;
+    };
+
+    Operand evaluate(const Syntax& formula, Frame& frame) {
+        const Arithmetic arithmetic(frame.formula, work_);
+        spend(formula.at, frame, 1);
+        if (++depth_ > deepest) fail_depth(formula.at, frame);
+        Operand result = value_of(formula, frame, arithmetic);
+        --depth_;
+        return result;
+    }
+
+    void spend(const Token& at, const Frame& frame, double operations) const {
+        try {
+            work_.spend(operations);
+        } catch (const Refusal& refusal) {
+            fail(at, frame, refusal.what());
+        }
+    }
+
+    // A value that is needed as a whole number: a subscript, a bound.
+    long whole(const Syntax& formula, Frame& frame, const std::string& what) {
+        const ex value = evaluate(formula, frame).expression;
+        if (!is_a<numeric>(value))
+            fail(formula.at, frame,
+                 fmt::format("{} must be known when the kernel is written: numbers, indices and parameters declared "
+                             "constant",
+                             what));
+        const numeric number = ex_to<numeric>(value);
+        if (!number.is_integer())
+            fail(formula.at, frame, fmt::format("{} must be a whole number, not {:.6g}", what, number.to_double()));
+        if (abs(number) > largest) fail(formula.at, frame, fmt::format("{} is beyond {}", what, largest));
+        return number.to_long();
+    }
+
+private:
+    static constexpr int deepest = 1000;            // nodes in nodes, those of definitions too
+    static constexpr long largest = 1'000'000'000;  // subscript or bound
+
+    [[noreturn]] void fail(const Token& at, const Frame& frame, std::string message) const {
+        std::string indices;
+        for (const auto& [name, value] : frame.indices)
+            indices += fmt::format("{}{} = {}", indices.empty() ? "" : ", ", name, value);
+        if (!indices.empty()) message += fmt::format(" ({})", indices);
+        source_.fail(at.at, message);
+    }
+
+    [[noreturn]] void fail_depth(const Token& at, const Frame& frame) const {
+        fail(at, frame,
+             definitions_ > 0
+                 ? fmt::format("definitions need one another without end here, or more than {} deep", deepest)
+                 : fmt::format("{} is nested more than {} deep", frame.formula, deepest));
+    }
+
+    template <typename Compute>
+    Operand computed(const Token& at, const Frame& frame, const Compute& compute) const {
+        try {
+            return compute();
+        } catch (const Refusal& refusal) {
+            fail(at, frame, refusal.what());
+        }
+    }
+
+    // Adds or multiplies neighbours in pairs of like length, so that long sums cost n log n and no intermediate number
+    // can grow unseen.
+    class Fold {
+    public:
+        using Combine = Operand (Arithmetic::*)(const Operand&, const Operand&) const;
+        Fold(const Evaluator& evaluator, const Frame& frame, const Arithmetic& arithmetic, Combine combine)
+            : evaluator_(evaluator), frame_(frame), arithmetic_(arithmetic), combine_(combine) {}
+
+        void push(Operand operand, const Token& at) {
+            parts_.push_back({std::move(operand), at, 0});
+            while (parts_.size() > 1 && parts_[parts_.size() - 2].pairs == parts_.back().pairs) join();
+        }
+        Operand result() {
+            while (parts_.size() > 1) join();
+            return std::move(parts_.front().operand);
+        }
+
+    private:
+        struct Part {
+            Operand operand;
+            Token at;  // the operator before it
+            int pairs;
+        };
+        void join() {
+            const Part right = std::move(parts_.back());
+            parts_.pop_back();
+            Part& left = parts_.back();
+            left.operand = evaluator_.computed(right.at, frame_,
+                                               [&] { return (arithmetic_.*combine_)(left.operand, right.operand); });
+            ++left.pairs;
+        }
+
+        const Evaluator& evaluator_;
+        const Frame& frame_;
+        const Arithmetic& arithmetic_;
+        const Combine combine_;
+        std::vector<Part> parts_;
+    };
+
+    Operand value_of(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        const auto operand = [&](std::size_t k) { return evaluate(formula.operands[k], frame); };
+        const auto compute = [&](const auto& operation) { return computed(formula.at, frame, operation); };
+        switch (formula.kind) {
+            case Kind::number:
+                return compute([&] { return arithmetic.number(std::string(formula.at.text)); });
+            case Kind::pi: {
+                static const Operand pi = operand_of(GiNaC::Pi);
+                return pi;
+            }
+            case Kind::index:
+                return operand_of(frame.indices[formula.index].second);
+            case Kind::name:
+                return formula.name->definition ? defined(formula, frame) : declared(formula, frame);
+            case Kind::sum:
+                return folded(formula, frame, arithmetic, &Arithmetic::add);
+            case Kind::product:
+                return folded(formula, frame, arithmetic, &Arithmetic::multiply);
+            case Kind::negation: {
+                const Operand a = operand(0);
+                return compute([&] { return arithmetic.negate(a); });
+            }
+            case Kind::inverse: {
+                const Operand a = operand(0);
+                return compute([&] { return arithmetic.invert(a); });
+            }
+            case Kind::power: {
+                const Operand base = operand(0), exponent = operand(1);
+                return compute([&] { return arithmetic.raise(base, exponent); });
+            }
+            case Kind::call: {
+                const Operand argument = operand(0);
+                return compute([&] { return arithmetic.call(*formula.function, argument); });
+            }
+            case Kind::series:
+                return series(formula, frame, arithmetic);
+            case Kind::remainder:
+                break;
+        }
+        const long a = whole(formula.operands[0], frame, "what mod divides"),
+                   b = whole(formula.operands[1], frame, "what mod divides by");
+        if (b <= 0) fail(formula.operands[1].at, frame, fmt::format("mod divides by {}; it must be positive", b));
+        return operand_of((a % b + b) % b);
+    }
+
+    Operand folded(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic, Fold::Combine combine) {
+        Fold fold(*this, frame, arithmetic, combine);
+        for (std::size_t k = 0; k < formula.operands.size(); ++k)
+            fold.push(evaluate(formula.operands[k], frame), formula.signs[k]);
+        return fold.result();
+    }
+
+    Operand series(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        const long first = whole(formula.operands[0], frame, "the first index of a sum"),
+                   last = whole(formula.operands[1], frame, "the last index of a sum");
+        if (first > last) return operand_of(0);
+        Fold fold(*this, frame, arithmetic, &Arithmetic::add);
+        frame.indices.emplace_back(formula.index_name, first);
+        for (long i = first; i <= last; ++i) {
+            frame.indices.back().second = i;
+            fold.push(evaluate(formula.operands[2], frame), formula.at);
+        }
+        frame.indices.pop_back();
+        return fold.result();
+    }
+
+    // A coordinate, a parameter, the time.
+    Operand declared(const Syntax& formula, Frame& frame) {
+        const Name& name = *formula.name;
+        const std::vector<Operand>& elements = formula.primed ? name.velocities : name.values;
+        if (!name.array) return elements.front();
+        const long k = whole(formula.operands[0], frame, fmt::format("the index of {}", formula.at.text));
+        if (k < 1 || k > static_cast<long>(elements.size()))
+            fail(formula.at, frame,
+                 fmt::format("there is no {0}[{1}]: the array has the elements {0}[1] to {0}[{2}]", formula.at.text, k,
+                             elements.size()));
+        return elements[static_cast<std::size_t>(k - 1)];
+    }
+
+    Operand defined(const Syntax& formula, Frame& frame) {
+        Definition& definition = *formula.name->definition;
+        std::vector<long> indices;
+        for (const Syntax& subscript : formula.operands)
+            indices.push_back(whole(subscript, frame, fmt::format("an index of {}", formula.at.name())));
+        Definition::Value& entry = definition.values[indices];
+        if (!entry.complete) {
+            if (entry.needed)
+                fail(formula.at, frame,
+                     fmt::format("{} needs its own value: definitions must not refer to one another in a circle",
+                                 definition.label));
+            entry.needed = true;
+            Frame own{definition.label, {}};
+            for (std::size_t k = 0; k < indices.size(); ++k)
+                own.indices.emplace_back(definition.indices[k], indices[k]);
+            ++definitions_;
+            entry.value = evaluate(definition.formula, own);
+            --definitions_;
+            entry.complete = true;
+        }
+        if (!motion_allowed_ && (entry.value.moves || entry.value.velocities))
+            fail(formula.at, frame,
+                 fmt::format("{} holds coordinates or the time, which cannot occur in {}: write it with numbers and "
+                             "parameters",
+                             definition.label, frame.formula));
+        if (!formula.primed) return entry.value;
+        if (entry.value.velocities)
+            fail(formula.at, frame,
+                 fmt::format("{} holds a velocity, so its time derivative would hold an acceleration",
+                             definition.label));
+        if (!entry.rate)
+            entry.rate = computed(formula.at, frame, [&] {
+                return Arithmetic(definition.label, work_).derivative(entry.value, names_->flow);
+            });
+        return *entry.rate;
+    }
+
+    const Source& source_;
+    Work& work_;
+    Names* names_;
+    const bool motion_allowed_;
+    int depth_ = 0;
+    int definitions_ = 0;
+};
+
+Evaluator::Frame frame_of(const Scope& scope, const std::vector<long>& indices) {
+    Evaluator::Frame frame{scope.formula, {}};
+    for (std::size_t k = 0; k < indices.size(); ++k) frame.indices.emplace_back(scope.indices[k], indices[k]);
+    return frame;
+}
+
+}  // namespace
+
+Operand evaluate(const Source& source, const Syntax& formula, const Scope& scope, const std::vector<long>& indices) {
+    Work own;
+    Evaluator::Frame frame = frame_of(scope, indices);
+    Work& work = scope.names != nullptr ? scope.names->work : own;
+    Evaluator evaluator(source, work, scope.names, scope.motion_allowed);
+    Operand result = evaluator.evaluate(formula, frame);
+    // Its value will be needed, with 60 digits.
+    if (!scope.motion_allowed) evaluator.spend(formula.at, frame, 4 * result.extent.size);
+    return result;
+}
+
+long evaluate_whole(const Source& source, const Syntax& formula, const Scope& scope) {
+    Work own;
+    Evaluator::Frame frame = frame_of(scope, {});
+    Work& work = scope.names != nullptr ? scope.names->work : own;
+    return Evaluator(source, work, scope.names, scope.motion_allowed).whole(formula, frame, scope.formula);
+}
+
+ex parse_expression(const Source& source, const Text& text, const Scope& scope) {
+    return evaluate(source, parse_formula(source, text, scope), scope).expression;
+}
+
+GiNaC::numeric value_in_range(const Source& source, Position at, const ex& expression, const std::string& formula,
+                              const GiNaC::exmap& symbols) {
+    try {
+        const numeric value = real_value(expression, symbols);
+        const double size = std::fabs(value.to_double());  // 1e-300 itself is in range, though its double is below it
+        if (!value.is_zero() && !(size >= 1e-300 && size <= 1e300))
+            source.fail(at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", formula));
+        return value;
+    } catch (const NoValue& error) {
+        source.fail(at, fmt::format("{} has no finite real value: {}", formula, error.what()));
+    }
+}
+
+}  // namespace lobatto

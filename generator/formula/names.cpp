@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// How names get their meaning, and how they are written.
+#include "generator/formula/names.hpp"
+
+#include <fmt/format.h>
+
+namespace lobatto {
+
+Name& Names::add_parameter(const std::string& name, const std::vector<GiNaC::ex>& values, bool array) {
+    Name& added = all[name];
+    added.array = array;
+    for (const GiNaC::ex& value : values) added.values.push_back(operand_of(value));
+    return added;
+}
+
+Name& Names::add_coordinate(const std::string& name, const std::vector<GiNaC::symbol>& positions,
+                            const std::vector<GiNaC::symbol>& velocities, bool array) {
+    Name& added = all[name];
+    added.role = Name::Role::coordinate;
+    added.array = array;
+    for (std::size_t k = 0; k < positions.size(); ++k) {
+        added.values.push_back(operand_of(positions[k]));
+        added.values.back().moves = true;
+        added.velocities.push_back(operand_of(velocities[k]));
+        added.velocities.back().velocities = true;
+        flow.next[positions[k]] = positions[k] + flow.dt * velocities[k];
+    }
+    return added;
+}
+
+Name& Names::add_time(const std::string& name, const GiNaC::symbol& time) {
+    Name& added = all[name];
+    added.role = Name::Role::time;
+    added.values.push_back(operand_of(time));
+    added.values.back().moves = true;
+    flow.next[time] = time + flow.dt;
+    return added;
+}
+
+std::vector<Spelling> Names::spellings(bool motion_allowed) const {
+    std::vector<Spelling> result;
+    for (const auto& [name, meaning] : all) {
+        const bool coordinate = meaning.role == Name::Role::coordinate;
+        if (!motion_allowed && (coordinate || meaning.role == Name::Role::time)) continue;
+        std::string written = name;
+        if (meaning.array) written += "[i]";
+        if (meaning.definition && !meaning.definition->indices.empty())
+            written += fmt::format("[{}]", fmt::join(meaning.definition->indices, ","));
+        result.push_back({written, name});
+        if (coordinate) result.push_back({written + "'", name + "'"});
+    }
+    return result;
+}
+
+}  // namespace lobatto

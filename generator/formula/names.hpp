@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What the names of a scene mean in its formulas.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "generator/formula/formula.hpp"
+#include "generator/formula/operand.hpp"
+
+namespace lobatto {
+
+// An abbreviation r, or r[i,j] with indices; its values are computed when they are needed, once for each subscript.
+struct Definition {
+    std::string label;  // "the definition r"
+    std::vector<std::string> indices;
+    Syntax formula;
+    struct Value {
+        bool needed = false, complete = false;  // needed and not complete: being computed
+        Operand value;
+        std::optional<Operand> rate;  // its time derivative
+    };
+    std::map<std::vector<long>, Value> values;
+};
+
+struct Name {
+    enum class Role { coordinate, parameter, time, definition };
+    Role role = Role::parameter;
+    bool array = false;                      // of coordinates or parameters, written x[1] ... x[n]
+    std::vector<Operand> values;             // one, or one an element; a constant parameter's is its exact value
+    std::vector<Operand> velocities;         // coordinates only
+    std::shared_ptr<Definition> definition;  // definitions only
+    bool used = false;
+};
+
+// A name as formulas write it, x[i]', and without its brackets, as people misspell it.
+struct Spelling {
+    std::string written, plain;
+};
+
+struct Names {
+    std::map<std::string, Name, std::less<>> all;
+    Flow flow;
+    Work work;
+
+    Name& add_parameter(const std::string& name, const std::vector<GiNaC::ex>& values, bool array = false);
+    Name& add_coordinate(const std::string& name, const std::vector<GiNaC::symbol>& positions,
+                         const std::vector<GiNaC::symbol>& velocities, bool array = false);
+    Name& add_time(const std::string& name, const GiNaC::symbol& time);
+
+    // For suggestions; without those that move unless they are allowed.
+    std::vector<Spelling> spellings(bool motion_allowed) const;
+};
+
+}  // namespace lobatto

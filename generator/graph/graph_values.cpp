@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The graph's two bridges: from GiNaC expressions, and to numbers of 60 digits (CLN).
+#include <cln/cln.h>
+
+#include <algorithm>
+
+#include <optional>
+
+#include "generator/graph/graph.hpp"
+
+namespace lobatto {
+
+namespace {
+
+const cln::float_format_t format = cln::float_format(number_digits);
+
+cln::cl_F real(const cln::cl_R& x) {
+    return cln::cl_float(x, format);
+}
+
+cln::cl_R real_part_of(const cln::cl_N& z, const char* what) {
+    if (!cln::zerop(cln::imagpart(z))) throw DomainError(std::string(what) + " of a value outside its domain");
+    return cln::realpart(z);
+}
+
+std::optional<Op> function_op(const std::string& name) {
+    static const std::map<std::string, Op> ops = {{"sin", Op::sin},   {"cos", Op::cos},   {"tan", Op::tan},
+                                                  {"exp", Op::exp},   {"log", Op::log},   {"sinh", Op::sinh},
+                                                  {"cosh", Op::cosh}, {"tanh", Op::tanh}, {"asin", Op::asin},
+                                                  {"acos", Op::acos}, {"atan", Op::atan}};
+    const auto found = ops.find(name);
+    return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
+}
+
+const cln::cl_F largest = cln::cl_float(cln::expt_pos(cln::cl_I(10), 5000), format);  // __float128 ends at 1e4932
+
+// Powers of exact numbers stay exact up to this size.
+constexpr double most_bits = 100000;
+
+double bits_of(const cln::cl_RA& x) {
+    return static_cast<double>(
+        std::max(cln::integer_length(cln::numerator(x)), cln::integer_length(cln::denominator(x))));
+}
+
+cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
+    // Far out CLN throws, or even answers tanh(1e161) = 0; there these functions are 0, 1, -1 or too large.
+    const bool exponential = op == Op::exp || op == Op::sinh || op == Op::cosh || op == Op::tanh;
+    if (exponential && cln::abs(x[0]) > 1000000) {
+        if (op == Op::tanh) return cln::signum(x[0]);
+        if (op == Op::exp && cln::minusp(x[0])) return 0;
+        throw DomainError("a value beyond all numbers of the kernel");
+    }
+    const bool angle = op == Op::sin || op == Op::pair_sine || op == Op::cos || op == Op::pair_cosine || op == Op::tan;
+    if (angle && cln::abs(real(x[0])) > largest) throw DomainError("a value beyond all numbers of the kernel");
+    switch (op) {
+        case Op::add: {
+            cln::cl_R sum = 0;
+            for (const auto& term : x) sum = sum + term;
+            return sum;
+        }
+        case Op::multiply: {
+            cln::cl_R product = 1;
+            for (const auto& factor : x) product = product * factor;
+            return product;
+        }
+        case Op::power:
+            if (exponent < 0 && cln::zerop(x[0])) throw DomainError("division by zero");
+            if (is_rational(x[0]) && bits_of(cln::the<cln::cl_RA>(x[0])) * std::abs(exponent) > most_bits)
+                return cln::the<cln::cl_R>(cln::expt(real(x[0]), exponent));
+            return cln::the<cln::cl_R>(cln::expt(x[0], exponent));
+        case Op::sqrt: {
+            if (cln::minusp(x[0])) throw DomainError("square root of a negative number");
+            cln::cl_RA root;
+            if (is_rational(x[0]) && cln::sqrtp(cln::the<cln::cl_RA>(x[0]), &root)) return root;
+            return cln::sqrt(real(x[0]));
+        }
+        case Op::sin:
+        case Op::pair_sine:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sin(real(x[0])));
+        case Op::cos:
+        case Op::pair_cosine:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cos(real(x[0])));
+        case Op::sincos_pair:
+            return x[0];  // carries its argument; the halves above evaluate it
+        case Op::tan:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tan(real(x[0])));
+        case Op::exp:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::exp(real(x[0])));
+        case Op::log:
+            if (!cln::plusp(x[0])) throw DomainError("logarithm of a number that is not positive");
+            return x[0] == 1 ? cln::cl_R(0) : cln::cl_R(cln::ln(real(x[0])));
+        case Op::sinh:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::sinh(real(x[0])));
+        case Op::cosh:
+            return cln::zerop(x[0]) ? cln::cl_R(1) : cln::cl_R(cln::cosh(real(x[0])));
+        case Op::tanh:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::tanh(real(x[0])));
+        case Op::asin:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : real_part_of(cln::asin(real(x[0])), "asin");
+        case Op::acos:
+            return real_part_of(cln::acos(real(x[0])), "acos");
+        case Op::atan:
+            return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
+        case Op::raise:
+            if (cln::abs(x[1]) <= 4096 && cln::round1(x[1]) == x[1])
+                return apply(Op::power, cln::cl_I_to_int(cln::round1(x[1])), {x[0]});  // real for a negative base too
+            if (!cln::plusp(x[0])) throw DomainError("real power of a number that is not positive");
+            return apply(Op::exp, 0, {real(x[1]) * cln::ln(real(x[0]))});  // far out it is 0 or too large, too
+        case Op::constant:
+        case Op::input:
+            break;
+    }
+    throw std::logic_error("apply: not an operation");
+}
+
+}  // namespace
+
+cln::cl_R apply(Op op, int exponent, const std::vector<cln::cl_R>& operands) {
+    try {
+        return value_of(op, exponent, operands);
+    } catch (const cln::floating_point_overflow_exception&) {
+        throw DomainError("a value beyond all numbers of the kernel");
+    } catch (const cln::floating_point_underflow_exception&) {
+        return 0;
+    }
+}
+
+std::vector<cln::cl_R> Graph::evaluate(const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots) const {
+    std::vector<cln::cl_R> values(nodes_.size());
+    for (const Id id : topological(roots)) {
+        const Node& node = (*this)[id];
+        cln::cl_R& value = values[static_cast<std::size_t>(id)];
+        if (node.op == Op::constant) {
+            value = constant_of(id).value;
+        } else if (node.op == Op::input) {
+            value = inputs[static_cast<std::size_t>(node.index)];
+        } else {
+            std::vector<cln::cl_R> operands;
+            for (const Id operand : node.operands) operands.push_back(values[static_cast<std::size_t>(operand)]);
+            value = apply(node.op, node.index, operands);
+        }
+    }
+    return values;
+}
+
+// Whether a sum is the negative of its preferred form: the rational constant in it positive, else its first term.
+bool Graph::leads_with_minus(Id id) const {
+    const Node& node = (*this)[id];
+    if (node.op != Op::add) return false;
+    const Id last = node.operands.back();
+    const bool has_constant = is_constant(last) && is_rational(constant_of(last).value);
+    const Id leader = has_constant ? last : node.operands.front();
+    const Node& term = (*this)[leader];
+    const std::vector<Id> factors = term.op == Op::multiply ? term.operands : std::vector<Id>{leader};
+    return std::count_if(factors.begin(), factors.end(),
+                         [this](Id f) { return is_constant(f) && cln::minusp(constant_of(f).value); }) %
+               2 !=
+           0;
+}
+
+Id Graph::negate_terms(Id sum) {
+    std::vector<Id> terms = (*this)[sum].operands;
+    for (Id& term : terms) term = negate(term);
+    return add(terms);
+}
+
+// GiNaC chooses between (a - b) (c - d) and (b - a) (d - c) by address; here each sum has a sign of its own.
+void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
+    if (leads_with_minus(base)) {
+        base = negate_terms(base);
+        if (exponent % 2 != 0) factors.push_back(number(-1));
+    }
+    factors.push_back(power(base, exponent));
+}
+
+Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
+    std::map<GiNaC::ex, Id, GiNaC::ex_is_less> done;
+    const auto convert = [&](const auto& self, const GiNaC::ex& e) -> Id {
+        const auto known = done.find(e);
+        if (known != done.end()) return known->second;
+        Id id = 0;
+        if (GiNaC::is_a<GiNaC::numeric>(e)) {
+            const GiNaC::numeric& value = GiNaC::ex_to<GiNaC::numeric>(e);
+            if (!value.is_real()) throw std::logic_error("a complex number in a real expression");
+            id = constant(cln::the<cln::cl_R>(value.to_cl_N()));
+        } else if (GiNaC::is_a<GiNaC::symbol>(e)) {
+            const auto place = inputs.find(e);
+            if (place == inputs.end())
+                throw std::logic_error("a symbol without input: " + GiNaC::ex_to<GiNaC::symbol>(e).get_name());
+            id = static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(place->second).to_int());
+        } else if (e.is_equal(GiNaC::Pi)) {
+            id = constant(cln::pi(format), "pi");
+        } else if (GiNaC::is_a<GiNaC::add>(e)) {
+            std::vector<Id> terms;
+            for (const auto& term : e) terms.push_back(self(self, term));
+            id = add(terms);
+        } else if (GiNaC::is_a<GiNaC::mul>(e)) {
+            std::vector<Id> factors;
+            for (const auto& factor : e) append_factor(factors, self(self, factor), 1);
+            id = multiply(factors);
+        } else if (GiNaC::is_a<GiNaC::power>(e)) {
+            const Id base = self(self, e.op(0));
+            const GiNaC::ex exponent = e.op(1);
+            if (exponent.info(GiNaC::info_flags::integer)) {
+                std::vector<Id> factors;
+                append_factor(factors, base, GiNaC::ex_to<GiNaC::numeric>(exponent).to_int());
+                id = multiply(factors);
+            } else if ((2 * exponent).info(GiNaC::info_flags::integer)) {
+                // x^(k/2) with k odd is sqrt(x)^k: one root for all such powers.
+                id = power(function(Op::sqrt, base), GiNaC::ex_to<GiNaC::numeric>(2 * exponent).to_int());
+            } else {
+                id = raise(base, self(self, exponent));
+            }
+        } else if (GiNaC::is_a<GiNaC::function>(e)) {
+            const std::string name = GiNaC::ex_to<GiNaC::function>(e).get_name();
+            const auto op = function_op(name);
+            if (!op || e.nops() != 1) throw std::logic_error("a function the graph does not know: " + name);
+            id = function(*op, self(self, e.op(0)));
+        } else {
+            throw std::logic_error("an expression the graph does not know");
+        }
+        done.emplace(e, id);
+        return id;
+    };
+    return convert(convert, expression);
+}
+
+}  // namespace lobatto

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The graph as written formulas: for people, for LaTeX and for C++.
+#include "generator/graph/notation.hpp"
+
+#include <cln/cln.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <sstream>
+
+namespace lobatto {
+
+namespace {
+
+// Binding strength of what was printed last.
+enum Strength { sum = 1, product = 2, sign = 3, power = 4, atom = 5 };
+
+// Of a float, in what people read: enough to recognise it, and more than double has.
+constexpr int shown_digits = 25;
+
+struct Printed {
+    std::string text;
+    Strength strength = atom;
+};
+
+std::string integer_text(const cln::cl_I& value) {
+    std::ostringstream out;
+    out << value;
+    return out.str();
+}
+
+std::string_view function_name(Op op) {
+    switch (op) {
+        case Op::sqrt:
+            return "sqrt";
+        case Op::sin:
+        case Op::pair_sine:
+            return "sin";
+        case Op::cos:
+        case Op::pair_cosine:
+            return "cos";
+        case Op::tan:
+            return "tan";
+        case Op::exp:
+            return "exp";
+        case Op::log:
+            return "log";
+        case Op::sinh:
+            return "sinh";
+        case Op::cosh:
+            return "cosh";
+        case Op::tanh:
+            return "tanh";
+        case Op::asin:
+            return "asin";
+        case Op::acos:
+            return "acos";
+        case Op::atan:
+            return "atan";
+        default:
+            return "";
+    }
+}
+
+class Printer {
+public:
+    Printer(const Graph& graph, Notation notation, const Naming& naming, Precision precision, bool fuses)
+        : graph_(graph), notation_(notation), naming_(naming), precision_(precision), fuses_(fuses) {}
+
+    Printed print(Id id, bool at_root = false) const {
+        if (naming_ && !at_root) {
+            const std::string name = naming_(id);
+            if (!name.empty()) return {name, atom};
+        }
+        const Node& node = graph_[id];
+        switch (node.op) {
+            case Op::constant:
+                return constant(id);
+            case Op::input: {
+                const Input& input = graph_.input_of(id);
+                return {notation_ == Notation::cpp     ? input.code
+                        : notation_ == Notation::latex ? latex_name(input.name)
+                                                       : input.name,
+                        atom};
+            }
+            case Op::add:
+                return addition(node);
+            case Op::multiply:
+                return fraction(node.operands);
+            case Op::power:
+                if (node.index < 0) return fraction({id});
+                if (notation_ == Notation::cpp)
+                    throw std::logic_error("C++ has no power operator: expand powers first");
+                return raised(node.operands[0], std::to_string(node.index));
+            case Op::raise:
+                if (notation_ == Notation::cpp) return {call("pow", node.operands), atom};
+                return raised(node.operands[0], print(node.operands[1]).text);
+            case Op::sqrt:
+                if (notation_ == Notation::latex) return {"\\sqrt{" + print(node.operands[0]).text + "}", atom};
+                return {call("sqrt", node.operands), atom};
+            case Op::sincos_pair:
+                return print(node.operands[0]);
+            case Op::pair_sine:
+            case Op::pair_cosine:
+                return {call(function_name(node.op), graph_[node.operands[0]].operands), atom};
+            default:
+                return {call(function_name(node.op), node.operands), atom};
+        }
+    }
+
+private:
+    std::string call(std::string_view name, const std::vector<Id>& operands) const {
+        if (notation_ == Notation::latex)
+            return "\\" +
+                   std::string(name == "asin"   ? "arcsin"
+                               : name == "acos" ? "arccos"
+                               : name == "atan" ? "arctan"
+                                                : name) +
+                   "\\left(" + print(operands[0]).text + "\\right)";
+        std::string text(name);
+        if (notation_ == Notation::cpp) text.insert(0, "lobatto::");
+        text += "(" + print(operands[0]).text;
+        for (std::size_t i = 1; i < operands.size(); ++i) text += ", " + print(operands[i]).text;
+        return text + ")";
+    }
+
+    std::string enclosed(const Printed& printed, Strength needed) const {
+        if (printed.strength >= needed) return printed.text;
+        return notation_ == Notation::latex ? "\\left(" + printed.text + "\\right)" : "(" + printed.text + ")";
+    }
+
+    Printed raised(Id base, const std::string& exponent) const {
+        const std::string below = enclosed(print(base), atom);
+        if (notation_ == Notation::latex) return {"{" + below + "}^{" + exponent + "}", power};
+        const bool simple = exponent.find_first_not_of("0123456789") == std::string::npos;
+        return {below + "^" + (simple ? exponent : "(" + exponent + ")"), power};
+    }
+
+    std::string literal(const cln::cl_R& value) const {
+        const long largest = precision_ == Precision::single ? 128 : precision_ == Precision::double_ ? 1024 : 16384;
+        const long exponent =
+            cln::zerop(value) ? 0 : cln::cl_I_to_long(cln::float_exponent(cln::cl_float(value, cln::float_format(20))));
+        if (exponent > largest || exponent < 4 - largest)
+            throw DomainError("the formulas derived from it contain the number " + decimal(value, 3) +
+                              ", beyond the range of the kernel's number type; choose other units");
+        if (precision_ == Precision::double_) {
+            std::array<char, 40> buffer{};
+            const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), cln::double_approx(value)).ptr;
+            std::string text(buffer.data(), end);
+            return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+        }
+        const int digits = precision_ == Precision::single ? 9 : precision_ == Precision::extended ? 21 : 36;
+        const char* suffix = precision_ == Precision::single ? "f" : precision_ == Precision::extended ? "L" : "Q";
+        std::string text = decimal(value, digits);
+        if (text.find_first_of(".e") == std::string::npos) text += ".0";
+        return text + suffix;
+    }
+
+    Printed constant(Id id) const {
+        const Constant& c = graph_.constant_of(id);
+        if (notation_ == Notation::cpp) return {literal(c.value), cln::minusp(c.value) ? sign : atom};
+        if (is_plain(c)) return fraction({id});
+        if (c.label == "pi") return {notation_ == Notation::latex ? "\\pi" : "pi", atom};
+        return {c.label, c.label.find_first_of("+- ") == std::string::npos ? power : sum};
+    }
+
+    // Whether a sum can take in this product with one rounding: two factors or more, no quotient, and no change of
+    // sign, which would be an operation of its own.
+    bool can_fuse(Id term) const {
+        const Node& node = graph_[term];
+        return fuses_ && node.op == Op::multiply && (!naming_ || naming_(term).empty()) &&
+               std::none_of(node.operands.begin(), node.operands.end(), [this](Id factor) {
+                   return graph_.is_number(factor, -1) || (graph_[factor].op == Op::power && graph_[factor].index < 0);
+               });
+    }
+
+    Printed addition(const Node& node) const {
+        std::vector<Id> terms = node.operands;
+        if (notation_ != Notation::cpp) {  // for people: a positive term first
+            const auto first =
+                std::find_if(terms.begin(), terms.end(), [this](Id term) { return !graph_.is_negative(term); });
+            if (first != terms.end()) std::rotate(terms.begin(), first, first + 1);
+        }
+        std::vector<Id> fused;
+        if (const auto plain = std::find_if(terms.begin(), terms.end(), [this](Id term) { return !can_fuse(term); });
+            fuses_ && terms.size() > 1) {
+            std::rotate(terms.begin(), plain == terms.end() ? terms.begin() : plain, terms.end());
+            const auto first =
+                std::stable_partition(terms.begin() + 1, terms.end(), [this](Id term) { return !can_fuse(term); });
+            fused.assign(first, terms.end());
+            terms.erase(first, terms.end());
+        }
+        std::string text;
+        for (const Id term : terms) {
+            const bool named = naming_ && !naming_(term).empty();
+            const std::string printed = enclosed(print(term), product);
+            if (!text.empty() && !named && printed.front() == '-')
+                text += " - " + printed.substr(1);
+            else
+                text += (text.empty() ? "" : " + ") + printed;
+        }
+        for (const Id term : fused) {
+            std::vector<Id> factors = graph_[term].operands;
+            const std::string last = print(factors.back()).text;
+            factors.pop_back();
+            text = "lobatto::fused_sum(" + fraction(factors).text + ", " + last + ", " + text + ")";
+        }
+        return {text, fused.empty() ? sum : atom};
+    }
+
+    // Factors as numerator over denominator, with the sign in front.
+    Printed fraction(const std::vector<Id>& factors) const {
+        bool negative = false;
+        std::vector<std::string> above, below;
+        std::vector<Printed> alone;
+        for (const Id factor : factors) {
+            const Node& node = graph_[factor];
+            const bool named = naming_ && factors.size() > 1 && !naming_(factor).empty();
+            if (!named && node.op == Op::constant &&
+                (notation_ == Notation::cpp || is_plain(graph_.constant_of(factor)))) {
+                cln::cl_R value = graph_.constant_of(factor).value;
+                if (cln::minusp(value)) {
+                    negative = !negative;
+                    value = -value;
+                }
+                if (notation_ == Notation::cpp) {
+                    if (value != 1 || factors.size() == 1) above.push_back(literal(value));
+                } else if (!is_rational(value)) {
+                    above.push_back(decimal(value, shown_digits));
+                } else {
+                    const cln::cl_RA rational = cln::the<cln::cl_RA>(value);
+                    if (cln::numerator(rational) != 1 || factors.size() == 1)
+                        above.push_back(integer_text(cln::numerator(rational)));
+                    if (cln::denominator(rational) != 1) below.push_back(integer_text(cln::denominator(rational)));
+                }
+            } else if (!named && node.op == Op::power && node.index < 0) {
+                if (notation_ == Notation::cpp)
+                    below.push_back(enclosed(print(node.operands[0]), atom));
+                else
+                    below.push_back(node.index == -1 ? enclosed(print(node.operands[0]), power)
+                                                     : raised(node.operands[0], std::to_string(-node.index)).text);
+            } else {
+                above.push_back(enclosed(print(factor), factors.size() == 1 ? sum : power));
+            }
+        }
+        if (above.size() == 1 && above.front() == "1" && !below.empty()) above.clear();
+        const std::string minus = negative ? "-" : "";
+        if (below.empty())
+            return {minus + joined(above), negative           ? (above.size() > 1 ? product : sign)
+                                           : above.size() > 1 ? product
+                                           : notation_ == Notation::cpp || factors.size() == 1 ? atom
+                                                                                               : power};
+        const std::string one = notation_ == Notation::cpp ? literal(1) : "1";
+        if (notation_ == Notation::latex)
+            return {minus + "\\frac{" + (above.empty() ? one : joined(above)) + "}{" + joined(below) + "}", product};
+        return {minus + (above.empty() ? one : joined(above)) + (notation_ == Notation::cpp ? " / " : "/") +
+                    (below.size() == 1 ? below.front() : "(" + joined(below) + ")"),
+                product};
+    }
+
+    std::string joined(const std::vector<std::string>& factors) const {
+        std::string text;
+        for (const auto& factor : factors) {
+            if (!text.empty())
+                text += notation_ == Notation::cpp ? " * " : notation_ == Notation::latex ? " \\, " : "*";
+            text += factor;
+        }
+        return text.empty() ? "1" : text;
+    }
+
+    const Graph& graph_;
+    Notation notation_;
+    const Naming& naming_;
+    Precision precision_;
+    bool fuses_;
+};
+
+void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::ex>& symbols) {
+    for (auto part = e.preorder_begin(); part != e.preorder_end(); ++part)
+        if (GiNaC::is_a<GiNaC::symbol>(*part)) symbols.emplace(GiNaC::ex_to<GiNaC::symbol>(*part).get_name(), *part);
+}
+
+}  // namespace
+
+std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming, Precision precision,
+                    bool fuses) {
+    return Printer(graph, notation, naming, precision, fuses).print(id, true).text;
+}
+
+std::string decimal(const cln::cl_R& value, int digits) {
+    if (cln::zerop(value)) return "0";
+    const cln::cl_RA magnitude = cln::rational(cln::abs(value));
+    // value = integer * 10^scale with `digits` digits: the exponent is guessed from the logarithm, then corrected.
+    int scale =
+        static_cast<int>(cln::cl_I_to_long(cln::floor1(cln::ln(cln::cl_float(magnitude, cln::float_format(20))) /
+                                                       cln::ln(cln::cl_float(10, cln::float_format(20)))))) -
+        digits + 1;
+    cln::cl_I integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -scale));
+    while (integer >= cln::expt_pos(cln::cl_I(10), digits))
+        integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -(++scale)));
+    while (integer < cln::expt_pos(cln::cl_I(10), digits - 1))
+        integer = cln::round1(magnitude * cln::expt(cln::cl_RA(10), -(--scale)));
+    std::string text = integer_text(integer);
+    const int exponent = scale + digits - 1;
+    text.erase(text.find_last_not_of('0') + 1);
+    const int count = static_cast<int>(text.size());
+    if (exponent >= -4 && exponent < digits) {
+        if (exponent < 0)
+            text = "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + text;
+        else if (count <= exponent + 1)
+            text += std::string(static_cast<std::size_t>(exponent + 1 - count), '0');
+        else
+            text.insert(static_cast<std::size_t>(exponent) + 1, ".");
+    } else {
+        if (count > 1) text.insert(1, ".");
+        text += "e" + std::to_string(exponent);
+    }
+    return (cln::minusp(value) ? "-" : "") + text;
+}
+
+std::string canonical_text(const GiNaC::ex& expression, Notation notation) {
+    std::map<std::string, GiNaC::ex> symbols;
+    collect_symbols(expression, symbols);
+    Graph graph;
+    GiNaC::exmap inputs;
+    for (const auto& [name, symbol] : symbols) inputs[symbol] = graph.input({name, name, Stage::iterate});
+    return formula(graph, graph.from(expression, inputs), notation);
+}
+
+std::string latex_name(const std::string& name) {
+    static const std::map<std::string, std::string> greek = [] {
+        std::map<std::string, std::string> names;
+        for (const char* letter :
+             {"alpha", "beta",  "gamma",  "delta", "epsilon", "zeta",  "eta", "theta", "iota", "kappa", "lambda",
+              "mu",    "nu",    "xi",     "rho",   "sigma",   "tau",   "phi", "chi",   "psi",  "omega", "Gamma",
+              "Delta", "Theta", "Lambda", "Xi",    "Pi",      "Sigma", "Phi", "Psi",   "Omega"})
+            names.emplace(letter, std::string("\\") + letter);
+        return names;
+    }();
+    std::string stem = name, subscript;
+    const bool velocity = !stem.empty() && stem.back() == '\'';
+    if (velocity) stem.pop_back();
+    if (const auto underscore = stem.find('_'); underscore != std::string::npos && underscore > 0) {
+        subscript = stem.substr(underscore + 1);
+        stem.erase(underscore);
+    } else {
+        std::size_t digits = stem.find_last_not_of("0123456789") + 1;
+        if (digits > 0) {
+            subscript = stem.substr(digits);
+            stem.erase(digits);
+        }
+    }
+    if (const auto letter = greek.find(stem); letter != greek.end())
+        stem = letter->second;
+    else if (stem.size() > 1)
+        stem = "\\mathrm{" + stem + "}";
+    if (velocity) stem = "\\dot{" + stem + "}";
+    // Subscripts of subscripts stand side by side: p_theta_left becomes p_{\theta,\mathrm{left}}.
+    std::string below;
+    for (std::size_t begin = 0; begin < subscript.size();) {
+        const std::size_t end = std::min(subscript.find('_', begin), subscript.size());
+        const std::string part = subscript.substr(begin, end - begin);
+        const auto letter = greek.find(part);
+        const bool is_word = part.find_first_of("0123456789") == std::string::npos && part.size() > 1;
+        if (!part.empty())
+            below += (below.empty() ? "" : ",") + (letter != greek.end() ? letter->second
+                                                   : is_word             ? "\\mathrm{" + part + "}"
+                                                                         : part);
+        begin = end + 1;
+    }
+    if (!below.empty()) stem += "_{" + below + "}";
+    return stem;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The graph as written formulas: for people, for LaTeX and for C++.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "generator/graph/graph.hpp"
+
+namespace lobatto {
+
+enum class Notation { text, latex, cpp };
+enum class Precision { single, double_, extended, quadruple };  // float, double, long double, __float128
+
+// How a node that has a name of its own reads (an input, a temporary); empty: print its operation.
+using Naming = std::function<std::string(Id)>;
+
+// The formula of a node. C++ literals are shortest round-trip for double, and 9, 21, 36 digits with suffix f, L, Q
+// otherwise. Where it `fuses`, C++ adds products by lobatto::fused_sum(a, b, c) = a b + c of base/pack.hpp.
+std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming = {},
+                    Precision precision = Precision::double_, bool fuses = false);
+
+// A number in scientific or plain decimal notation, rounded once to the given count of significant digits.
+std::string decimal(const cln::cl_R& value, int digits);
+
+// A GiNaC expression as a person reads it, in an order that does not change from run to run. Symbols are ordered by
+// name.
+std::string canonical_text(const GiNaC::ex& expression, Notation notation = Notation::text);
+
+// A name for LaTeX: theta_1' becomes \dot{\theta}_{1}.
+std::string latex_name(const std::string& name);
+
+}  // namespace lobatto

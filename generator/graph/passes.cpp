@@ -1,0 +1,442 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs.
+#include "generator/graph/passes.hpp"
+
+#include <cln/cln.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <optional>
+#include <set>
+
+#include "generator/graph/notation.hpp"
+
+namespace lobatto {
+
+namespace {
+
+std::vector<Id> roots_of(const Program& program) {
+    std::vector<Id> roots;
+    for (const Output& output : program.outputs) roots.push_back(output.value);
+    return roots;
+}
+
+// What `rule` makes of a node, given its operands already rewritten.
+using Rule = std::function<Id(Graph& result, const Graph& before, Id id, std::vector<Id> operands)>;
+
+// What `rule` makes of the nodes that `roots` ask for.
+std::vector<Id> images(Graph& after, const Graph& before, const std::vector<Id>& roots, const Rule& rule) {
+    std::vector<Id> image(static_cast<std::size_t>(before.size()), -1);
+    for (const Id id : before.topological(roots)) {
+        const Node& node = before[id];
+        std::vector<Id> operands;
+        for (const Id operand : node.operands) operands.push_back(image[static_cast<std::size_t>(operand)]);
+        Id& result = image[static_cast<std::size_t>(id)];
+        if (node.op == Op::constant)
+            result = after.constant(before.constant_of(id).value, before.constant_of(id).label);
+        else if (node.op == Op::input)
+            result = after.input(before.input_of(id));
+        else
+            result = rule(after, before, id, std::move(operands));
+    }
+    return image;
+}
+
+// The programs in a new graph, and what has a name.
+Programs rewrite(const Programs& before, const Rule& rule) {
+    Programs after;
+    for (const Input& input : before.graph.inputs()) after.graph.input(input);
+    const std::vector<Id> image = images(after.graph, before.graph, roots_of(before), rule);
+    after.programs = before.programs;
+    after.solves = before.solves;
+    for (Program& program : after.programs)
+        for (Output& output : program.outputs) output.value = image[static_cast<std::size_t>(output.value)];
+    for (const auto& [id, name] : before.names) after.names.emplace_back(image[static_cast<std::size_t>(id)], name);
+    return after;
+}
+
+Id same(Graph& graph, const Node& node, std::vector<Id> operands) {
+    return graph.raw(node.op, std::move(operands), node.index);
+}
+
+}  // namespace
+
+// ---- fold constants: whatever depends on numbers only becomes a number of 60 digits; its formula stays as label
+
+Programs fold_constants(const Programs& programs) {
+    Graph scratch = programs.graph;  // to print the formulas that vanish
+    return rewrite(programs, [&scratch](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        const Node& node = before[id];
+        std::vector<Id> numbers, others, printed;
+        for (std::size_t i = 0; i < operands.size(); ++i) {
+            if (graph.is_constant(operands[i])) {
+                numbers.push_back(operands[i]);
+                printed.push_back(node.operands[i]);
+            } else {
+                others.push_back(operands[i]);
+            }
+        }
+        const bool n_ary = node.op == Op::add || node.op == Op::multiply;
+        if (numbers.empty() || (!n_ary && !others.empty())) return same(graph, node, std::move(operands));
+        if (n_ary && numbers.size() == 1) return node.op == Op::add ? graph.add(operands) : graph.multiply(operands);
+        std::vector<cln::cl_R> values;
+        for (const Id number : numbers) values.push_back(graph.constant_of(number).value);
+        const cln::cl_R value = apply(node.op, node.index, values);
+        std::string label;
+        if (!is_rational(value)) label = formula(scratch, scratch.raw(node.op, printed, node.index), Notation::text);
+        others.push_back(graph.constant(value, label));
+        return node.op == Op::add        ? graph.add(others)
+               : node.op == Op::multiply ? graph.multiply(others)
+                                         : others.front();
+    });
+}
+
+// ---- factor sums (Horner): a x^3 + b x^2 + c x = x (c + x (b + a x))
+
+namespace {
+
+// A factor is taken out only of terms that are known no earlier than the factor itself: coefficients of an earlier
+// stage are hoisted for free.
+Id horner(Graph& graph, const std::vector<Id>& terms) {
+    const auto factors_of = [&graph](Id term) {
+        return graph[term].op == Op::multiply ? graph[term].operands : std::vector<Id>{term};
+    };
+    const auto base_of = [&graph](Id factor) {
+        return graph[factor].op == Op::power && graph[factor].index > 0 ? graph[factor].operands[0] : factor;
+    };
+    std::vector<std::pair<Id, std::vector<std::size_t>>> uses;  // base -> terms, in order of first appearance
+    for (std::size_t t = 0; t < terms.size(); ++t)
+        for (const Id factor : factors_of(terms[t])) {
+            const Id base = base_of(factor);
+            const Node& node = graph[base];
+            if (graph.is_constant(base) || node.op == Op::power || node.stage != graph[terms[t]].stage) continue;
+            auto use = std::find_if(uses.begin(), uses.end(), [base](const auto& u) { return u.first == base; });
+            if (use == uses.end()) use = uses.insert(uses.end(), {base, {}});
+            use->second.push_back(t);
+        }
+    const auto best = std::max_element(uses.begin(), uses.end(),
+                                       [](const auto& x, const auto& y) { return x.second.size() < y.second.size(); });
+    if (best == uses.end() || best->second.size() < 2)
+        return terms.size() == 1 ? terms.front()
+                                 : graph.raw(Op::add, terms);  // a sum within a sum stays one: it chose its rounding
+    std::vector<Id> inside, outside;
+    for (std::size_t t = 0, next = 0; t < terms.size(); ++t) {
+        if (next < best->second.size() && best->second[next] == t) {
+            inside.push_back(graph.divide(terms[t], best->first));
+            ++next;
+        } else {
+            outside.push_back(terms[t]);
+        }
+    }
+    const Id product = graph.raw(Op::multiply, {best->first, horner(graph, inside)});
+    if (outside.empty()) return product;
+    const Id rest = outside.size() == 1 ? outside.front() : horner(graph, outside);
+    std::vector<Id> sum{product};
+    if (graph[rest].op == Op::add)
+        sum.insert(sum.end(), graph[rest].operands.begin(), graph[rest].operands.end());
+    else
+        sum.push_back(rest);
+    return graph.raw(Op::add, std::move(sum));
+}
+
+}  // namespace
+
+Programs factor_sums(const Programs& programs) {
+    return rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        return before[id].op == Op::add ? horner(graph, operands) : same(graph, before[id], std::move(operands));
+    });
+}
+
+// ---- powers by multiplication
+
+namespace {
+
+Id raised(Graph& graph, Id base, int exponent) {
+    if (exponent == 1) return base;
+    if (exponent < 0) return graph.raw(Op::power, {raised(graph, base, -exponent)}, -1);
+    if (exponent % 2 == 0) {
+        const Id half = raised(graph, base, exponent / 2);
+        return graph.raw(Op::multiply, {half, half});
+    }
+    return graph.raw(Op::multiply, {raised(graph, base, exponent - 1), base});
+}
+
+// sqrt(x)^exponent with an odd exponent, as a power of x times a root: rounding of the root is not raised with it.
+Id raised_root(Graph& graph, Id root, int exponent) {
+    Id x = graph[root].operands[0];
+    if (exponent < 0) {
+        x = graph.raw(Op::power, {x}, -1);
+        root = graph.raw(Op::sqrt, {x});
+    }
+    const int whole = (std::abs(exponent) - 1) / 2;
+    return whole == 0 ? root : graph.raw(Op::multiply, {raised(graph, x, whole), root});
+}
+
+}  // namespace
+
+Programs multiply_powers(const Programs& programs) {
+    // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...; with a
+    // root as base, r = 1/x, then sqrt(r), r sqrt(r) ...
+    std::map<Id, std::set<int>> negative;
+    for (const Id id : programs.graph.topological(roots_of(programs)))
+        if (programs.graph[id].op == Op::power && programs.graph[id].index < 0)
+            negative[programs.graph[id].operands[0]].insert(programs.graph[id].index);
+    return rewrite(programs, [&negative](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        const Node& node = before[id];
+        if (node.op != Op::power) return same(graph, node, std::move(operands));
+        const bool shares = node.index < 0 && negative[node.operands[0]].size() > 1;
+        if (graph[operands.front()].op == Op::sqrt && node.index % 2 != 0 && (node.index != -1 || shares))
+            return raised_root(graph, operands.front(), node.index);
+        if (shares) return raised(graph, graph.raw(Op::power, {operands.front()}, -1), -node.index);
+        return raised(graph, operands.front(), node.index);
+    });
+}
+
+// ---- stages: the operands known first are combined first, so that their part can be hoisted
+
+namespace {
+
+std::string positive_label(const Constant& negative) {
+    if (negative.label.empty()) return "";
+    return negative.label.rfind("-(", 0) == 0 && negative.label.back() == ')'
+               ? negative.label.substr(2, negative.label.size() - 3)
+               : "-(" + negative.label + ")";
+}
+
+}  // namespace
+
+Programs group_by_stage(const Programs& programs) {
+    // Products that have a name of their own keep their sign.
+    std::set<std::vector<Id>> named;
+    for (const auto& [id, name] : programs.names) named.insert(programs.graph[id].operands);
+    return rewrite(programs, [&named](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        const Node& node = before[id];
+        if (node.op != Op::add && node.op != Op::multiply) return same(graph, node, std::move(operands));
+        // A minus sign stays with the later operand, where it is a subtraction: what is hoisted keeps its name and
+        // sign.
+        std::vector<Id> early;
+        for (const Id operand : node.operands)
+            if (before[operand].stage <= Stage::step_size) early.push_back(operand);
+        const bool minus = node.op == Op::multiply && node.stage > Stage::step_size &&
+                           graph.is_negative(operands.front()) && !named.contains(early);
+        if (minus) {
+            operands.front() = graph.constant(-graph.constant_of(operands.front()).value,
+                                              positive_label(graph.constant_of(operands.front())));
+            if (graph.is_number(operands.front(), 1)) operands.erase(operands.begin());
+        }
+        std::vector<Id> group;
+        for (const Stage stage : {Stage::constant, Stage::parameter, Stage::step_size, Stage::step, Stage::iterate}) {
+            std::vector<Id> here;
+            for (const Id operand : operands)
+                if (graph[operand].stage == stage) here.push_back(operand);
+            if (here.empty()) continue;
+            // What came before forms one operand; a lone constant stays beside what it multiplies or is added to.
+            if (group.size() > 1) group = {graph.raw(node.op, group)};
+            group.insert(group.end(), here.begin(), here.end());
+        }
+        if (minus) group.insert(group.begin(), graph.number(-1));
+        // A sum begins with a term that has no minus sign, where there is one.
+        if (node.op == Op::add) {
+            const auto first =
+                std::find_if(group.begin(), group.end(), [&graph](Id term) { return !graph.is_negative(term); });
+            if (first != group.end()) std::rotate(group.begin(), first, first + 1);
+        }
+        return graph.raw(node.op, std::move(group));
+    });
+}
+
+// ---- share: operand pairs that several sums or products contain are computed once
+
+Programs share_pairs(const Programs& programs) {
+    // Sums and products of the graph as operand lists, rewritten in place; extracted pairs become new nodes of `graph`.
+    Programs work = rewrite(programs, [](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        return same(graph, before[id], std::move(operands));
+    });
+    Graph& graph = work.graph;
+    const std::vector<Id> order = graph.topological(roots_of(work));
+    std::map<Id, std::vector<Id>> lists;
+    for (const Id id : order)
+        if (graph[id].op == Op::add || graph[id].op == Op::multiply) lists[id] = graph[id].operands;
+    using Pair = std::array<Id, 3>;  // op, smaller, larger
+    // In rounds: all pairs are counted, then the most frequent ones taken out, each list changing once a round.
+    for (bool changed = true; changed;) {
+        changed = false;
+        std::map<Pair, std::set<Id>> users;
+        for (const auto& [id, operands] : lists)
+            for (std::size_t i = 0; i < operands.size(); ++i)
+                for (std::size_t j = i + 1; j < operands.size(); ++j) {
+                    const auto [low, high] = std::minmax(operands[i], operands[j]);
+                    users[{static_cast<Id>(graph[id].op), low, high}].insert(id);
+                }
+        std::vector<std::pair<Pair, std::set<Id>>> frequent;
+        for (auto& [pair, ids] : users)
+            if (ids.size() > 1) frequent.emplace_back(pair, std::move(ids));
+        std::stable_sort(frequent.begin(), frequent.end(),
+                         [](const auto& x, const auto& y) { return x.second.size() > y.second.size(); });
+        std::set<Id> touched;
+        for (auto& [key, ids] : frequent) {
+            std::erase_if(ids, [&touched](Id id) { return touched.contains(id); });
+            // A pair that is a whole node already gains nothing unless a longer list contains it.
+            const bool in_longer =
+                std::any_of(ids.begin(), ids.end(), [&lists](Id id) { return lists[id].size() > 2; });
+            if (ids.size() < 2 || !in_longer) continue;
+            const auto [op, low, high] = key;
+            // The pair in the order in which its first user holds it.
+            std::vector<Id> pair;
+            for (const Id operand : lists[*ids.begin()])
+                if ((operand == low || operand == high) && pair.size() < 2) pair.push_back(operand);
+            const Id shared = graph.raw(static_cast<Op>(op), pair);
+            for (const Id id : ids) {
+                std::vector<Id>& operands = lists[id];
+                operands.erase(std::find(operands.begin(), operands.end(), low));
+                operands.erase(std::find(operands.begin(), operands.end(), high));
+                operands.insert(operands.begin(), shared);
+            }
+            lists[shared] = pair;  // also when one of the users was the pair itself
+            touched.insert(ids.begin(), ids.end());
+            touched.insert(shared);
+            changed = true;
+        }
+    }
+    // Rebuild from the lists.
+    Programs result;
+    for (const Input& input : graph.inputs()) result.graph.input(input);
+    std::map<Id, Id> image;
+    const std::function<Id(Id)> build = [&](Id id) -> Id {
+        if (const auto known = image.find(id); known != image.end()) return known->second;
+        const Node node = graph[id];
+        Id built = 0;
+        if (node.op == Op::constant) {
+            built = result.graph.constant(graph.constant_of(id).value, graph.constant_of(id).label);
+        } else if (node.op == Op::input) {
+            built = result.graph.input(graph.input_of(id));
+        } else {
+            const auto list = lists.find(id);
+            const std::vector<Id> sources = list == lists.end() ? node.operands : list->second;
+            std::vector<Id> operands;
+            for (const Id source : sources) operands.push_back(build(source));
+            built = list != lists.end() && operands.size() == 1 ? operands.front()
+                                                                : result.graph.raw(node.op, operands, node.index);
+        }
+        return image[id] = built;
+    };
+    result.programs = work.programs;
+    result.solves = work.solves;
+    for (Program& program : result.programs)
+        for (Output& output : program.outputs) output.value = build(output.value);
+    for (const auto& [id, name] : work.names) result.names.emplace_back(build(id), name);
+    return result;
+}
+
+// ---- sines and cosines of a sum of two angles from those of the two
+
+namespace {
+
+bool is_trigonometric(Op op) {
+    return op == Op::sin || op == Op::cos;
+}
+
+// x of a term x or -x.
+Id angle_of(const Graph& graph, Id term, bool& is_negative) {
+    const Node& node = graph[term];
+    is_negative = node.op == Op::multiply && node.operands.size() == 2 && graph.is_number(node.operands[0], -1);
+    return is_negative ? node.operands[1] : term;
+}
+
+// The sums of two angles, both plus or minus, whose sines or cosines a program takes besides those of both angles.
+std::set<Id> sums_of_known_angles(const Graph& graph, const Program& program) {
+    const std::vector<Id> nodes = graph.topological(roots_of(program));
+    std::set<Id> arguments;
+    for (const Id id : nodes)
+        if (is_trigonometric(graph[id].op)) arguments.insert(graph[id].operands[0]);
+    std::set<Id> sums;
+    for (const Id sum : arguments) {
+        if (graph[sum].op != Op::add || graph[sum].operands.size() != 2) continue;
+        bool ignored = false;
+        const auto is_known = [&](Id term) {
+            const Id angle = angle_of(graph, term, ignored);
+            return graph[angle].op != Op::add && arguments.contains(angle);
+        };
+        if (is_known(graph[sum].operands[0]) && is_known(graph[sum].operands[1])) sums.insert(sum);
+    }
+    // Near zero sin(a - b) has fewer digits then: not where it is divided by, or in the argument of a function.
+    std::vector<bool> needs_digits(static_cast<std::size_t>(graph.size()));
+    for (auto id = nodes.rbegin(); id != nodes.rend(); ++id) {
+        const Node& node = graph[*id];
+        const bool is_polynomial =
+            node.op == Op::add || node.op == Op::multiply || (node.op == Op::power && node.index > 0);
+        const bool here = needs_digits[static_cast<std::size_t>(*id)];
+        if (here && is_trigonometric(node.op)) sums.erase(node.operands[0]);
+        if (here || !is_polynomial)
+            for (const Id operand : node.operands) needs_digits[static_cast<std::size_t>(operand)] = true;
+    }
+    return sums;
+}
+
+Id sine_or_cosine_of_sum(Graph& graph, Op op, const std::vector<Id>& terms) {
+    std::array<Id, 2> sine{}, cosine{};
+    std::array<bool, 2> minus{};
+    for (std::size_t i = 0; i < 2; ++i) {
+        const Id angle = angle_of(graph, terms[i], minus[i]);
+        sine[i] = graph.raw(Op::sin, {angle});
+        cosine[i] = graph.raw(Op::cos, {angle});
+    }
+    const auto product = [&](Id a, Id b, bool is_negative) {
+        const Id value = graph.raw(Op::multiply, {a, b});
+        return is_negative ? graph.raw(Op::multiply, {graph.constant(-1, ""), value}) : value;
+    };
+    if (op == Op::sin)
+        return graph.raw(Op::add, {product(sine[0], cosine[1], minus[0]), product(cosine[0], sine[1], minus[1])});
+    return graph.raw(Op::add, {product(cosine[0], cosine[1], false), product(sine[0], sine[1], minus[0] == minus[1])});
+}
+
+}  // namespace
+
+Programs add_angles(const Programs& programs) {
+    // Each program by itself: another may take the sum's sine alone.
+    Programs after = programs;
+    for (std::size_t p = 0; p < programs.programs.size(); ++p) {
+        const std::set<Id> sums = sums_of_known_angles(programs.graph, programs.programs[p]);
+        if (sums.empty()) continue;
+        const std::vector<Id> image =
+            images(after.graph, programs.graph, roots_of(programs.programs[p]),
+                   [&sums](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+                       const Node& node = before[id];
+                       if (!is_trigonometric(node.op) || !sums.contains(node.operands[0]))
+                           return same(graph, node, std::move(operands));
+                       return sine_or_cosine_of_sum(graph, node.op, std::vector<Id>(graph[operands[0]].operands));
+                   });
+        for (std::size_t i = 0; i < programs.programs[p].outputs.size(); ++i)
+            after.programs[p].outputs[i].value = image[static_cast<std::size_t>(programs.programs[p].outputs[i].value)];
+    }
+    return after;
+}
+
+// ---- sine and cosine of one argument as a pair
+
+Programs pair_sines(const Programs& programs) {
+    std::set<Id> sines, cosines;  // arguments, in the graph before
+    for (const Id id : programs.graph.topological(roots_of(programs))) {
+        if (programs.graph[id].op == Op::sin) sines.insert(programs.graph[id].operands[0]);
+        if (programs.graph[id].op == Op::cos) cosines.insert(programs.graph[id].operands[0]);
+    }
+    return rewrite(programs, [&](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+        const Node& node = before[id];
+        const bool trigonometric = node.op == Op::sin || node.op == Op::cos;
+        if (!trigonometric || !sines.contains(node.operands[0]) || !cosines.contains(node.operands[0]))
+            return same(graph, node, std::move(operands));
+        const Id pair = graph.raw(Op::sincos_pair, std::move(operands));
+        return graph.raw(node.op == Op::sin ? Op::pair_sine : Op::pair_cosine, {pair});
+    });
+}
+
+std::vector<Id> roots_of(const Programs& programs) {
+    std::vector<Id> roots;
+    for (const Program& program : programs.programs)
+        for (const Id root : roots_of(program)) roots.push_back(root);
+    for (const auto& [id, name] : programs.names) roots.push_back(id);
+    return roots;
+}
+
+}  // namespace lobatto

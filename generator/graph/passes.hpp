@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "generator/graph/graph.hpp"
+
+namespace lobatto {
+
+// One value a program computes, and the place in C++ where it goes.
+struct Output {
+    std::string target;  // W[0]
+    Id value = 0;
+};
+
+// One function of the kernel: its outputs, computed together.
+struct Program {
+    std::string name;  // node
+    std::vector<Output> outputs;
+};
+
+// A linear system that the program `correction` leaves to the elimination of the support header: J_mark delta_mark =
+// -F, and the unknowns that delta_mark are.
+struct Solve {
+    std::string mark;  // "" when it is the only one
+    std::vector<std::size_t> unknowns;
+};
+
+// All programs of a kernel over one graph, so that what they hoist is shared; and names for values that deserve one
+// when hoisted.
+struct Programs {
+    Graph graph;
+    std::vector<Program> programs;
+    std::vector<std::pair<Id, std::string>> names;  // value -> identifier
+    std::vector<Solve> solves;
+};
+
+// The values that the programs and the names ask for.
+std::vector<Id> roots_of(const Programs& programs);
+
+// The passes. Each gives the same values on a graph of its own.
+Programs fold_constants(const Programs& programs);   // numbers of 60 digits; the formula stays as label
+Programs factor_sums(const Programs& programs);      // Horner
+Programs multiply_powers(const Programs& programs);  // integer powers by multiplication
+Programs group_by_stage(const Programs& programs);   // what is known first is combined first
+Programs share_pairs(const Programs& programs);      // common parts of sums and products
+Programs add_angles(const Programs& programs);       // sin(a - b) from those of a and b, where these are there
+Programs pair_sines(const Programs& programs);       // sine and cosine of one argument together
+
+}  // namespace lobatto

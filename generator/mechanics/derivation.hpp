@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Everything known of a scene before any code is written: what the later stages read.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "generator/mechanics/discretisation.hpp"
+#include "generator/mechanics/structure.hpp"
+#include "generator/mechanics/system.hpp"
+#include "generator/method/quadrature.hpp"
+#include "generator/scene/scene.hpp"
+
+namespace lobatto {
+
+struct Derivation {
+    Scene scene;
+    System system;
+    Quadrature quadrature;
+    Structure structure;
+
+    // The equations of all nodes written out, for people and for checks; a kernel is assembled from one node's formulas
+    // and does not need them. Made at the first call.
+    const Discretisation& discretisation() const;
+    void put(Discretisation equations) {
+        discretisation_ = std::make_shared<const Discretisation>(std::move(equations));
+    }
+
+private:
+    mutable std::shared_ptr<const Discretisation> discretisation_;
+};
+
+}  // namespace lobatto

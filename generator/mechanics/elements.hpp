@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Repeated terms of a sum: one formula, written once, and the table of what it is applied to.
+#pragma once
+
+#include <ginac/ginac.h>
+
+#include <vector>
+
+#include "generator/mechanics/system.hpp"
+
+namespace lobatto {
+
+// T(x; a), the same for every row; x_j stands for variable rows[r][j], a_j for coefficients[r][j].
+struct Element {
+    std::vector<GiNaC::symbol> x, a;
+    GiNaC::ex term;                      // in x, a, time and run-time parameters that are the same in all rows
+    std::vector<std::vector<int>> rows;  // rows x |x|: which variable
+    std::vector<std::vector<GiNaC::ex>> coefficients;  // rows x |a|: a number or a parameter
+    int target = -1;  // -1: the rows are terms of a potential; else: of the force on the variable x[target]
+};
+
+struct Elements {
+    std::vector<Element> repeated;                        // of at least `fewest_rows` rows
+    std::vector<GiNaC::ex> others;                        // terms that repeat too seldom
+    std::vector<std::pair<int, GiNaC::ex>> other_forces;  // likewise: variable acted on, term
+};
+
+constexpr std::size_t fewest_rows = 8;
+
+// Rows that follow one another with each variable the next: their formula can be taken in vector lanes.
+struct RowRun {
+    int begin, count;
+};
+std::vector<RowRun> runs_of(const Element& element);
+// Whether most rows of all formulas stand in long runs, with the same distances between the variables of a row.
+bool are_neighbours(const Elements& elements);
+// How far the rows of long runs reach from the first coordinate, where all of them begin; -1 where some do not.
+int row_reach(const Elements& elements);
+// Whether the rows are one run, along all of `count` variables or all pairs or triples of neighbours.
+bool covers(const Element& element, int count);
+
+// Where the formula of all pairs of neighbours holds beyond the first coordinate, or the last, with zero for the one
+// that is not there: a chain between walls.
+struct Walls {
+    std::size_t element = 0;  // its number
+    bool before = false, behind = false;
+    std::vector<GiNaC::ex> others;  // without what stands for the walls
+};
+Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q);
+// Whether the slope is that of one formula, of single coordinates or pairs of neighbours, which covers all of them.
+bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector<GiNaC::symbol>& q);
+
+// The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
+Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,
+                       const std::vector<GiNaC::ex>& terms, const std::vector<std::pair<int, GiNaC::ex>>& forces);
+
+}  // namespace lobatto

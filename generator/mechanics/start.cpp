@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Whether a motion can begin where a scene lets it begin.
+#include "generator/mechanics/start.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "generator/graph/notation.hpp"
+#include "generator/mechanics/elimination.hpp"
+#include "generator/mechanics/sample.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+using Numbers = std::vector<cln::cl_R>;
+
+std::size_t at(int index) {
+    return static_cast<std::size_t>(index);
+}
+
+std::string short_text(const ex& expression) {
+    const std::string text = canonical_text(expression);
+    return text.size() <= 120 ? text : fmt::format("a formula of {} characters", text.size());
+}
+
+class StartCheck {
+public:
+    StartCheck(const Scene& scene, const System& system) : scene_(scene), system_(system) {
+        for (const Parameter& parameter : scene.parameters)
+            start_.set(parameter.symbol, value_of(parameter.value, "the parameter " + parameter.name));
+        start_.set(scene.time, 0);
+        for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
+            const Coordinate& coordinate = scene.coordinates[k];
+            start_.set(coordinate.position,
+                       value_of(scene.initial_position[k], "the initial position of " + coordinate.name));
+            const bool given = scene.start == Start::velocity;
+            start_.set(
+                coordinate.velocity,
+                given ? value_of(scene.initial_rate[k], "the initial velocity of " + coordinate.name) : cln::cl_R(0));
+        }
+        for (const auto& [place, value] : system.momentum_v.entries()) {
+            mass_places_.push_back(place);
+            mass_values_.push_back(value);
+        }
+        momentum_ = start_.convert(system.momentum);
+        mass_ = start_.convert(mass_values_);
+    }
+
+    void run() {
+        require_values();
+        require_mass();
+        if (scene_.start == Start::velocity || system_.separable) return;
+        find_velocities();
+        require_values();
+        require_mass();
+    }
+
+private:
+    cln::cl_R value_of(const ex& expression, const std::string& what) const {
+        return float_of(scene_.evaluate(expression, what));
+    }
+
+    [[noreturn]] void refuse(const std::string& reason) const { scene_.source.fail(scene_.lagrangian_at, reason); }
+
+    // "x = 0, x' = 1": what of the start an expression holds.
+    std::string values_in(const ex& expression) const {
+        std::string text;
+        int shown = 0;
+        const auto add = [&](const GiNaC::symbol& symbol) {
+            if (!expression.has(symbol) || ++shown > 6) return;
+            const cln::cl_R value = start_.get(symbol);
+            text += fmt::format("{}{} = {}", shown == 1 ? "" : ", ", symbol.get_name(),
+                                cln::zerop(value) ? "0" : decimal(value, 6));
+        };
+        for (const auto* symbols : {&system_.q, &system_.v})
+            for (const auto& symbol : *symbols) add(symbol);
+        add(system_.t);
+        if (shown == 0)
+            for (const auto& symbol : system_.parameters) add(symbol);
+        return text + (shown > 6 ? ", ..." : "");
+    }
+
+    // All formulas at once; when one has no value, one by one to find it.
+    void require_values() {
+        std::vector<ex> all = system_.terms;
+        for (const auto* list : {&system_.outer_force, &system_.momentum, &system_.force})
+            all.insert(all.end(), list->begin(), list->end());
+        for (const SparseMatrix* matrix :
+             {&system_.momentum_v, &system_.momentum_q, &system_.force_v, &system_.force_q})
+            for (const auto& [place, value] : matrix->entries()) all.push_back(value);
+        try {
+            start_(all);
+        } catch (const DomainError&) {
+            name_culprit();
+        }
+    }
+
+    void name_culprit() {
+        const auto require = [&](const ex& formula, const auto& what, Position place) {
+            try {
+                start_({formula});
+            } catch (const DomainError& error) {
+                scene_.source.fail(place, fmt::format("{} at the start, {}: {}; start elsewhere, or mend the formula",
+                                                      what(), values_in(formula), error.what()));
+            }
+        };
+        const Position lagrangian = scene_.lagrangian_at;
+        for (const ex& term : system_.terms)
+            require(
+                term, [&] { return "the Lagrangian has no value because of its term " + short_text(term); },
+                lagrangian);
+        for (std::size_t k = 0; k < system_.outer_force.size(); ++k) {
+            const ex& force = system_.outer_force[k];
+            const std::string on = "the force on " + scene_.coordinates[k].written;
+            const Position place = scene_.coordinates[k].force_at;
+            require(
+                force, [&] { return on + " has no value"; }, place);
+            for (const auto* symbols : {&system_.q, &system_.v})
+                for (const auto& symbol : *symbols)
+                    require(
+                        force.diff(symbol), [&] { return on + " has no derivative in " + symbol.get_name(); }, place);
+        }
+        const auto first = [&](const GiNaC::symbol& by, const ex& value) {
+            require(
+                value,
+                [&] {
+                    return fmt::format("the derivative dL/d{} = {} has no value", by.get_name(), short_text(value));
+                },
+                lagrangian);
+        };
+        for (std::size_t k = 0; k < system_.momentum.size(); ++k) {
+            first(system_.v[k], system_.momentum[k]);
+            first(system_.q[k], system_.force[k]);
+        }
+        const auto second = [&](const SparseMatrix& matrix, const auto& of, const auto& by) {
+            for (const auto& [place, value] : matrix.entries())
+                require(
+                    value,
+                    [&, row = place.first, column = place.second, entry = value] {
+                        return fmt::format("the second derivative d2L/d{}d{} = {} has no value", of[at(row)].get_name(),
+                                           by[at(column)].get_name(), short_text(entry));
+                    },
+                    lagrangian);
+        };
+        second(system_.momentum_v, system_.v, system_.v);
+        second(system_.momentum_q, system_.v, system_.q);
+        second(system_.force_v, system_.q, system_.v);
+        second(system_.force_q, system_.q, system_.q);
+        throw std::logic_error("formulas have no values together, but each by itself");
+    }
+
+    Elimination eliminate_mass(const std::vector<cln::cl_R>& right) const {
+        const std::vector<Sized> values = start_.evaluate_sized(mass_);
+        std::map<std::pair<int, int>, Sized> matrix;
+        for (std::size_t i = 0; i < mass_places_.size(); ++i) matrix[mass_places_[i]] = values[i];
+        return eliminate(matrix, right);
+    }
+
+    void require_mass() const {
+        const Elimination elimination = eliminate_mass(Numbers(system_.q.size(), cln::cl_R(0)));
+        if (!elimination.singular) return;
+        ex held = 0;
+        for (const ex& value : mass_values_) held += GiNaC::pow(value, 2);
+        const bool everywhere =
+            std::none_of(system_.q.begin(), system_.q.end(), [&](const auto& q) { return held.has(q); });
+        refuse(fmt::format("the mass matrix is singular at the start, {}: no kinetic energy opposes the direction {}{}",
+                           values_in(held), direction_text(system_, elimination.vector),
+                           everywhere ? "; give it mass, or remove a coordinate"
+                                      : " there; start elsewhere, or choose coordinates that are regular there (x and "
+                                        "y instead of an angle at its pole)"));
+    }
+
+    // p(v) - p0, and the sum of its squares.
+    struct Residual {
+        Numbers vector;
+        cln::cl_R square = 0;
+        bool vanishes = true;
+    };
+    std::optional<Residual> residual(const Numbers& velocity, const Numbers& wanted) {
+        for (std::size_t k = 0; k < velocity.size(); ++k) start_.set(system_.v[k], velocity[k]);
+        try {
+            const std::vector<Sized> p = start_.evaluate_sized(momentum_);
+            Residual result;
+            for (std::size_t k = 0; k < p.size(); ++k) {
+                result.vector.push_back(p[k].value - wanted[k]);
+                result.square = result.square + cln::square(result.vector[k]);
+                result.vanishes = result.vanishes && p[k].equals({wanted[k], cln::abs(wanted[k])});
+            }
+            return result;
+        } catch (const std::exception&) {  // DomainError; CLN's own when a velocity leaves its range
+            return std::nullopt;
+        }
+    }
+
+    // Newton's method for dL/dv = p0 from v = 0, its steps halved until the residual falls: what kernels do too.
+    void find_velocities() {
+        Numbers wanted;
+        for (std::size_t k = 0; k < scene_.initial_rate.size(); ++k)
+            wanted.push_back(value_of(scene_.initial_rate[k], "the initial momentum of " + scene_.coordinates[k].name));
+        Numbers velocity(wanted.size(), cln::cl_R(0));
+        std::optional<Residual> here = residual(velocity, wanted);
+        for (int iteration = 0; here && !here->vanishes; ++iteration) {
+            const Elimination step = eliminate_mass(here->vector);
+            if (step.singular || iteration == 100) refuse_momentum(wanted, *here);
+            cln::cl_RA fraction = 1;
+            for (int halvings = 0;; ++halvings, fraction = fraction / 2) {
+                if (halvings == 60) refuse_momentum(wanted, *here);
+                Numbers trial;
+                for (std::size_t k = 0; k < velocity.size(); ++k)
+                    trial.push_back(velocity[k] - fraction * step.vector[k]);
+                std::optional<Residual> there = residual(trial, wanted);
+                if (!there || there->square > here->square * (1 - fraction / 8)) continue;
+                velocity = trial;
+                here = there;
+                break;
+            }
+        }
+    }
+
+    [[noreturn]] void refuse_momentum(const Numbers& wanted, const Residual& nearest) const {
+        std::size_t worst = 0;
+        for (std::size_t k = 1; k < wanted.size(); ++k)
+            if (cln::abs(nearest.vector[k]) > cln::abs(nearest.vector[worst])) worst = k;
+        const Coordinate& coordinate = scene_.coordinates[worst];
+        scene_.source.fail(
+            coordinate.rate_at,
+            fmt::format("no velocity has this momentum: p_{0} = dL/d{1} = {2} comes no nearer to {3} than {4:.6g}; "
+                        "give a momentum that a velocity has, or the velocity itself",
+                        coordinate.name, coordinate.velocity.get_name(), short_text(system_.momentum[worst]),
+                        decimal(wanted[worst], 6), cln::double_approx(wanted[worst] + nearest.vector[worst])));
+    }
+
+    const Scene& scene_;
+    const System& system_;
+    Formulas start_;
+    std::vector<std::pair<int, int>> mass_places_;
+    std::vector<ex> mass_values_;
+    std::vector<Id> momentum_, mass_;
+};
+
+}  // namespace
+
+void check_start(const Scene& scene, const System& system) {
+    StartCheck(scene, system).run();
+}
+
+}  // namespace lobatto

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Whether a motion can begin where a scene lets it begin.
+#pragma once
+
+#include "generator/mechanics/system.hpp"
+
+namespace lobatto {
+
+// At the scene's start, to 60 digits: L, the forces and all their derivatives are finite and real, the mass matrix
+// dp/dv has an inverse, and where the scene gives momenta there are velocities with p = dL/dv. Else InputError.
+void check_start(const Scene& scene, const System& system);
+
+}  // namespace lobatto

@@ -1,0 +1,535 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What a scene's system lets the kernel leave out, each finding with its reason.
+#include "generator/mechanics/structure.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "generator/formula/expansion.hpp"
+#include "generator/graph/notation.hpp"
+#include "generator/mechanics/routhian.hpp"
+#include "generator/mechanics/sample.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+bool has_any(const ex& expression, const std::vector<GiNaC::symbol>& symbols) {
+    return std::any_of(symbols.begin(), symbols.end(), [&](const auto& symbol) { return expression.has(symbol); });
+}
+
+std::optional<ClosedSolution> closed_solution(const System& system) {
+    if (system.n != 1 || !system.separable || !system.autonomous) return std::nullopt;
+    const ex q = system.q[0];
+    const ex acceleration = expanded(system.gradient[0] / system.mass(0, 0));  // -q''
+    for (const auto& [kind, shape] :
+         {std::pair<ClosedSolution::Kind, ex>{ClosedSolution::Kind::harmonic, q},
+          std::pair<ClosedSolution::Kind, ex>{ClosedSolution::Kind::pendulum, GiNaC::sin(q)}}) {
+        const ex omega_squared = expanded(acceleration / shape);
+        if (!omega_squared.is_zero() && !has_any(omega_squared, system.q)) return ClosedSolution{kind, omega_squared};
+    }
+    return std::nullopt;
+}
+
+// Couplings between coordinates: who occurs in whose equations.
+class Couplings {
+public:
+    explicit Couplings(std::size_t count) : neighbours_(count) {}
+    void add(int a, int b) {
+        if (a == b) return;
+        neighbours_[static_cast<std::size_t>(a)].insert(b);
+        neighbours_[static_cast<std::size_t>(b)].insert(a);
+    }
+
+    // Connected components, each in the order of Cuthill and McKee reversed: breadth first from a far end, neighbours
+    // with few neighbours first.
+    std::vector<Group> groups() const {
+        std::vector<Group> result;
+        std::vector<bool> known(neighbours_.size(), false);
+        for (std::size_t first = 0; first < neighbours_.size(); ++first) {
+            if (known[first]) continue;
+            Group natural;
+            natural.coordinates = breadth_first(static_cast<int>(first));
+            for (const int k : natural.coordinates) known[static_cast<std::size_t>(k)] = true;
+            Group ordered;
+            ordered.coordinates = breadth_first(breadth_first(natural.coordinates.back()).back());
+            std::reverse(ordered.coordinates.begin(), ordered.coordinates.end());
+            std::sort(natural.coordinates.begin(), natural.coordinates.end());
+            natural.bandwidth = bandwidth(natural.coordinates);
+            ordered.bandwidth = bandwidth(ordered.coordinates);
+            result.push_back(ordered.bandwidth < natural.bandwidth ? ordered : natural);
+        }
+        return result;
+    }
+
+private:
+    std::vector<int> breadth_first(int start) const {
+        std::vector<int> order{start};
+        std::set<int> seen{start};
+        for (std::size_t next = 0; next < order.size(); ++next) {
+            const auto& here = neighbours_[static_cast<std::size_t>(order[next])];
+            std::vector<int> fresh;
+            for (const int k : here)
+                if (seen.insert(k).second) fresh.push_back(k);
+            std::stable_sort(fresh.begin(), fresh.end(), [&](int a, int b) { return degree(a) < degree(b); });
+            order.insert(order.end(), fresh.begin(), fresh.end());
+        }
+        return order;
+    }
+    std::size_t degree(int k) const { return neighbours_[static_cast<std::size_t>(k)].size(); }
+    int bandwidth(const std::vector<int>& order) const {
+        std::map<int, int> place;
+        for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
+        int widest = 0;
+        for (const int k : order)
+            for (const int other : neighbours_[static_cast<std::size_t>(k)])
+                widest = std::max(widest, std::abs(place.at(k) - place.at(other)));
+        return widest;
+    }
+
+    std::vector<std::set<int>> neighbours_;
+};
+
+class Finder {
+public:
+    Finder(const Scene& scene, const System& system, const Quadrature& quadrature, bool general)
+        : scene_(scene),
+          system_(system),
+          quadrature_(quadrature),
+          n_(system.n),
+          interior_(n_ * (quadrature.points - 2)) {
+        result_.general = general;
+    }
+
+    Structure run() {
+        result_.is_explicit = quadrature_.is_explicit();
+        result_.clean = scene_.method.arithmetic == StepArithmetic::clean && !result_.general;
+        result_.linear = system_.linear && !result_.general && !result_.clean;
+        result_.closed_solution = closed_solution(system_);
+        choose_form();
+        if (result_.form == Form::general)
+            general();
+        else
+            separable();
+        time_and_forces();
+        solution();
+        return std::move(result_);
+    }
+
+private:
+    void find(const std::string& name, bool holds, const std::string& reason) {
+        result_.findings.push_back({name, holds, reason});
+    }
+    std::string name(int k) const { return system_.q[static_cast<std::size_t>(k)].get_name(); }
+    // x, y, z and 9 more
+    template <class List>
+    std::string names(const List& list) const {
+        std::string text;
+        std::size_t shown = 0;
+        for (const int k : list) {
+            if (shown == 6 && list.size() > 7) return text + fmt::format(" and {} more", list.size() - shown);
+            text += (shown++ == 0 ? "" : ", ") + name(k);
+        }
+        return text;
+    }
+
+    void choose_form() {
+        if (result_.general) {
+            result_.form = Form::general;
+            find("general path", true,
+                 "asked for: nothing is looked for, all nodes of a step are solved for with full matrices");
+            return;
+        }
+        find("constant mass matrix", system_.separable,
+             system_.separable ? "the masses are the same everywhere, so the end of a step needs no equations"
+                               : system_.not_separable + ", so the end of a step is solved for with the points inside");
+        const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
+                                          [](const auto& entry) { return entry.first.first == entry.first.second; });
+        result_.diagonal_mass = system_.separable && diagonal;
+        result_.unrolled = interior_ <= unrolled_limit && !result_.clean && !result_.is_explicit;
+        if (result_.clean) {
+            find("round-off-clean arithmetic", true,
+                 "asked for: every step is iterated until nothing changes and its increments are added without error, "
+                 "so that rounding errors grow like a random walk");
+            return;
+        }
+        const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
+        if (!system_.separable || (!result_.diagonal_mass && !result_.unrolled && !result_.is_explicit))
+            result_.form = Form::general;
+        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted &&
+                 (result_.diagonal_mass || result_.unrolled))
+            result_.form = Form::linear_map;
+        if (!result_.is_explicit) return;
+        result_.linear = result_.form == Form::linear_map;
+        find("explicit steps", true,
+             "asked for: positions and velocities move in turn, straight from node to node, and nothing is solved for");
+    }
+
+    void separable() {
+        std::string coupling;
+        for (const auto& [place, value] : system_.mass.entries())
+            if (place.first < place.second && coupling.empty())
+                coupling = fmt::format("L holds {}'*{}' with the factor {}", name(place.first), name(place.second),
+                                       canonical_text(value));
+        if (n_ > 1)
+            find("diagonal mass matrix", result_.diagonal_mass,
+                 result_.diagonal_mass
+                     ? "no two velocities are multiplied: each momentum is its own mass times velocity"
+                     : coupling);
+        linearity();
+        // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has
+        // one.
+        if (result_.diagonal_mass) {
+            for (const auto& [place, value] : system_.hessian.entries()) result_.entries.push_back(place);
+        } else {
+            std::set<int> columns;
+            for (const auto& [place, value] : system_.hessian.entries()) columns.insert(place.second);
+            for (int i = 0; i < n_; ++i)
+                for (const int j : columns) result_.entries.emplace_back(i, j);
+        }
+        const bool full = result_.entries.size() == static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_);
+        if (n_ > 1)
+            find("sparse second derivatives", !full,
+                 full ? fmt::format("all {} entries of M^-1 V'' occur", n_ * n_)
+                      : fmt::format("{} of {} entries of M^-1 V'' are not zero, and only they are computed",
+                                    result_.entries.size(), n_ * n_));
+        std::set<int> free;
+        for (int k = 0; k < n_; ++k) free.insert(k);
+        for (const auto& [place, value] : system_.hessian.entries()) {
+            free.erase(place.first);
+            free.erase(place.second);
+        }
+        for (int k = 0; k < n_; ++k)
+            if (!system_.gradient[static_cast<std::size_t>(k)].is_zero()) free.erase(k);
+        if (!result_.diagonal_mass) free.clear();
+        find("cyclic coordinates", !free.empty(),
+             free.empty() ? "no coordinate is without a force"
+                          : names(free) + ": without a force, so the motion is uniform and nothing is solved for");
+        Couplings couplings(static_cast<std::size_t>(n_));
+        for (const auto& [row, column] : result_.entries) couplings.add(row, column);
+        result_.groups = couplings.groups();
+        if (!result_.is_explicit) describe_groups();
+        if (result_.form == Form::linear_map) return;
+        repetition();
+        absorption();
+        neighbourhood();
+        if (result_.clean || result_.is_explicit) return;
+        find("small enough to write out", result_.unrolled,
+             result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
+                                            interior_, unrolled_limit)
+                              : fmt::format("{} unknowns a step, more than {}: loops over points and coordinates",
+                                            interior_, unrolled_limit));
+    }
+
+    void general() {
+        result_.unrolled = false;
+        const std::vector<int> cyclic = result_.general ? std::vector<int>{} : find_cyclic(scene_, system_);
+        result_.routhian = reduce(system_, cyclic);
+        const int active = static_cast<int>(result_.routhian.active.size());
+        if (result_.general) {
+            Group all;
+            for (int k = 0; k < active; ++k) all.coordinates.push_back(k);
+            all.bandwidth = active - 1;
+            result_.groups = {all};
+            return;
+        }
+        linearity();
+        find("cyclic coordinates", !cyclic.empty(),
+             cyclic.empty()
+                 ? "every coordinate itself occurs, or its velocity more than squared, or its mass may vanish"
+                 : names(cyclic) +
+                       ": L holds only the velocity, so the momentum is constant and the motion "
+                       "follows from it without equations");
+        Couplings couplings(static_cast<std::size_t>(active));
+        for (const auto& [place, value] : result_.routhian.second.entries())
+            if (place.first < 2 * active && place.second < 2 * active)
+                couplings.add(place.first % active, place.second % active);
+        result_.groups = couplings.groups();
+        if (!cyclic.empty() && result_.groups.size() > 1) {  // one multiplier may couple all of them
+            Group all;
+            for (const Group& group : result_.groups)
+                all.coordinates.insert(all.coordinates.end(), group.coordinates.begin(), group.coordinates.end());
+            all.bandwidth = active - 1;
+            result_.groups = {all};
+        }
+        const std::size_t size = result_.routhian.z.size();
+        const std::size_t present = result_.routhian.second.entries().size();
+        find("sparse second derivatives", present < size * size,
+             present == size * size
+                 ? fmt::format("all {} second derivatives of L occur", present)
+                 : fmt::format("{} of {} second derivatives of L are not zero, and only they are computed", present,
+                               size * size));
+        describe_groups();
+        if (cyclic.empty()) repetition();
+    }
+
+    // Terms of V, or of L, that are one formula of many variables.
+    void repetition() {
+        const bool general = result_.form == Form::general;
+        if (result_.form == Form::linear_map || (!general && (result_.unrolled || !result_.diagonal_mass))) return;
+        std::vector<ex> terms;
+        std::vector<std::pair<int, ex>> forces;
+        for (const ex& term : general ? system_.terms : all_at(system_.terms, system_.v, 0))
+            if (!term.is_zero()) terms.push_back(general ? term : -term);
+        std::vector<GiNaC::symbol> all = system_.q;
+        all.insert(all.end(), system_.v.begin(), system_.v.end());
+        for (int k = 0; k < n_; ++k) {
+            const ex& force = system_.outer_force[static_cast<std::size_t>(k)];
+            if (force.is_zero()) continue;
+            for (const ex& term : terms_of(force, all)) forces.emplace_back(general ? n_ + k : k, term);
+        }
+        const std::size_t count = terms.size() + forces.size();
+        if (count < looped_from) return;
+        Elements elements = find_elements(system_, general ? result_.routhian.z : system_.q, terms, forces);
+        const std::size_t single = elements.others.size() + elements.other_forces.size();
+        result_.looped = 4 * single <= count;
+        if (result_.looped) result_.elements = std::move(elements);
+        const std::size_t formulas = result_.elements.repeated.size();
+        find("repeated terms", result_.looped,
+             result_.looped ? fmt::format("{} of {} terms of L are {}, computed in loops over tables", count - single,
+                                          count, formulas == 1 ? "one formula" : fmt::format("{} formulas", formulas))
+                            : fmt::format("of {} terms of L {} are unlike all others", count, single));
+    }
+
+    // The quadratic part of V: worth taking out of the iteration when the rest bends the forces less at the start.
+    void absorption() {
+        if (result_.linear || result_.clean || result_.is_explicit || interior_ == 0 || !result_.diagonal_mass) return;
+        result_.constant_hessian = SparseMatrix(n_, n_);
+        std::vector<GiNaC::symbol> variables = system_.q;
+        variables.push_back(system_.t);
+        std::vector<ex> whole, rest;
+        bool diagonal = true;
+        const ConstantPart constant_part(variables);
+        for (const auto& [place, value] : system_.hessian.entries()) {
+            const ex constant = constant_part.of(value);
+            if (!constant.is_zero()) {
+                result_.constant_hessian.put(place.first, place.second, constant);
+                diagonal = diagonal && place.first == place.second;
+            }
+            const ex mass = system_.mass(static_cast<std::size_t>(place.first), static_cast<std::size_t>(place.first));
+            whole.push_back(value / mass);
+            rest.push_back((value - constant) / mass);
+        }
+        if (result_.constant_hessian.entries().empty()) {
+            find("quadratic part absorbed", false, "V has no quadratic part");
+            return;
+        }
+        double with = 1, without = 1;
+        try {
+            with = contraction_of(rest);
+            without = contraction_of(whole);
+        } catch (const DomainError&) {  // then as if there were no quadratic part
+        }
+        result_.diagonal_part = diagonal && with < without;
+        result_.absorbed = !result_.unrolled && !result_.diagonal_part && with < 0.1;
+        std::string reason = fmt::format(
+            "without its quadratic part V bends the forces as much at the start, so nothing is taken out of the "
+            "iteration");
+        if (result_.diagonal_part)
+            reason = fmt::format(
+                "the constant part of V'' is diagonal and taken into the stage map: at the start a sweep "
+                "leaves {:.1g} of the error, not {:.1g}",
+                with, without);
+        else if (result_.absorbed)
+            reason = fmt::format(
+                "V is nearly quadratic at the start, so that where sweeps do not contract one matrix serves "
+                "all iterations: one leaves {:.1g} of the error there",
+                with);
+        else if (!diagonal)
+            reason = "the constant part of V'' couples coordinates, and the rest is no small part of the forces";
+        find("quadratic part absorbed", result_.diagonal_part || result_.absorbed, reason);
+    }
+
+    void neighbourhood() {
+        if (!result_.looped || result_.linear || result_.clean) return;
+        result_.neighbours = !result_.general && !result_.diagonal_part && are_neighbours(result_.elements);
+        find("neighbouring coordinates", result_.neighbours,
+             result_.neighbours      ? "formulas go along coordinates that stand side by side: vector lanes hold these"
+             : result_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
+                                     : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
+        if (!result_.neighbours) return;
+        result_.walls = walls_of(result_.elements, system_.q);
+        const bool before = result_.walls.before, behind = result_.walls.behind;
+        if (before || behind)
+            find("walls", true,
+                 (before && behind ? "both ends hang on them"
+                  : before         ? name(0) + " hangs on one"
+                                   : name(static_cast<int>(system_.q.size()) - 1) + " hangs on one") +
+                     std::string(" by the formula of neighbours, in whose loop it goes along"));
+    }
+
+    // h^2 |A| |entries|, where those of M^-1 V'' stand, at the start; norms of largest row sums.
+    double contraction_of(const std::vector<ex>& entries) const {
+        Formulas formulas;
+        for (const Parameter& parameter : scene_.parameters)
+            formulas.set(parameter.symbol,
+                         float_of(scene_.evaluate(parameter.value, "the parameter " + parameter.name)));
+        for (std::size_t k = 0; k < scene_.coordinates.size(); ++k)
+            formulas.set(system_.q[k], float_of(scene_.evaluate(scene_.initial_position[k], "the initial position")));
+        formulas.set(system_.t, cln::cl_float(0, cln::float_format(number_digits)));
+        const std::vector<cln::cl_R> values = formulas(entries);
+        std::map<int, double> rows;
+        std::size_t e = 0;
+        for (const auto& [place, value] : system_.hessian.entries())
+            rows[place.first] += std::fabs(cln::double_approx(values[e++]));
+        double largest = 0, stage = 0;
+        for (const auto& [row, sum] : rows) largest = std::max(largest, sum);
+        for (unsigned i = 0; i < quadrature_.A.rows(); ++i) {
+            double sum = 0;
+            for (unsigned j = 0; j < quadrature_.A.cols(); ++j)
+                sum += std::fabs(GiNaC::ex_to<GiNaC::numeric>(quadrature_.A(i, j).evalf()).to_double());
+            stage = std::max(stage, sum);
+        }
+        const double h = scene_.evaluate(scene_.run.step, "the step").to_double();
+        return h * h * stage * largest;
+    }
+
+    void linearity() {
+        std::string reason = "all forces are linear, so a step is one matrix: nothing is iterated";
+        if (result_.linear && result_.form != Form::linear_map)
+            reason = "all forces are linear, so one solve a step is exact, its matrix factored once for all steps";
+        if (result_.is_explicit && system_.linear && !result_.linear) return;  // of no use
+        if (!result_.linear) reason = curved();
+        find("linear system", result_.linear, reason);
+    }
+
+    // A second derivative that is not constant: "d2V/dadb = 2*a depends on the position".
+    std::string curved() const {
+        const auto blocks =
+            system_.separable
+                ? std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&system_.hessian, 0, 0}}
+                : std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&system_.momentum_v, true, true},
+                                                                           {&system_.momentum_q, true, false},
+                                                                           {&system_.force_v, false, true},
+                                                                           {&system_.force_q, false, false}};
+        const std::string of = system_.separable ? "V" : "L";
+        for (const auto& [matrix, by_velocity, then_velocity] : blocks)
+            for (const auto& [place, value] : matrix->entries()) {
+                const char* on = has_any(value, system_.q)   ? "position"
+                                 : has_any(value, system_.v) ? "velocity"
+                                 : value.has(system_.t)      ? "time"
+                                                             : nullptr;
+                if (on == nullptr) continue;
+                const std::string row = name(place.first), column = name(place.second) + (then_velocity ? "'" : "");
+                const bool outer =
+                    !by_velocity && !system_.outer_force[static_cast<std::size_t>(place.first)].is_zero();
+                const std::string text = canonical_text(outer && system_.separable ? -value : value),
+                                  formula = text.size() > 80 ? "" : " = " + text;
+                const std::string slope = outer ? fmt::format("df_{}/d{}", row, column)
+                                                : fmt::format("d2{}/d{}{}d{}", of, row, by_velocity ? "'" : "", column);
+                return fmt::format("{}{} depends on the {}", slope, formula, on);
+            }
+        return "a force depends on the time";
+    }
+
+    void describe_groups() {
+        if (n_ == 1 || (result_.form == Form::general && result_.routhian.active.size() == 1)) return;
+        const std::size_t count = result_.groups.size();
+        const auto& in = result_.form == Form::general ? result_.routhian.active : std::vector<int>{};
+        const auto listed = [&](const Group& group) {
+            std::vector<int> coordinates;
+            for (const int k : group.coordinates)
+                coordinates.push_back(in.empty() ? k : in[static_cast<std::size_t>(k)]);
+            return names(coordinates);
+        };
+        std::string reason;
+        if (count == 1) {
+            reason = "all coordinates act on one another";
+        } else {
+            for (std::size_t g = 0; g < count && g < 4; ++g)
+                reason += (g == 0 ? "{" : ", {") + listed(result_.groups[g]) + "}";
+            reason += count > 4 ? fmt::format(" and {} more", count - 4) : "";
+            reason += " do not act on one another: each is solved by itself";
+        }
+        find("independent groups", count > 1, reason);
+        int widest = 0;
+        std::size_t largest = 0;
+        for (const Group& group : result_.groups) {
+            widest = std::max(widest, group.bandwidth);
+            largest = std::max(largest, group.coordinates.size());
+        }
+        if (largest == 1) return;
+        const bool banded = 3 * widest + 3 < static_cast<int>(largest);
+        find("banded equations", banded,
+             fmt::format("in a good order only coordinates at most {} apart, of {}, act on one another{}", widest,
+                         largest, banded ? ": only this band is stored and solved" : ""));
+    }
+
+    void time_and_forces() {
+        find("no explicit time", system_.autonomous,
+             system_.autonomous ? "nothing depends on the time itself: no formula takes it"
+                                : "L, a force or an event depends on the time: every formula is given it");
+        std::vector<int> driven;
+        for (int k = 0; k < n_; ++k)
+            if (!system_.outer_force[static_cast<std::size_t>(k)].is_zero()) driven.push_back(k);
+        find("no forces", driven.empty(),
+             driven.empty() ? "all forces come from L, so every step is symplectic"
+                            : "forces beside L act on " + names(driven) + ", so energy is gained or lost");
+        if (!scene_.constants.empty()) {
+            std::string list;
+            for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;
+            find("constant parameters", true, list + ": numbers in the formulas, not arguments of them");
+        }
+    }
+
+    void solution() {
+        const bool closed = result_.closed_solution.has_value();
+        find("solution in closed form", closed,
+             closed ? (result_.closed_solution->kind == ClosedSolution::Kind::harmonic
+                           ? "q'' = -w2*q"
+                           : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
+                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared)
+                    : "this is neither a harmonic oscillator nor a plane pendulum");
+    }
+
+    const Scene& scene_;
+    const System& system_;
+    const Quadrature& quadrature_;
+    const int n_, interior_;
+    Structure result_;
+};
+
+}  // namespace
+
+ConstantPart::ConstantPart(const std::vector<GiNaC::symbol>& variables) {
+    for (const auto& symbol : variables) variables_.insert(symbol);
+}
+
+bool ConstantPart::holds_variable(const ex& value) const {
+    for (auto part = value.preorder_begin(); part != value.preorder_end(); ++part)
+        if (GiNaC::is_a<GiNaC::symbol>(*part) && variables_.contains(*part)) return true;
+    return false;
+}
+
+ex ConstantPart::of(const ex& value) const {
+    if (!holds_variable(value)) return value;
+    if (GiNaC::is_a<GiNaC::add>(value)) {
+        ex constant = 0;
+        for (const ex& term : value) constant += of(term);
+        return constant;
+    }
+    // A factor before a sum: m (1 + q^2).
+    if (!GiNaC::is_a<GiNaC::mul>(value)) return 0;
+    ex factor = 1, sum = 0;
+    for (const ex& part : value) {
+        if (!holds_variable(part))
+            factor *= part;
+        else if (GiNaC::is_a<GiNaC::add>(part) && sum.is_zero())
+            sum = part;
+        else
+            return 0;
+    }
+    return factor * of(sum);
+}
+
+Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general) {
+    return Finder(scene, system, quadrature, general).run();
+}
+
+}  // namespace lobatto

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The mechanical system of a scene: L(q, q', t) and forces, their first and second derivatives, and of what kind they
+// are.
+//
+// Derivatives are taken symbolically, term by term. Whether one vanishes, or depends on q, v or t, is told by its
+// values at seeded points to 60 digits: a formula that is zero only after simplification is recognised, and nothing is
+// expanded.
+#include "generator/mechanics/system.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "generator/graph/notation.hpp"
+#include "generator/mechanics/elimination.hpp"
+#include "generator/mechanics/sample.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+using GiNaC::exvector;
+using Symbols = std::vector<GiNaC::symbol>;
+
+[[noreturn]] void refuse(const Scene& scene, const std::string& reason) {
+    scene.source.fail(scene.lagrangian_at, "the Lagrangian " + reason);
+}
+
+// The variables that an expression holds, as indices in ascending order.
+class Occurrences {
+public:
+    explicit Occurrences(const Symbols& variables) {
+        for (std::size_t i = 0; i < variables.size(); ++i) index_[variables[i]] = i;
+    }
+    std::set<std::size_t> in(const ex& expression) const {
+        std::set<std::size_t> found;
+        visit(expression, found);
+        return found;
+    }
+
+private:
+    void visit(const ex& expression, std::set<std::size_t>& found) const {
+        if (GiNaC::is_a<GiNaC::symbol>(expression)) {
+            if (const auto known = index_.find(expression); known != index_.end()) found.insert(known->second);
+            return;
+        }
+        for (std::size_t i = 0; i < expression.nops(); ++i) visit(expression.op(i), found);
+    }
+    std::map<ex, std::size_t, GiNaC::ex_is_less> index_;
+};
+
+// GiNaC goes through the whole of a substitution at every sum and product: only what occurs is put into it.
+ex at(const ex& expression, const Symbols& variables, const Occurrences& occurrences, const ex& value) {
+    GiNaC::exmap found;
+    for (const std::size_t i : occurrences.in(expression)) found[variables[i]] = value;
+    return expression.subs(found, GiNaC::subs_options::no_pattern);
+}
+
+void append_terms(const ex& expression, const Occurrences& occurrences, std::vector<ex>& terms) {
+    if (GiNaC::is_a<GiNaC::add>(expression)) {
+        for (const ex& term : expression) append_terms(term, occurrences, terms);
+        return;
+    }
+    if (GiNaC::is_a<GiNaC::mul>(expression)) {
+        exvector free, bound;
+        for (const ex& factor : expression) (occurrences.in(factor).empty() ? free : bound).push_back(factor);
+        if (bound.size() == 1 && GiNaC::is_a<GiNaC::add>(bound.front())) {
+            std::vector<ex> inner;
+            append_terms(bound.front(), occurrences, inner);
+            const ex coefficient = GiNaC::mul(free);
+            for (const ex& term : inner) terms.push_back(coefficient * term);
+            return;
+        }
+    }
+    terms.push_back(expression);
+}
+
+ex sum_of(const exvector& terms) {
+    return terms.empty() ? ex(0) : ex(GiNaC::add(terms));
+}
+
+// Which of q, v, t the derivatives of a system depend on, from their values at sample points.
+class Dependence {
+public:
+    struct Kind {
+        bool zero = true, on_q = false, on_v = false, on_t = false;
+    };
+
+    Dependence(const Scene& scene, const System& system, const Symbols& motion)
+        : scene_(scene), system_(system), motion_(motion) {}
+
+    // A root or other broken power of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2) does: what
+    // holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a point is
+    // constant.
+    bool is_broken(const ex& expression) const {
+        for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
+            if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::integer) &&
+                !motion_.in(*part).empty())
+                return true;
+        return false;
+    }
+
+    std::vector<Kind> of(const std::vector<ex>& expressions) const {
+        std::vector<Kind> kinds = sampled(expressions);
+        const std::size_t n = system_.q.size();
+        for (std::size_t i = 0; i < kinds.size(); ++i) {
+            if (!is_broken(expressions[i])) continue;
+            kinds[i].zero = false;
+            for (const std::size_t variable : motion_.in(expressions[i]))
+                (variable < n ? kinds[i].on_q : variable < 2 * n ? kinds[i].on_v : kinds[i].on_t) = true;
+        }
+        return kinds;
+    }
+
+private:
+    std::vector<Kind> sampled(const std::vector<ex>& expressions) const {
+        std::vector<Kind> kinds(expressions.size());
+        try {
+            at_sample_points(scene_, [&](NearStart& point) { look(expressions, point, kinds); });
+        } catch (const DomainError& error) {
+            refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
+                                       "from the singularity, or mend the formula",
+                                       error.what()));
+        }
+        return kinds;
+    }
+
+    void look(const std::vector<ex>& expressions, NearStart& point, std::vector<Kind>& kinds) const {
+        Formulas formulas;
+        point.set_all(formulas);
+        const std::vector<Id> roots = formulas.convert(expressions);
+        const std::vector<Sized> here = formulas.evaluate_sized(roots);
+        const auto moved = [&](const Symbols& symbols, bool Kind::*flag) {
+            std::vector<cln::cl_R> before;
+            for (std::size_t k = 0; k < symbols.size(); ++k) {
+                before.push_back(formulas.get(symbols[k]));
+                formulas.set(symbols[k], point.near(before.back()));
+            }
+            const std::vector<Sized> there = formulas.evaluate_sized(roots);
+            for (std::size_t i = 0; i < kinds.size(); ++i)
+                if (!here[i].equals(there[i])) kinds[i].*flag = true;
+            for (std::size_t k = 0; k < symbols.size(); ++k) formulas.set(symbols[k], before[k]);
+        };
+        for (std::size_t i = 0; i < kinds.size(); ++i)
+            if (!here[i].vanishes()) kinds[i].zero = false;
+        moved(system_.q, &Kind::on_q);
+        moved(system_.v, &Kind::on_v);
+        moved({system_.t}, &Kind::on_t);
+    }
+
+    const Scene& scene_;
+    const System& system_;
+    const Occurrences motion_;  // q, v, t
+};
+
+// Refuses a mass matrix that is singular near the start.
+void check_mass(const Scene& scene, const System& system) {
+    std::vector<ex> entries;
+    std::vector<std::pair<int, int>> places;
+    for (const auto& [place, value] : system.momentum_v.entries()) {
+        places.push_back(place);
+        entries.push_back(value);
+    }
+    const auto elimination_at = [&](Formulas& formulas) {
+        const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(entries));
+        std::map<std::pair<int, int>, Sized> matrix;
+        for (std::size_t i = 0; i < places.size(); ++i) matrix[places[i]] = values[i];
+        return eliminate(matrix, std::vector<cln::cl_R>(static_cast<std::size_t>(system.n), cln::cl_R(0)));
+    };
+    for (int attempt = 0;; ++attempt) {
+        try {
+            Formulas formulas;
+            NearStart(scene, attempt).set_all(formulas);
+            const Elimination elimination = elimination_at(formulas);
+            if (elimination.singular)
+                refuse(scene,
+                       "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
+                       "do not follow from momenta. No kinetic energy opposes the direction " +
+                           direction_text(system, elimination.vector) +
+                           "; add the missing mass, or remove a coordinate");
+            break;
+        } catch (const DomainError&) {
+            if (attempt == sample_attempts) throw;
+        }
+    }
+}
+
+std::string slope_text(const std::string& of, const GiNaC::symbol& by, const ex& value) {
+    std::string text = canonical_text(value);
+    if (text.size() > 200) text = "a formula of " + std::to_string(text.size()) + " characters";
+    return "d" + of + "/d" + by.get_name() + " = " + text;
+}
+
+}  // namespace
+
+std::string direction_text(const System& system, const std::vector<cln::cl_R>& direction) {
+    std::string text;
+    int shown = 0;
+    for (std::size_t k = 0; k < direction.size(); ++k) {
+        if (cln::abs(direction[k]) < cln::expt(cln::cl_RA(10), -30)) continue;
+        if (++shown > 8) return text + ", ...";
+        text += (text.empty() ? "" : ", ") + system.v[k].get_name() + " = " + decimal(direction[k], 6);
+    }
+    return text;
+}
+
+std::vector<ex> terms_of(const ex& expression, const Symbols& variables) {
+    std::vector<ex> terms;
+    append_terms(expression, Occurrences(variables), terms);
+    return terms;
+}
+
+std::vector<ex> all_at(const std::vector<ex>& expressions, const Symbols& variables, const ex& value) {
+    const Occurrences occurrences(variables);
+    std::vector<ex> result;
+    for (const ex& expression : expressions) result.push_back(at(expression, variables, occurrences, value));
+    return result;
+}
+
+std::vector<ex> gradient_of(const std::vector<ex>& terms, const Symbols& variables) {
+    const Occurrences occurrences(variables);
+    std::vector<exvector> parts(variables.size());
+    for (const ex& term : terms)
+        for (const std::size_t i : occurrences.in(term)) parts[i].push_back(term.diff(variables[i]));
+    std::vector<ex> gradient;
+    for (const exvector& part : parts) gradient.push_back(sum_of(part));
+    return gradient;
+}
+
+SparseMatrix derivative_of(const std::vector<ex>& vector, const Symbols& variables) {
+    const Occurrences occurrences(variables);
+    SparseMatrix result(static_cast<int>(vector.size()), static_cast<int>(variables.size()));
+    for (std::size_t k = 0; k < vector.size(); ++k) {
+        std::vector<ex> terms;
+        append_terms(vector[k], occurrences, terms);
+        std::map<std::size_t, exvector> parts;
+        for (const ex& term : terms)
+            for (const std::size_t i : occurrences.in(term)) parts[i].push_back(term.diff(variables[i]));
+        for (const auto& [i, part] : parts) {
+            const ex value = sum_of(part);
+            if (!value.is_zero()) result.put(static_cast<int>(k), static_cast<int>(i), value);
+        }
+    }
+    return result;
+}
+
+namespace {
+
+bool mentions(const System& system, const GiNaC::symbol& t) {
+    const auto has = [&](const ex& e) { return e.has(t); };
+    return has(system.lagrangian) || std::any_of(system.outer_force.begin(), system.outer_force.end(), has);
+}
+
+// L(q, q', t) + f(t) moves as L does, and a time that drops out need not be known: any moment will do.
+Scene without_time(const Scene& scene) {
+    const Symbols time{scene.time};
+    const Occurrences occurrences(time);
+    const auto still = [&](const ex& value) {
+        try {
+            return at(value, time, occurrences, 0);
+        } catch (const std::exception&) {  // a pole at the origin: one away from it
+            return at(value, time, occurrences, GiNaC::numeric(1, 2));
+        }
+    };
+    Scene result = scene;
+    result.lagrangian = still(scene.lagrangian);
+    for (Coordinate& coordinate : result.coordinates) coordinate.force = still(coordinate.force);
+    return result;
+}
+
+}  // namespace
+
+bool System::has_forces() const {
+    return std::any_of(outer_force.begin(), outer_force.end(), [](const GiNaC::ex& F) { return !F.is_zero(); });
+}
+
+System build_system(const Scene& scene) {
+    System system;
+    system.n = static_cast<int>(scene.coordinates.size());
+    system.t = scene.time;
+    for (const Coordinate& coordinate : scene.coordinates) {
+        system.q.push_back(coordinate.position);
+        system.v.push_back(coordinate.velocity);
+        system.outer_force.push_back(coordinate.force);
+    }
+    for (const Parameter& parameter : scene.parameters) system.parameters.push_back(parameter.symbol);
+    system.lagrangian = scene.lagrangian;
+    Symbols all = system.q;
+    all.insert(all.end(), system.v.begin(), system.v.end());
+    all.push_back(system.t);
+    system.terms = terms_of(system.lagrangian, all);
+    system.momentum = gradient_of(system.terms, system.v);
+    system.force = gradient_of(system.terms, system.q);
+    for (std::size_t k = 0; k < system.force.size(); ++k) system.force[k] += system.outer_force[k];
+
+    // Derivatives and first-order quantities together, each with what it depends on.
+    const std::array<SparseMatrix, 4> derived = {
+        derivative_of(system.momentum, system.v), derivative_of(system.momentum, system.q),
+        derivative_of(system.force, system.v), derivative_of(system.force, system.q)};
+    const std::array<SparseMatrix*, 4> kept = {&system.momentum_v, &system.momentum_q, &system.force_v,
+                                               &system.force_q};
+    std::vector<ex> looked_at = system.momentum;
+    looked_at.insert(looked_at.end(), system.force.begin(), system.force.end());
+    const std::size_t first_order = looked_at.size();
+    for (const SparseMatrix& matrix : derived)
+        for (const auto& [place, value] : matrix.entries()) looked_at.push_back(value);
+    const Dependence dependence(scene, system, all);
+    const std::vector<Dependence::Kind> kinds = dependence.of(looked_at);
+
+    // A value that does not depend on what its formula mentions is written without it.
+    const Occurrences of_motion(all);
+    const auto constant_form = [&](const ex& value) {
+        try {
+            return at(value, all, of_motion, 0);
+        } catch (const std::exception&) {  // a pole at the origin: one away from it
+            return at(value, all, of_motion, GiNaC::numeric(1, 2));
+        }
+    };
+    const auto coordinate_of = [&](std::size_t k) { return system.q[k].get_name(); };
+    system.linear = true;
+    system.separable = true;
+    const auto reason = [&](const std::string& why) {
+        if (system.separable) system.not_separable = why;
+        system.separable = false;
+    };
+    std::size_t next = first_order;
+    for (std::size_t block = 0; block < derived.size(); ++block) {
+        *kept[block] = SparseMatrix(system.n, system.n);
+        for (const auto& [place, value] : derived[block].entries()) {
+            const Dependence::Kind& kind = kinds[next++];
+            if (kind.zero) continue;
+            const bool constant = !kind.on_q && !kind.on_v && !kind.on_t;
+            const ex kept_value = constant ? constant_form(value) : value;
+            kept[block]->put(place.first, place.second, kept_value);
+            system.linear = system.linear && constant;
+            const std::string of = (block < 2 ? "p_" : "f_") + coordinate_of(static_cast<std::size_t>(place.first));
+            const GiNaC::symbol& by =
+                (block == 0 || block == 2 ? system.v : system.q)[static_cast<std::size_t>(place.second)];
+            const auto text = [&] { return slope_text(of, by, kept_value); };
+            if (block == 0 && !constant && system.separable)
+                reason(text() + (kind.on_v   ? " depends on the velocity"
+                                 : kind.on_q ? " depends on the position"
+                                             : " depends on the time"));
+            if (block == 1 && system.separable) reason(text() + ": the momentum depends on the position");
+            if (block == 2 && system.separable) reason(text() + ": the force depends on the velocity");
+        }
+    }
+    for (std::size_t i = 0; i < first_order; ++i) {
+        ex& value = i < system.momentum.size() ? system.momentum[i] : system.force[i - system.momentum.size()];
+        if (kinds[i].zero) value = 0;
+        if (kinds[i].on_t) system.autonomous = false;
+        if (!dependence.is_broken(value)) continue;
+        system.linear = false;
+        if (kinds[i].on_v && i >= system.momentum.size())
+            reason("f_" + coordinate_of(i - system.momentum.size()) + ": the force depends on the velocity");
+    }
+    for (const Event& event : scene.outputs.events)
+        if (event.value.has(system.t)) system.autonomous = false;  // events are given the time with everything else
+    if (system.autonomous && mentions(system, system.t)) return build_system(without_time(scene));
+    check_mass(scene, system);
+
+    // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
+    if (system.separable) {
+        std::vector<ex> at_zero;
+        try {
+            at_zero = all_at(system.momentum, system.v, 0);
+            all_at({system.lagrangian}, system.v, 0);
+        } catch (const std::domain_error&) {  // however small, a term that is infinite at rest, or 0^0
+            reason("the Lagrangian has no value at rest");
+            at_zero.clear();
+        }
+        const std::vector<Dependence::Kind> rest = dependence.of(at_zero);
+        for (std::size_t k = 0; k < rest.size(); ++k)
+            if (!rest[k].zero && system.separable)
+                reason("p_" + coordinate_of(k) + " = " + canonical_text(at_zero[k]) + " at rest");
+    }
+    if (!system.separable) return system;
+    system.mass = system.momentum_v;
+    system.potential = -at(system.lagrangian, system.v, Occurrences(system.v), 0);
+    system.hessian = SparseMatrix(system.n, system.n);
+    for (const ex& force : system.force) system.gradient.push_back(-force);
+    for (const auto& [place, value] : system.force_q.entries()) system.hessian.put(place.first, place.second, -value);
+    return system;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "generator/method/method.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "generator/method/splitting.hpp"
+
+namespace lobatto {
+
+const char* word_of(Family family) {
+    return family == Family::lobatto ? "lobatto" : family == Family::gauss ? "gauss" : "splitting";
+}
+
+Family family_of(const std::string& word) {
+    for (const Family family : {Family::lobatto, Family::gauss, Family::splitting})
+        if (word == word_of(family)) return family;
+    throw std::invalid_argument(word + " is no family of methods");
+}
+
+const std::vector<int>& sizes_of(Family family) {
+    static const std::vector<int> lobatto = {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12},
+                                  gauss = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+    return family == Family::lobatto ? lobatto : family == Family::gauss ? gauss : splitting_stages();
+}
+
+int Method::order() const {
+    switch (family) {
+        case Family::lobatto:
+            return 2 * points - 2;
+        case Family::gauss:
+            return 2 * points;
+        default:
+            return splitting_order(points);
+    }
+}
+
+std::string Method::name() const {
+    const std::string suffix = arithmetic == StepArithmetic::clean ? ", clean" : "";
+    switch (family) {
+        case Family::lobatto:
+            return fmt::format("Lobatto, {} points{}", points, suffix);
+        case Family::gauss:
+            return fmt::format("Gauss, {} {}{}", points, points == 1 ? "stage" : "stages", suffix);
+        default:
+            return fmt::format("splitting, {} stages{}", points, suffix);
+    }
+}
+
+}  // namespace lobatto

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The programs of any other Lagrangian: one node's slopes and second derivatives in z = (v, q, P), from which the
+// support header assembles the equations of a step (D25 ... D30).
+#include "generator/mechanics/sample.hpp"
+#include "generator/programs/builder.hpp"
+#include "generator/programs/identifier.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+class GeneralBuilder : public ProgramBuilder {
+public:
+    using ProgramBuilder::ProgramBuilder;
+
+    Programs build() {
+        node();
+        velocities_as_inputs();
+        mechanics();
+        events();
+        return std::move(p_);
+    }
+
+private:
+    // g = dR/dz with the forces beside dR/dq, and its derivative.
+    void node() {
+        const Routhian& routhian = d_.structure.routhian;
+        const std::size_t active = routhian.active.size();
+        const GiNaC::exmap before = symbols_;
+        for (std::size_t i = 0; i < routhian.z.size(); ++i) {
+            const std::size_t kind = i / active;  // 0: v, 1: q, 2: P
+            const std::vector<int>& coordinates = kind < 2 ? routhian.active : routhian.cyclic;
+            const auto k = static_cast<std::size_t>(coordinates[i - std::min<std::size_t>(kind, 2) * active]);
+            const std::string& name = d_.scene.coordinates[k].name;
+            const std::string shown = kind == 0 ? name + "_dot" : kind == 1 ? name : "p_" + name;
+            symbols_[routhian.z[i]] =
+                g().input({at("z", i), shown, Stage::iterate, kind == 1 ? g().input_of(q_[k]).start : 0.1});
+        }
+        Ids slopes;
+        for (const ex& slope : routhian.gradient) slopes.push_back(convert(slope));
+        Program node{"node", {}};
+        for (std::size_t i = 0; i < slopes.size(); ++i) node.outputs.push_back({at("g", i), slopes[i]});
+        std::size_t e = 0;
+        for (const auto& [place, value] : routhian.second.entries())
+            node.outputs.push_back({at("H", e++), convert(value)});
+        p_.programs.push_back(std::move(node));
+        program("slope", "g", slopes);
+        symbols_ = before;
+    }
+
+    // For the host: all coordinates, in (q, velocity).
+    void mechanics() {
+        Ids momentum, force;
+        for (const ex& value : d_.system.momentum) momentum.push_back(convert(value));
+        for (const ex& value : d_.system.force) force.push_back(convert(value));
+        Program slopes{"slopes", {}}, legendre{"legendre", {}}, stage{"stage", {}};
+        for (std::size_t k = 0; k < n_; ++k) slopes.outputs.push_back({at("Lv", k), momentum[k]});
+        for (std::size_t k = 0; k < n_; ++k) slopes.outputs.push_back({at("Lq", k), force[k]});
+        stage.outputs = slopes.outputs;
+        p_.programs.push_back(std::move(slopes));
+        program("momentum", "p", momentum);
+        for (std::size_t k = 0; k < n_; ++k) legendre.outputs.push_back({at("p", k), momentum[k]});
+        std::size_t e = 0;
+        for (const auto& [place, value] : d_.system.momentum_v.entries()) {
+            legendre.outputs.push_back({at("M", e), convert(value)});
+            stage.outputs.push_back({at("M", e++), convert(value)});
+        }
+        p_.programs.push_back(std::move(legendre));
+        p_.programs.push_back(std::move(stage));
+        if (d_.scene.outputs.energy) p_.programs.push_back({"energy", {{"return", energy()}}});
+    }
+
+    // (D26) H = v . dL/dv - L, term by term: a term of degree d in the velocities gives d - 1 times itself, so that no
+    // kinetic energy is subtracted from its double.
+    Id energy() {
+        const std::vector<ex>& terms = d_.system.terms;
+        std::vector<ex> radial;  // v . d(term)/dv
+        for (const ex& term : terms) {
+            const std::vector<ex> slopes = gradient_of({term}, d_.system.v);
+            ex sum = 0;
+            for (std::size_t k = 0; k < n_; ++k)
+                if (!slopes[k].is_zero()) sum += d_.system.v[k] * slopes[k];
+            radial.push_back(sum);
+        }
+        const std::vector<int> degrees = degrees_of(terms, radial);
+        Ids sum;
+        for (std::size_t i = 0; i < terms.size(); ++i)
+            sum.push_back(degrees[i] >= 0 ? g().multiply({g().number(degrees[i] - 1), convert(terms[i])})
+                                          : g().subtract(convert(radial[i]), convert(terms[i])));
+        return g().add(sum);
+    }
+
+    // The degree of each term, 0 to 4; -1 when it has none: v . d(term)/dv = degree * term at sample points.
+    std::vector<int> degrees_of(const std::vector<ex>& terms, const std::vector<ex>& radial) {
+        std::vector<int> degrees(terms.size(), -2);
+        at_sample_points(d_.scene, [&](NearStart& point) {
+            Formulas formulas;
+            point.set_all(formulas);
+            const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(terms)),
+                                     products = formulas.evaluate_sized(formulas.convert(radial));
+            for (std::size_t i = 0; i < terms.size(); ++i) {
+                int here = -1;
+                for (int degree = 0; degree <= 4; ++degree)
+                    if (products[i].equals({values[i].value * degree, values[i].size * degree})) here = degree;
+                degrees[i] = degrees[i] == -2 || degrees[i] == here ? here : -1;
+            }
+        });
+        return degrees;
+    }
+};
+
+}  // namespace
+
+Programs general_programs(const Derivation& derivation) {
+    return GeneralBuilder(derivation).build();
+}
+
+}  // namespace lobatto

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The programs of systems whose terms repeat: each formula once, for loops over its rows, and the rest written out.
+//
+// Of the program element_3_node the inputs are x0, x1, ..., a0, a1, ... of one row and the outputs add to W and S, or
+// to g and H.
+#include "generator/programs/looped.hpp"
+#include "generator/formula/expansion.hpp"
+
+#include <fmt/format.h>
+
+#include "generator/programs/builder.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+class LoopedBuilder : public ProgramBuilder {
+public:
+    explicit LoopedBuilder(const Derivation& derivation)
+        : ProgramBuilder(derivation), general_(derivation.structure.form == Form::general) {
+        std::size_t e = 0;
+        if (general_) {
+            for (const auto& [place, value] : d_.structure.routhian.second.entries()) entry_[place] = e++;
+        } else {
+            for (const auto& place : d_.structure.entries) entry_[place] = e++;
+        }
+    }
+
+    Programs build() {
+        if (!general_) masses();
+        written_out();
+        for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number)
+            element(number, d_.structure.elements.repeated[number]);
+        symbols_ = before_;
+        velocities_as_inputs();
+        events();
+        return std::move(p_);
+    }
+
+private:
+    const char* slope() const { return general_ ? "g" : "W"; }
+    const char* second() const { return general_ ? "H" : "S"; }
+    static std::string add_to(const std::string& place) { return place + " +="; }
+
+    // One value when all masses are the same formula, else one a coordinate.
+    void masses() {
+        Ids masses;
+        for (std::size_t k = 0; k < n_; ++k) masses.push_back(convert(d_.system.mass(k, k)));
+        Program mass{"mass", {}}, inverse{"inverse_mass", {}};
+        for (const Id value : masses) {
+            mass.outputs.push_back({"", value});
+            inverse.outputs.push_back({"", g().power(value, -1)});
+            if (std::all_of(masses.begin(), masses.end(), [&](Id other) { return other == masses.front(); })) break;
+        }
+        p_.programs.push_back(std::move(mass));
+        p_.programs.push_back(std::move(inverse));
+    }
+
+    // The degree of a term in the velocities among its variables, 0 to 4, or -1.
+    static ex energy_of(const ex& term, const std::vector<GiNaC::symbol>& velocities) {
+        ex radial = 0;
+        for (const auto& velocity : velocities) radial += velocity * term.diff(velocity);
+        for (int degree = 0; degree <= 4; ++degree)
+            if (expanded(radial - degree * term).is_zero()) return (degree - 1) * term;
+        return radial - term;
+    }
+
+    // The quadratic part of V depends neither on the variables nor on the time.
+    ConstantPart free_of(std::vector<GiNaC::symbol> variables) const {
+        variables.push_back(d_.system.t);
+        return ConstantPart(variables);
+    }
+
+    // What does not repeat: straight-line code over q, or z.
+    void written_out() {
+        before_ = symbols_;
+        const std::vector<GiNaC::symbol>& variables = general_ ? d_.structure.routhian.z : d_.system.q;
+        if (general_)
+            for (std::size_t i = 0; i < variables.size(); ++i) {
+                const std::size_t k = i % n_;
+                const double start = i < n_ ? 0.1 : g().input_of(q_[k]).start;
+                symbols_[variables[i]] = g().input({at("z", i), at("z", i), Stage::iterate, start});
+            }
+        const Elements& elements = d_.structure.elements;
+        // The gradient of terms and the forces beside them.
+        const auto add_slopes = [&](Program& program, const std::vector<ex>& terms) {
+            std::vector<ex> gradient = gradient_of(terms, variables);
+            for (const auto& [acted_on, force] : elements.other_forces)
+                gradient[static_cast<std::size_t>(acted_on)] += general_ ? force : -force;
+            for (std::size_t i = 0; i < gradient.size(); ++i)
+                if (!gradient[i].is_zero()) program.outputs.push_back({add_to(at(slope(), i)), convert(gradient[i])});
+            return gradient;
+        };
+        const ConstantPart constant_part = free_of(variables);
+        Program node{"rest_node", {}}, slope_only{"rest_slope", {}}, quadratic{"rest_quadratic", {}};
+        const SparseMatrix second_derivatives = derivative_of(add_slopes(slope_only, elements.others), variables);
+        node.outputs = slope_only.outputs;
+        for (const auto& [place, value] : second_derivatives.entries()) {
+            const auto known = entry_.find(place);
+            if (known == entry_.end()) continue;  // zero after all
+            node.outputs.push_back({add_to(at(second(), known->second)), convert(value)});
+            if (!d_.structure.absorbed && !d_.structure.diagonal_part) continue;
+            const ex constant = constant_part.of(value);
+            if (!constant.is_zero()) quadratic.outputs.push_back({add_to(at("S0", known->second)), convert(constant)});
+        }
+        if (d_.scene.outputs.energy) {
+            Ids values;
+            const std::vector<GiNaC::symbol> velocities(variables.begin(),
+                                                        variables.begin() + (general_ ? static_cast<long>(n_) : 0));
+            for (const ex& term : elements.others)
+                values.push_back(convert(general_ ? energy_of(term, velocities) : term));
+            p_.programs.push_back({"rest_energy", {{"sum +=", g().add(values)}}});
+        }
+        p_.programs.push_back(std::move(node));
+        p_.programs.push_back(std::move(slope_only));
+        p_.programs.push_back(std::move(quadratic));
+        if (!d_.structure.walls.before && !d_.structure.walls.behind) return;
+        // The same where the walls of a chain are rows.
+        Program inside{"inside_slope", {}};
+        add_slopes(inside, d_.structure.walls.others);
+        p_.programs.push_back(std::move(inside));
+    }
+
+    void element(std::size_t number, const Element& element) {
+        const std::string name = fmt::format("element_{}", number + 1);
+        const auto start_of = [&](int variable) {
+            const auto i = static_cast<std::size_t>(variable);
+            return general_ && i < n_ ? 0.1 : g().input_of(q_[i % n_]).start;
+        };
+        for (std::size_t j = 0; j < element.x.size(); ++j)
+            symbols_[element.x[j]] = g().input({fmt::format("x{}", j), fmt::format("x{} of {}", j, name),
+                                                Stage::iterate, start_of(element.rows.front()[j])});
+        for (std::size_t j = 0; j < element.a.size(); ++j)
+            symbols_[element.a[j]] =
+                g().input({fmt::format("a{}", j), fmt::format("a{} of {}", j, name), Stage::step,
+                           d_.scene.evaluate(element.coefficients.front()[j], "a coefficient").to_double()});
+        const bool is_force = element.target >= 0;
+        const ex term = is_force && !general_ ? -element.term : element.term;
+        std::vector<ex> gradient;
+        for (const auto& x : element.x) gradient.push_back(is_force ? ex(0) : term.diff(x));
+        if (is_force) gradient[static_cast<std::size_t>(element.target)] = term;
+        const ConstantPart constant_part = free_of(element.x);
+        Program node{name + "_node", {}}, slope_only{name + "_slope", {}}, quadratic{name + "_quadratic", {}};
+        // Action and reaction: the same value, added and taken away.
+        Ids slopes;
+        std::vector<bool> taken;
+        for (std::size_t j = 0; j < gradient.size(); ++j) {
+            std::size_t i = 0;
+            while (i < j && (taken[i] || !expanded(gradient[i] + gradient[j]).is_zero())) ++i;
+            taken.push_back(i < j);
+            slopes.push_back(i < j ? slopes[i] : convert(gradient[j]));
+            if (!gradient[j].is_zero())
+                slope_only.outputs.push_back({fmt::format("{}[i{}] {}=", slope(), j, i < j ? '-' : '+'), slopes[j]});
+        }
+        node.outputs = slope_only.outputs;
+        int column = 0;
+        for (const auto& [i, j] : pairs_of(element)) {
+            const ex value = gradient[i].diff(element.x[j]);
+            node.outputs.push_back(
+                {add_to(fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column)),
+                 convert(value)});
+            const ex constant = constant_part.of(value);
+            if ((d_.structure.absorbed || d_.structure.diagonal_part) && !constant.is_zero())
+                quadratic.outputs.push_back(
+                    {add_to(fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column)),
+                     convert(constant)});
+            ++column;
+        }
+        if (d_.scene.outputs.energy && !is_force) {
+            std::vector<GiNaC::symbol> velocities;
+            for (std::size_t j = 0; general_ && j < element.x.size(); ++j)
+                if (element.rows.front()[j] < static_cast<int>(n_)) velocities.push_back(element.x[j]);
+            p_.programs.push_back(
+                {name + "_energy", {{"sum +=", convert(general_ ? energy_of(term, velocities) : term)}}});
+        }
+        p_.programs.push_back(std::move(node));
+        p_.programs.push_back(std::move(slope_only));
+        p_.programs.push_back(std::move(quadratic));
+        // Coefficients that are parameters are put into an array by prepare().
+        Program table{name + "_a", {}};
+        if (has_parameters(element))
+            for (std::size_t j = 0; j < element.a.size(); ++j)
+                for (const auto& row : element.coefficients) table.outputs.push_back({"", convert(row[j])});
+        p_.programs.push_back(std::move(table));
+    }
+
+    bool general_;
+    std::map<std::pair<int, int>, std::size_t> entry_;
+    GiNaC::exmap before_;
+};
+
+}  // namespace
+
+bool has_parameters(const Element& element) {
+    for (const auto& row : element.coefficients)
+        for (const ex& value : row)
+            if (!GiNaC::is_a<GiNaC::numeric>(value)) return true;
+    return false;
+}
+
+std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element) {
+    std::vector<std::pair<std::size_t, std::size_t>> pairs;
+    for (std::size_t i = 0; i < element.x.size(); ++i) {
+        if (element.target >= 0 && static_cast<std::size_t>(element.target) != i) continue;
+        const ex slope = element.target >= 0 ? element.term : element.term.diff(element.x[i]);
+        for (std::size_t j = 0; j < element.x.size(); ++j)
+            if (!expanded(slope.diff(element.x[j])).is_zero()) pairs.emplace_back(i, j);
+    }
+    return pairs;
+}
+
+Programs looped_programs(const Derivation& derivation) {
+    return LoopedBuilder(derivation).build();
+}
+
+}  // namespace lobatto

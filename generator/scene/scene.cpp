@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The keys of a scene file and what they mean: a document in, a Scene out. Every key is described in
+// docs/scene_format.md.
+#include "generator/scene/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+#include "generator/formula/expression.hpp"
+#include "generator/formula/real.hpp"
+#include "generator/formula/token.hpp"
+#include "generator/method/splitting.hpp"
+#include "generator/scene/document.hpp"
+#include "generator/scene/scene_system.hpp"
+#include "generator/scene/table.hpp"
+
+namespace lobatto {
+namespace {
+
+constexpr std::size_t longest_title = 200, longest_event = 1000, most_events = 100;
+constexpr long long most_steps = 9'000'000'000'000'000;  // step numbers are exact as doubles up to 2^53
+
+// The values of the run-time parameters: as given, or else those of the scene.
+GiNaC::exmap values_of(const std::vector<Parameter>& parameters, const std::vector<GiNaC::ex>& given) {
+    GiNaC::exmap values;
+    for (std::size_t k = 0; k < parameters.size(); ++k)
+        values[parameters[k].symbol] = real_value(given.empty() ? parameters[k].value : given[k]);
+    return values;
+}
+
+std::string shown(const GiNaC::numeric& number) {
+    return fmt::format("{:.6g}", number.to_double());
+}
+
+class Reader {
+public:
+    explicit Reader(const Source& source)
+        : source_(source),
+          document_(read_document(source)),
+          root_(source, document_.entries, {1, 1}, "a scene",
+                {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "method", "run",
+                 "output"}),
+          system_(source, root_, scene_) {}
+
+    Scene run() {
+        scene_.source = source_;
+        scene_.path = source_.path();
+        scene_.name = identifier_of_file(source_.path());
+        scene_.title = scene_.name;
+        if (const Entry* title = root_.find("title")) scene_.title = label_of(source_, *title, longest_title);
+        system_.read();
+        read_method();
+        read_run();
+        read_output();
+        system_.refuse_unused();
+        return std::move(scene_);
+    }
+
+private:
+    [[noreturn]] void fail(Position at, const std::string& message) const { source_.fail(at, message); }
+
+    static std::string identifier_of_file(const std::string& path) {
+        std::string name;
+        for (const char c : std::filesystem::path(path).stem().string()) {
+            const bool fits = is_identifier(std::string("x") + c);
+            if (fits && !(c == '_' && name.ends_with('_'))) name += c;
+            if (!fits && !name.ends_with('_')) name += '_';
+        }
+        return is_identifier(name) ? name : "scene_" + name;
+    }
+
+    int splitting_stages_of(const Entry& entry) const {
+        const std::vector<int>& all = splitting_stages();
+        const std::string there_are = fmt::format("there are splitting methods with {} stages", fmt::join(all, ", "));
+        const auto stages = static_cast<int>(integer_of(source_, entry, all.front(), all.back(), there_are.c_str()));
+        if (std::find(all.begin(), all.end(), stages) == all.end()) fail(entry.value.at, there_are);
+        return stages;
+    }
+
+    void read_method() {
+        const Entry* section = root_.find("method");
+        if (section == nullptr) return;
+        const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
+                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic"});
+        const Entry *family = table.find("family"), *points = table.find("points"), *stages = table.find("stages");
+        if (family != nullptr) {
+            const Value& value = family->value;
+            const bool text = value.kind == Value::Kind::text;
+            try {
+                scene_.method.family = family_of(text ? value.text.value : "");
+            } catch (const std::invalid_argument&) {
+                fail(value.at, "unknown family; there are \"lobatto\", \"gauss\" and \"splitting\"");
+            }
+            if (scene_.method.family == Family::gauss) scene_.method.points = 3;
+            if (scene_.method.family == Family::splitting) scene_.method.points = 11;
+        }
+        const bool lobatto = scene_.method.family == Family::lobatto,
+                   splitting = scene_.method.family == Family::splitting;
+        if (!lobatto && points != nullptr)
+            fail(points->at, splitting ? "splitting methods have stages, not points: write stages = 11"
+                                       : "Gauss has stages, not points: write stages = 3");
+        if (lobatto && stages != nullptr)
+            fail(stages->at,
+                 "Lobatto has points, not stages: write points = 4, or add family = \"gauss\" or \"splitting\"");
+        if (points != nullptr)
+            scene_.method.points =
+                static_cast<int>(integer_of(source_, *points, 2, 12, "there is Lobatto with 2 to 12 points"));
+        if (stages != nullptr && splitting)
+            scene_.method.points = splitting_stages_of(*stages);
+        else if (stages != nullptr)
+            scene_.method.points =
+                static_cast<int>(integer_of(source_, *stages, 1, 10, "there is Gauss with 1 to 10 stages"));
+        if (const Entry* tolerance = table.find("tolerance")) {
+            GiNaC::numeric value = 0;
+            system_.read_formula(*tolerance, system_.scope_of("the tolerance", false), &value);
+            scene_.method.tolerance = value.to_double();
+            if (!(scene_.method.tolerance > 0 && scene_.method.tolerance <= 0.001))
+                fail(tolerance->value.at, fmt::format("the tolerance is {}; it must be above 0 and at most 0.001; "
+                                                      "leave it out to iterate to rounding",
+                                                      shown(value)));
+        }
+        if (scene_.method.tolerance > 0 && splitting)
+            fail(table.find("tolerance")->at, "splitting methods iterate nothing; leave out the tolerance");
+        if (const Entry* arithmetic = table.find("arithmetic")) {
+            const Value& value = arithmetic->value;
+            const bool text = value.kind == Value::Kind::text;
+            if (!text || (value.text.value != "plain" && value.text.value != "clean"))
+                fail(value.at, "unknown arithmetic; there are \"plain\" and \"clean\"");
+            if (value.text.value == "clean") scene_.method.arithmetic = StepArithmetic::clean;
+            if (scene_.method.arithmetic == StepArithmetic::clean && scene_.method.tolerance > 0)
+                fail(
+                    value.at,
+                    "clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave one of both "
+                    "out");
+        }
+    }
+
+    void read_run() {
+        const std::string example = "[run] with lines step = 0.05 and until = 10";
+        const Entry& section = root_.get("run", example);
+        const Table table(source_, table_of(source_, section, example), section.at, "[run]",
+                          {"step", "steps_per_period", "period", "until", "error"});
+        const Entry* step = table.find("step");
+        const Entry* per_period = table.find("steps_per_period");
+        const Entry* period = table.find("period");
+        if (step == nullptr && per_period == nullptr)
+            fail(table.at(), "[run] has no step; add step = 0.05, or steps_per_period and period");
+        if (step != nullptr && per_period != nullptr)
+            fail(per_period->at, "[run] has both step and steps_per_period; keep one");
+        if (step != nullptr && period != nullptr)
+            fail(period->at, "period goes with steps_per_period; with step it has no meaning");
+        const Entry& length =
+            step != nullptr
+                ? *step
+                : table.get("period", "the period that has these steps, for example period = \"2*pi/omega\"");
+        const Scope scope = system_.scope_of(step != nullptr ? "the step" : "the period", false);
+        GiNaC::numeric h = 0;
+        scene_.run.step = system_.read_formula(length, scope, &h);
+        if (!h.is_positive())
+            fail(length.value.at, fmt::format("{} is {}; it must be positive", scope.formula, shown(h)));
+        if (per_period != nullptr) {
+            const long long count = integer_of(source_, *per_period, 1, most_steps, "at least 1 and at most 9e15");
+            scene_.run.step = scene_.run.step / GiNaC::numeric(static_cast<long>(count));
+            h = h / GiNaC::numeric(static_cast<long>(count));
+        }
+        const Entry& until = table.get("until", "the end time, for example until = 10");
+        GiNaC::numeric end = 0;
+        scene_.run.until = system_.read_formula(until, system_.scope_of("the end time", false), &end);
+        if (end.is_negative())
+            fail(until.value.at,
+                 fmt::format("the end time is {}; it must not be negative: a run starts at time 0", shown(end)));
+        if (end > h * GiNaC::numeric(static_cast<long>(most_steps)))
+            fail(until.value.at,
+                 fmt::format("the run has {} steps; at most 9e15: make until smaller or the step larger",
+                             shown(end / h)));
+        if (const Entry* error = table.find("error")) {
+            GiNaC::numeric value = 0;
+            system_.read_formula(*error, system_.scope_of("the error", false), &value);
+            scene_.run.error = value.to_double();
+            if (!(scene_.run.error >= 1e-15 && scene_.run.error <= 0.1))
+                fail(error->value.at,
+                     fmt::format("the error is {}; it is relative to the amplitude of the motion, at least "
+                                 "1e-15 and at most 0.1",
+                                 shown(value)));
+        }
+    }
+
+    void read_output() {
+        const Entry* section = root_.find("output");
+        if (section == nullptr) return;
+        const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
+                          "[output]", {"every", "energy", "momenta", "tangent", "dense", "events"});
+        Outputs& outputs = scene_.outputs;
+        if (const Entry* every = table.find("every"))
+            outputs.every = static_cast<long>(
+                integer_of(source_, *every, 1, most_steps,
+                           "at least 1 and at most 9e15: states whose step is a multiple of it are kept"));
+        if (const Entry* energy = table.find("energy")) outputs.energy = boolean_of(source_, *energy);
+        if (const Entry* momenta = table.find("momenta")) outputs.momenta = boolean_of(source_, *momenta);
+        if (const Entry* tangent = table.find("tangent")) outputs.tangent = boolean_of(source_, *tangent);
+        if (const Entry* dense = table.find("dense")) {
+            outputs.dense =
+                static_cast<int>(integer_of(source_, *dense, 0, 100, "0 to 100 states between two steps are computed"));
+            if (outputs.dense > 0 && outputs.every > 1)
+                fail(dense->at, "dense fills the time between two steps, so all steps are kept: remove every");
+        }
+        if (const Entry* events = table.find("events")) read_events(*events);
+    }
+
+    void read_events(const Entry& entry) {
+        if (entry.value.kind != Value::Kind::list)
+            fail(entry.value.at,
+                 fmt::format("events must be a list such as [\"x = 0 rising\"], not {}", entry.value.kind_name()));
+        if (entry.value.items.size() > most_events)
+            fail(entry.value.at, fmt::format("{} events; at most {}", entry.value.items.size(), most_events));
+        for (const Value& item : entry.value.items) {
+            if (item.kind != Value::Kind::text)
+                fail(item.at,
+                     fmt::format("an event must be a text such as \"x = 0 rising\", not {}", item.kind_name()));
+            Event event;
+            event.at = item.text.at.front();
+            event.text = collapsed(item.text.value);
+            if (event.text.size() > longest_event)
+                fail(item.at, fmt::format("an event of {} bytes; at most {}", event.text.size(), longest_event));
+            const Scope scope = system_.scope_of("the event", true);
+            const Crossing crossing = parse_crossing(source_, item.text, scope);
+            const Operand value = evaluate(source_, crossing.difference, scope);
+            if (!value.moves && !value.velocities)
+                fail(item.at, "this event never happens: it holds neither a coordinate nor the time");
+            event.value = value.expression;
+            event.direction = crossing.direction;
+            scene_.outputs.events.push_back(event);
+        }
+    }
+
+    const Source& source_;
+    const Value document_;
+    const Table root_;
+    Scene scene_;
+    SystemReader system_;
+};
+
+}  // namespace
+
+GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
+                               const std::vector<GiNaC::ex>& given) const {
+    try {
+        return real_value(expression, values_of(parameters, given));
+    } catch (const NoValue& error) {
+        throw InputError(fmt::format("{}: {} has no finite real value: {}", printable(path), what, error.what()));
+    }
+}
+
+Names parameter_names(const Scene& scene) {
+    struct Values {
+        std::vector<GiNaC::ex> values;
+        bool array = false;
+    };
+    std::map<std::string, Values> all;
+    const auto add = [&](const Parameter& parameter, const GiNaC::ex& value) {
+        const std::size_t bracket = parameter.written.find('[');
+        Values& values = all[parameter.written.substr(0, bracket)];
+        values.values.push_back(value);
+        values.array = bracket != std::string::npos;
+    };
+    for (const Parameter& parameter : scene.parameters) add(parameter, parameter.symbol);
+    for (const Parameter& constant : scene.constants) add(constant, constant.value);
+    Names names;
+    for (const auto& [name, values] : all) names.add_parameter(name, values.values, values.array);
+    return names;
+}
+
+Scene read_scene(const std::string& path) {
+    return read_scene(Source::read(path));
+}
+
+Scene read_scene(const Source& source) {
+    return Reader(source).run();
+}
+
+}  // namespace lobatto

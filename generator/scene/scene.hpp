@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A scene: one mechanical system, how to integrate it and what to keep, read from a TOML file (docs/scene_format.md).
+#pragma once
+
+#include <ginac/ginac.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "generator/formula/source.hpp"
+#include "generator/method/method.hpp"
+
+namespace lobatto {
+
+struct Coordinate {
+    std::string name;        // an identifier; element 3 of an array x is x_3
+    std::string unit;        // "" when none is given
+    GiNaC::symbol position;  // prints as name
+    GiNaC::symbol velocity;  // prints as name'
+    GiNaC::ex force = 0;    // generalised force beside the Lagrangian's own, in positions, velocities, time, parameters
+    Position rate_at = {};  // where its initial velocity or momentum stands
+    std::string written = name;  // in formulas: x[3]
+    Position force_at = {};      // where its first force stands
+};
+
+struct Parameter {
+    std::string name;
+    std::string unit;
+    GiNaC::ex value;  // exact, free of symbols
+    GiNaC::symbol symbol;
+    std::string written = name;  // in formulas: m[3]
+};
+
+struct Run {
+    GiNaC::ex step;    // h > 0; in parameters
+    GiNaC::ex until;   // end time, >= 0; in parameters
+    double error = 0;  // that is wanted, relative to the amplitude of the motion; 0: nothing is said
+};
+
+// An event: the value crosses zero. Located on the step's own polynomial.
+struct Event {
+    std::string text;   // as written, white space collapsed: "theta = 0 rising"
+    GiNaC::ex value;    // left side minus right side, in positions, velocities, time and parameters
+    int direction = 0;  // 1: rising only, -1: falling only, 0: both
+    Position at = {};
+};
+
+// What a kernel computes beside the motion itself; it has no code for anything else.
+struct Outputs {
+    long every = 1;       // keep each state whose step index is a multiple of this
+    bool energy = true;   // a column H in the trajectory file, and what the run says of the energy
+    bool momenta = true;  // the columns p_...
+    bool tangent = true;  // the derivative of a step: its symplectic defect, monodromy
+    int dense = 0;        // states between two steps, evenly spaced, from the step's own polynomial
+    std::vector<Event> events;
+};
+
+// Initial rates are given either as velocities or as momenta, for all coordinates.
+enum class Start { velocity, momentum };
+
+struct Scene {
+    Source source{"", ""};   // the file, for errors found after reading
+    Position lagrangian_at;  // where the Lagrangian stands in it
+    std::string path;        // as given
+    std::string name;        // stem of the file as a C identifier: pendulum
+    std::string title;       // one line
+    std::vector<Coordinate> coordinates;
+    bool has_time = false;              // whether the scene declares the time; else no formula holds it
+    GiNaC::symbol time{"t"};            // prints as the name the scene gives it
+    std::vector<Parameter> parameters;  // run-time parameters, in the order of the file
+    std::vector<Parameter> constants;   // declared constant: already substituted everywhere
+    std::string lagrangian_text;        // as written, white space collapsed, without comments
+    GiNaC::ex lagrangian;               // in position and velocity symbols, time and run-time parameters
+    // Where bodies are in a plane, when the scene defines x and y, alone or with one index; in positions, time and
+    // run-time parameters. For pictures.
+    std::vector<std::pair<GiNaC::ex, GiNaC::ex>> places;
+    std::vector<GiNaC::ex> initial_position;  // in parameters
+    std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
+    Start start = Start::velocity;
+    Method method;
+    Run run;
+    Outputs outputs;
+
+    // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
+    // order: 60 decimal digits; throws InputError naming `what` when it is not a finite real number.
+    GiNaC::numeric evaluate(const GiNaC::ex& expression, const std::string& what,
+                            const std::vector<GiNaC::ex>& parameter_values = {}) const;
+};
+
+// The parameters and constants of a scene, for further formulas in them.
+struct Names;
+Names parameter_names(const Scene& scene);
+
+// Throws InputError: what, where, why, how to mend.
+Scene read_scene(const std::string& path);
+Scene read_scene(const Source& source);
+
+}  // namespace lobatto

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What a scene file says of the system: time, parameters, coordinates, definitions, the Lagrangian, forces.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "generator/formula/expression.hpp"
+#include "generator/scene/declarations.hpp"
+#include "generator/scene/scene.hpp"
+#include "generator/scene/table.hpp"
+
+namespace lobatto {
+
+class SystemReader {
+public:
+    // All three outlive the reader.
+    SystemReader(const Source& source, const Table& root, Scene& scene)
+        : source_(source), root_(root), scene_(scene), declarations_(source), names_(declarations_.names) {}
+
+    // All names before the formulas they occur in.
+    void read();
+    // After the last formula of the scene.
+    void refuse_unused() const;
+
+    // How further formulas are read: those that may hold what moves, and those in parameters.
+    Scope scope_of(const std::string& formula, bool motion_allowed) { return {&names_, formula, motion_allowed, {}}; }
+    // A formula whose value with the parameters of the scene must be a real number that a double can hold.
+    GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr);
+
+private:
+    // The lines of [coordinates]: one coordinate, or an array of them.
+    struct Group {
+        const Entry* entry;
+        std::size_t first, count;
+        bool array;
+        const Entry* position;
+        const Entry* rate;
+    };
+
+    [[noreturn]] void fail(Position at, const std::string& message) const { source_.fail(at, message); }
+
+    void read_time();
+    void read_parameters();
+    Parameter read_parameter(const Entry& entry, const Entry& value);
+    std::vector<Parameter> read_elements(const Entry& entry, const Entry& list);
+    void read_coordinates();
+    void read_coordinate(const Entry& entry);
+    void read_initial_entries(Group& group, const Table& table);
+    void read_count(Group& group, const Entry* count);
+    void refuse_names_of_momenta() const;
+    void read_definitions();
+    void read_lagrangian();
+    void read_forces();
+    const Group& group_of(const Subject& subject) const;
+    void read_places();
+    void read_initial_values();
+    void read_values(const Group& group, const Entry& entry, const std::string& what, std::vector<GiNaC::ex>& values);
+
+    const Source& source_;
+    const Table& root_;
+    Scene& scene_;
+    Declarations declarations_;
+    Names& names_;
+    std::deque<Text> keys_;  // of definitions: their indices are read from them
+    std::vector<std::pair<const Name*, const Entry*>> definition_lines_;
+    GiNaC::exmap parameter_values_;
+    std::vector<Group> groups_;
+};
+
+// On one line, without comments.
+std::string collapsed(const std::string& formula);
+
+}  // namespace lobatto

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include "runtime/build/compile.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+
+#include "runtime/build/cache.hpp"
+#include "runtime/build/compiler.hpp"
+#include "runtime/build/process.hpp"
+#include "runtime/error.hpp"
+#include "runtime/kernel/abi.h"
+
+namespace lobatto {
+namespace {
+
+constexpr int shown_lines = 40;
+
+std::string shell_text(const std::vector<std::string>& arguments) {
+    std::string text;
+    for (const std::string& argument : arguments) text += (text.empty() ? "" : " ") + shell_word(argument);
+    return text;
+}
+
+std::string first_lines(const std::string& output) {
+    std::size_t end = 0;
+    for (int line = 0; line < shown_lines && end < output.size(); ++line) {
+        const std::size_t newline = output.find('\n', end);
+        end = newline == std::string::npos ? output.size() : newline + 1;
+    }
+    std::string lines = output.substr(0, end);
+    if (!lines.empty() && lines.back() != '\n') lines += '\n';
+    return lines + (end < output.size() ? "[...]\n" : "");
+}
+
+std::string how_it_ended(const ProcessResult& result, double seconds_limit) {
+    if (result.timed_out) return fmt::format("did not finish within {} s", seconds_limit);
+    if (result.signal != 0) {
+        return fmt::format("was ended by signal {} ({}); a common cause is too little memory", result.signal,
+                           ::strsignal(result.signal));
+    }
+    return fmt::format("failed with exit code {}", result.exit_code);
+}
+
+}  // namespace
+
+Compiled compile(const Translation& translation) {
+    const Compiler compiler = find_compiler(translation.quadruple);
+    const std::string source = translation.name + ".cpp", object = translation.name + ".so";
+    ProcessRequest request;
+    request.arguments = compile_arguments(compiler, source, object, translation.quadruple, translation.short_loops);
+    const std::string command = shell_text(request.arguments);
+
+    const CacheEntry entry(
+        translation.name,
+        fmt::format("interface: {}\ncommand: {}\ncompiler: {}processor:\n{}source:\n{}", LOBATTO_ABI_VERSION, command,
+                    compiler.identity, processor_identity(), translation.text));
+    if (entry.is_valid()) return {entry.object_path(), command, true, 0};
+
+    const CacheEntry::Lock lock(entry);
+    if (entry.is_valid()) return {entry.object_path(), command, true, 0};  // built by another while we waited
+    const bool was_altered = entry.is_there();
+
+    request.folder = entry.building_path();
+    request.environment = {{"TMPDIR", request.folder}};  // what a killed compiler leaves is removed with the folder
+    write_file(request.folder + "/" + source, translation.text);
+    const auto start = std::chrono::steady_clock::now();
+    const ProcessResult result = run_process(request);
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    const bool has_object = std::filesystem::exists(request.folder + "/" + object);
+    if (!result.succeeded() || !has_object) {
+        std::string kept = "Source, command and whole output are kept in " + entry.failed_path();
+        try {
+            write_file(request.folder + "/command", command + "\n");
+            write_file(request.folder + "/output", result.output);
+            entry.keep_failure();
+        } catch (const MachineError& error) {
+            kept = std::string("Nothing of this could be kept: ") + error.what();
+        }
+        const std::string how = result.succeeded()
+                                    ? fmt::format(
+                                          "{} ended well but wrote no {}; correct the environment variable CXX, or "
+                                          "unset it to use g++ or clang++",
+                                          compiler.words[0], object)
+                                    : how_it_ended(result, request.seconds_limit);
+        throw MachineError(fmt::format("the C++ compiler {}.\nCommand: {}\nIts output:\n{}{}", how, command,
+                                       first_lines(result.output), kept));
+    }
+    entry.publish(object);
+    return {entry.object_path(), command, false, elapsed.count(), was_altered};
+}
+
+}  // namespace lobatto

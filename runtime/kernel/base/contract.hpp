@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: MIT
+// What an emitted kernel K provides: a struct of static functions, the formulas of one scene, and of constants.
+//
+// Every kernel: real; name, digest, method; coordinates (n), order, parameter_count, Parameters, parameter();
+// Coefficients, prepare(); form; and these claims, all constexpr:
+//   autonomous   no formula depends on time; otherwise `real time` follows `k` in every function that takes `k` and q
+//   linear       the second derivatives are constant, so that one correction solves a step
+//   has_energy, has_tangent   whether energies and tangent maps are compiled
+//   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
+//                for falling, 0 for both
+// Form::linear_map and Form::separable: is_explicit; of splitting methods they have c, b and drift_length[s - 1], the
+//   way between nodes, and neither A nor E nor what orders unknowns.
+// Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), acceleration(k, q, W),
+//   node(k, q, W, S), propagate(k, q, p, q1, p1).
+// Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
+//   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of steppers/separable.hpp are the
+//   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of base/solve.hpp order the
+//   unknowns, `neighbours` that acceleration can go SideBySide (base/rows.hpp; with row_reach, how far its rows
+//   reach, in_passing, that it can go InPassing, and unit_masses), and `absorbed` says that quadratic_part(k, S0) gives
+//   a constant part of S to iterate with; `clean` (in loops) that steps are those of steppers/clean.hpp. Gauss's nodes
+//   stand between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal,
+//   D, and taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
+// Form::general: see steppers/general.hpp.
+// Forms separable and general: angles, how many arguments of sine and cosine together the function that sweeps evaluate
+//   holds (node, of costly forces, and stage); where there are any it takes one more argument, AnglesAnew by default,
+//   which gives their sines and cosines (base/angles.hpp).
+#ifndef LOBATTO_KERNEL_CONTRACT_HPP
+#define LOBATTO_KERNEL_CONTRACT_HPP
+
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+
+#include "numbers.hpp"
+#include "pack.hpp"
+
+namespace lobatto {
+
+// The outcome of preparing or stepping; the same values as lobatto_status in abi.h.
+enum class Status : std::int32_t {
+    ok = 0,
+    not_converged = 1,
+    not_finite = 2,
+    singular_jacobian = 3,
+    singular_mass = 4,
+    time_stands_still = 5,
+    unsupported = 6
+};
+
+// The same values as lobatto_form in abi.h.
+enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
+
+// K's functions with a time for all of them: it is passed on where the kernel depends on it.
+template <class K>
+struct Formulas {
+    template <class Given, class Time, class... Rest>
+    [[gnu::always_inline]] static inline void node(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::node(k, rest...);
+        else
+            K::node(k, time, rest...);
+    }
+    // Along rows of coordinates, in the way How (base/rows.hpp).
+    template <class How, class Given, class Time, class Position, class Slope>
+    [[gnu::always_inline]] static inline void along_rows(const Given& k, Time time, Position position, Slope slope) {
+        if constexpr (K::autonomous)
+            K::template acceleration<How>(k, position, slope);
+        else
+            K::template acceleration<How>(k, time, position, slope);
+    }
+    template <class Given, class Time, class... Rest>
+    [[gnu::always_inline]] static inline void acceleration(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::acceleration(k, rest...);
+        else
+            K::acceleration(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    [[gnu::always_inline]] static inline void remainder(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::remainder(k, rest...);
+        else
+            K::remainder(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    static void slope(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::slope(k, rest...);
+        else
+            K::slope(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    static void slopes(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::slopes(k, rest...);
+        else
+            K::slopes(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    [[gnu::always_inline]] static inline void stage(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::stage(k, rest...);
+        else
+            K::stage(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    static void legendre(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::legendre(k, rest...);
+        else
+            K::legendre(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    static void momentum(const Given& k, Time time, Rest... rest) {  // of Form::general
+        if constexpr (K::autonomous)
+            K::momentum(k, rest...);
+        else
+            K::momentum(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    static void event(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            K::event(k, rest...);
+        else
+            K::event(k, time, rest...);
+    }
+    template <class Given, class Time, class... Rest>
+    static auto energy(const Given& k, Time time, Rest... rest) {
+        if constexpr (K::autonomous)
+            return K::energy(k, rest...);
+        else
+            return K::energy(k, time, rest...);
+    }
+};
+
+// What an array of coordinates, a pointer or anything with [], holds.
+template <class Array>
+using element_of = std::decay_t<decltype(std::declval<const Array&>()[0])>;
+
+// How the steps of systems with constant mass are taken: the equations of inner nodes solved, round-off-clean
+// (steppers/clean.hpp), or kicks and drifts in turn (steppers/splitting.hpp).
+enum class Stepping { solved, clean, in_turn };
+template <class K>
+constexpr Stepping stepping_of() {
+    if constexpr (K::form == Form::separable)
+        return K::clean ? Stepping::clean : K::is_explicit ? Stepping::in_turn : Stepping::solved;
+    else
+        return Stepping::solved;
+}
+template <class K>
+constexpr bool is_clean() {
+    return stepping_of<K>() == Stepping::clean;
+}
+
+// Whether a coordinate may move as soon as its acceleration is known.
+template <class K>
+constexpr bool moves_in_passing() {
+    if constexpr (K::neighbours && stepping_of<K>() == Stepping::in_turn)
+        return K::in_passing;
+    else
+        return false;
+}
+
+// The most coordinates whose mass matrix is treated as a full one.
+constexpr int most_full = 16;
+
+// What the steppers of all forms carry.
+template <class K>
+struct Motion {
+    using real = typename K::real;
+    static constexpr int n = K::coordinates;
+    static constexpr int event_room = K::events > 0 ? K::events : 1;
+
+    typename K::Coefficients coefficients{};  // values of stage parameter and step size
+    real step_size{};                         // h
+    real start_time{};
+    std::int64_t steps{};             // since start: the time is start_time + steps * h
+    real tolerance{};                 // of increments, relative; the iteration of a step ends there, or at rounding
+    real q[n]{};                      // position
+    std::int32_t iterations{};        // of the last step
+    real increment{};                 // last increment of the last step that looked, relative to its displacement
+    real event_values[event_room]{};  // at the last state looked at (steppers/events.hpp)
+
+    real time() const { return start_time + real(steps) * step_size; }
+    real next_time() const { return start_time + real(steps + 1) * step_size; }
+    bool time_stands_still() const { return next_time() == time(); }
+};
+
+// One trajectory of kernel K. Usage: prepare, start, then step as often as wanted. Not thread-safe; copy freely. A step
+// that fails leaves the state of the last good one.
+template <class K, Form form = K::form, Stepping stepping = stepping_of<K>()>
+struct Stepper;
+
+// K for what a trajectory side by side with others rarely does alone: its steps by Newton's iteration, so that sweeps
+// are compiled for lanes only.
+template <class K>
+struct Unswept : K {
+    static constexpr bool any_number = false;
+};
+template <class K>
+using Alone = std::conditional_t<stepping_of<K>() == Stepping::in_turn, K, Unswept<K>>;
+template <class K>
+using Single = Stepper<Alone<K>>;
+
+// How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
+// going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
+template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
+struct Lanes;
+
+// A system with constant mass, whose velocity is kept beside its position.
+template <class K>
+struct ConstantMass : Motion<K> {
+    using typename Motion<K>::real;
+    using Motion<K>::n, Motion<K>::coefficients;
+    real u[n]{};  // M^-1 p
+
+    void momentum(real* p) const { K::momentum(coefficients, u, p); }
+    Status energy(real time, const real* position, const real* momentum, real* value) const {
+        if constexpr (K::has_energy) {
+            *value = Formulas<K>::energy(coefficients, time, position, momentum);
+            return Status::ok;
+        } else {
+            (void)time, (void)position, (void)momentum, (void)value;
+            return Status::unsupported;
+        }
+    }
+    void momentum(real, const real*, const real* velocity, real* momentum) const {
+        K::momentum(coefficients, velocity, momentum);
+    }
+    Status velocity(real, const real*, const real* momentum, real* velocity) const {
+        K::velocity(coefficients, momentum, velocity);
+        return Status::ok;
+    }
+    // dL/dv = M v and dL/dq + F = -M W.
+    void slopes(real time, const real* position, const real* velocity, real* Lv, real* Lq) const {
+        real W[n];
+        Formulas<K>::acceleration(coefficients, time, position, +W);
+        for (int k = 0; k < n; ++k) W[k] = -W[k];
+        K::momentum(coefficients, velocity, Lv);
+        K::momentum(coefficients, static_cast<const real*>(W), Lq);
+    }
+};
+
+// When to try sweeps: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.
+struct Pause {
+    std::int32_t left{};   // steps
+    std::int32_t next{1};  // how many, the next time that sweeps fail
+
+    // Once a step: whether the pause is over with it.
+    bool count_down() { return left == 0 || --left == 0; }
+    void succeed() { next = 1; }
+    void fail() {
+        left = next;
+        next = next < 64 ? 2 * next : 64;
+    }
+};
+
+// Room for a step's arrays: on the stack while they are few, else in the stepper. In line, so that they are registers
+// where there are enough, and what the step refers to need not lie in memory for a call; or apart, as a function.
+template <class Arrays>
+struct Workspace {
+    struct Nothing {};
+    static constexpr bool is_large = sizeof(Arrays) > 16384;
+    mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
+
+    template <class Use>
+    [[gnu::noinline]] auto apart(const Use& use) const {
+        return with(use);
+    }
+    template <class Use>
+    LOBATTO_INLINE auto with(const Use& use) const {
+        if constexpr (is_large) {
+            return use(kept);
+        } else {
+            Arrays local;
+            return use(local);
+        }
+    }
+};
+
+// Lagrange's polynomials over the points, l_j(theta) and l_j'(theta).
+template <int count, class real>
+constexpr void lagrange(const real* points, real theta, real* value, real* slope) {
+    for (int j = 0; j < count; ++j) {
+        value[j] = real(1);
+        slope[j] = real(0);
+        for (int l = 0; l < count; ++l) {
+            if (l == j) continue;
+            const real scale = real(1) / (points[j] - points[l]);
+            slope[j] = (slope[j] * (theta - points[l]) + value[j]) * scale;
+            value[j] *= (theta - points[l]) * scale;
+        }
+    }
+}
+
+// Zero when all are finite, not a number otherwise.
+template <class real>
+inline real not_finite_part(const real* x, int count) {
+    real sum = real(0);
+    for (int i = 0; i < count; ++i) sum += x[i] - x[i];
+    return sum;
+}
+
+}  // namespace lobatto
+
+#endif

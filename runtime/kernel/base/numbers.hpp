@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// Numbers: what the number types of kernels need, and their elementary functions. C++17, no allocation.
+#ifndef LOBATTO_KERNEL_NUMBERS_HPP
+#define LOBATTO_KERNEL_NUMBERS_HPP
+
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+#ifdef LOBATTO_USE_FLOAT128
+#include <quadmath.h>
+#endif
+
+namespace lobatto {
+
+template <class real>
+struct Limits {
+    static constexpr real epsilon = std::numeric_limits<real>::epsilon();
+    static constexpr real smallest = std::numeric_limits<real>::min();
+    static constexpr real largest = std::numeric_limits<real>::max();
+    static constexpr real root_epsilon = sizeof(real) == 4   ? real(1.0 / 4096)           // 2^-12
+                                         : sizeof(real) == 8 ? real(1.0 / 134217728)      // 2^-27
+                                                             : real(1.0 / 8589934592.0);  // 2^-33
+};
+
+// The C library's functions by the names that the compiler knows them by: <cmath> would take longer to read than all of
+// this support. Templates of one type, so that the library's own functions come first where both are in sight. Sine and
+// cosine of double are in base/functions.hpp.
+template <class real, class type>
+using Only = std::enable_if_t<std::is_same_v<real, type>, real>;
+#define LOBATTO_FUNCTION(type, f, suffix) \
+    template <class real>                 \
+    inline Only<real, type> f(real x) {   \
+        return __builtin_##f##suffix(x);  \
+    }
+#define LOBATTO_FUNCTIONS(type, suffix)                                                       \
+    LOBATTO_FUNCTION(type, acos, suffix)                                                      \
+    LOBATTO_FUNCTION(type, asin, suffix)                                                      \
+    LOBATTO_FUNCTION(type, atan, suffix)                                                      \
+    LOBATTO_FUNCTION(type, cosh, suffix)                                                      \
+    LOBATTO_FUNCTION(type, exp, suffix)                                                       \
+    LOBATTO_FUNCTION(type, fabs, suffix)                                                      \
+    LOBATTO_FUNCTION(type, log, suffix)                                                       \
+    LOBATTO_FUNCTION(type, sinh, suffix)                                                      \
+    LOBATTO_FUNCTION(type, sqrt, suffix)                                                      \
+    LOBATTO_FUNCTION(type, tan, suffix)                                                       \
+    LOBATTO_FUNCTION(type, tanh, suffix)                                                      \
+    template <class real>                                                                     \
+    inline Only<real, type> pow(real x, Only<real, type> y) {                                 \
+        return __builtin_pow##suffix(x, y);                                                   \
+    }                                                                                         \
+    /* x y + z rounded once on every target, for error-free products; slow without an FMA. */ \
+    inline type rounded_once(type x, type y, type z) {                                        \
+        return __builtin_fma##suffix(x, y, z);                                                \
+    }
+LOBATTO_FUNCTIONS(float, f)
+LOBATTO_FUNCTIONS(double, )
+LOBATTO_FUNCTIONS(long double, l)
+LOBATTO_FUNCTION(float, sin, f)
+LOBATTO_FUNCTION(float, cos, f)
+LOBATTO_FUNCTION(long double, sin, l)
+LOBATTO_FUNCTION(long double, cos, l)
+#undef LOBATTO_FUNCTIONS
+#undef LOBATTO_FUNCTION
+
+#ifdef LOBATTO_USE_FLOAT128
+template <>
+struct Limits<__float128> {
+    static constexpr __float128 epsilon = __float128(1) / (__float128(1ull << 56) * __float128(1ull << 56));  // 2^-112
+    static constexpr __float128 smallest = __float128(std::numeric_limits<long double>::min());
+    static constexpr __float128 largest = __float128(std::numeric_limits<long double>::max());
+    static constexpr __float128 root_epsilon = __float128(1) / __float128(1ull << 57);
+};
+inline __float128 acos(__float128 x) {
+    return acosq(x);
+}
+inline __float128 asin(__float128 x) {
+    return asinq(x);
+}
+inline __float128 atan(__float128 x) {
+    return atanq(x);
+}
+inline __float128 cos(__float128 x) {
+    return cosq(x);
+}
+inline __float128 cosh(__float128 x) {
+    return coshq(x);
+}
+inline __float128 exp(__float128 x) {
+    return expq(x);
+}
+inline __float128 fabs(__float128 x) {
+    return fabsq(x);
+}
+inline __float128 log(__float128 x) {
+    return logq(x);
+}
+inline __float128 pow(__float128 x, __float128 y) {
+    return powq(x, y);
+}
+inline __float128 sin(__float128 x) {
+    return sinq(x);
+}
+inline __float128 sinh(__float128 x) {
+    return sinhq(x);
+}
+inline __float128 sqrt(__float128 x) {
+    return sqrtq(x);
+}
+inline __float128 tan(__float128 x) {
+    return tanq(x);
+}
+inline __float128 tanh(__float128 x) {
+    return tanhq(x);
+}
+#endif
+
+// Sine and cosine of one argument together. Those of double are in base/functions.hpp.
+template <class real>
+inline void sincos(real x, real& sine, real& cosine) {
+    sine = sin(x);
+    cosine = cos(x);
+}
+
+template <class... reals>
+inline bool is_finite(reals... x) {
+    return ((x - x == reals(0)) && ...);
+}
+
+#ifdef LOBATTO_USE_FLOAT128
+inline __float128 rounded_once(__float128 a, __float128 b, __float128 c) {
+    return fmaq(a, b, c);
+}
+#endif
+}  // namespace lobatto
+
+#endif

@@ -1,0 +1,721 @@
+// SPDX-License-Identifier: MIT
+// Pack<real, width>: `width` numbers side by side in vector registers, computed with as one. C++17, no allocation.
+//
+// A plain number is a pack of one lane: lanes_of, real_of, select, any, all, fused, minimum, maximum, sum and largest
+// know both, so that a function template serves one state and many.
+#ifndef LOBATTO_KERNEL_PACK_HPP
+#define LOBATTO_KERNEL_PACK_HPP
+
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+
+#include "numbers.hpp"
+
+#define LOBATTO_INLINE [[gnu::always_inline]] inline
+#define LOBATTO_FORMULA __attribute__((always_inline))             // behind the parameters of a function object
+#define LOBATTO_EACH(i) [&](int i) __attribute__((always_inline))  // a function of the number of a register
+
+namespace lobatto {
+
+// The registers of the target.
+#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
+constexpr int register_bytes = 64;
+#elif defined(__AVX__)
+constexpr int register_bytes = 32;
+#else
+constexpr int register_bytes = 16;
+#endif
+
+// How many numbers a register holds: one of the types that vector instructions do not know.
+template <class real>
+constexpr int native_lanes = 1;
+template <>
+inline constexpr int native_lanes<float> = register_bytes / 4;
+template <>
+inline constexpr int native_lanes<double> = register_bytes / 8;
+
+// One register, or a part of one: a compiler's vector. A comparison of two gives integers of the same size, -1 where it
+// holds and 0 elsewhere. One lane is the plain number, and its comparison a bool.
+template <class real, int lanes>
+struct Register {
+    typedef real Values __attribute__((vector_size(lanes * sizeof(real))));
+    using Truths = decltype(Values{} < Values{});
+    using Integers = Truths;
+    using Natural = std::conditional_t<sizeof(real) == 8, std::uint64_t, std::uint32_t>;
+    typedef Natural Naturals __attribute__((vector_size(lanes * sizeof(real))));
+};
+template <class real>
+struct Register<real, 1> {
+    using Values = real;
+    using Truths = bool;
+    using Integers = void;  // of numbers whose bits nobody asks for
+    using Naturals = void;
+};
+template <>
+struct Register<float, 1> {
+    using Values = float;
+    using Truths = bool;
+    using Integers = std::int32_t;
+    using Naturals = std::uint32_t;
+};
+template <>
+struct Register<double, 1> {
+    using Values = double;
+    using Truths = bool;
+    using Integers = std::int64_t;
+    using Naturals = std::uint64_t;
+};
+
+// a b + c, rounded once where the target has fused multiply-add (FMA) and twice elsewhere.
+#if defined(__FMA__) || defined(__FP_FAST_FMA) || defined(__aarch64__)
+LOBATTO_INLINE float fused(float a, float b, float c) {
+    return __builtin_fmaf(a, b, c);
+}
+LOBATTO_INLINE double fused(double a, double b, double c) {
+    return __builtin_fma(a, b, c);
+}
+constexpr bool has_fused = true;
+#else
+LOBATTO_INLINE float fused(float a, float b, float c) {
+    return a * b + c;
+}
+LOBATTO_INLINE double fused(double a, double b, double c) {
+    return a * b + c;
+}
+constexpr bool has_fused = false;
+#endif
+LOBATTO_INLINE long double fused(long double a, long double b, long double c) {
+    return a * b + c;
+}
+#ifdef LOBATTO_USE_FLOAT128
+LOBATTO_INLINE __float128 fused(__float128 a, __float128 b, __float128 c) {
+    return a * b + c;
+}
+#endif
+
+// The names of packs, for plain numbers.
+LOBATTO_INLINE bool any(bool truth) {
+    return truth;
+}
+LOBATTO_INLINE bool all(bool truth) {
+    return truth;
+}
+template <class T>
+LOBATTO_INLINE T select(bool truth, const T& a, const T& b) {
+    return truth ? a : b;
+}
+template <class real>
+LOBATTO_INLINE real minimum(real a, real b) {
+    return a < b ? a : b;
+}
+template <class real>
+LOBATTO_INLINE real maximum(real a, real b) {
+    return a > b ? a : b;
+}
+template <class real>
+LOBATTO_INLINE real sum(real x) {
+    return x;
+}
+template <class real>
+LOBATTO_INLINE real largest(real x) {
+    return x;
+}
+
+// What one instruction does with a register although the language has no word for it.
+namespace registers {
+
+template <class Values>
+LOBATTO_INLINE Values fused(Values a, Values b, Values c) {
+    if constexpr (has_fused) {
+        Values result{};
+        for (unsigned i = 0; i < sizeof(Values) / sizeof(a[0]); ++i) result[i] = lobatto::fused(a[i], b[i], c[i]);
+        return result;
+    } else {
+        return a * b + c;
+    }
+}
+template <class Values>
+LOBATTO_INLINE Values square_root(Values a) {
+    Values result{};
+    for (unsigned i = 0; i < sizeof(Values) / sizeof(a[0]); ++i) result[i] = lobatto::sqrt(a[i]);
+    return result;
+}
+template <class Truths>
+LOBATTO_INLINE bool any(Truths truths) {
+    bool result = false;
+    for (unsigned i = 0; i < sizeof(Truths) / sizeof(truths[0]); ++i) result |= truths[i] != 0;
+    return result;
+}
+
+template <class Truths>
+LOBATTO_INLINE bool all(Truths truths) {
+    bool result = true;
+    for (unsigned i = 0; i < sizeof(Truths) / sizeof(truths[0]); ++i) result &= truths[i] != 0;
+    return result;
+}
+
+// x86: g++ does not find these instructions in the loops above.
+#ifdef __SSE2__
+using Double2 = Register<double, 2>::Values;
+using Float4 = Register<float, 4>::Values;
+LOBATTO_INLINE Double2 square_root(Double2 a) {
+    return __builtin_ia32_sqrtpd(a);
+}
+LOBATTO_INLINE Float4 square_root(Float4 a) {
+    return __builtin_ia32_sqrtps(a);
+}
+LOBATTO_INLINE bool any(Register<double, 2>::Truths truths) {
+    return __builtin_ia32_movmskpd((Double2)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<double, 2>::Truths truths) {
+    return __builtin_ia32_movmskpd((Double2)truths) == 3;
+}
+LOBATTO_INLINE bool any(Register<float, 4>::Truths truths) {
+    return __builtin_ia32_movmskps((Float4)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<float, 4>::Truths truths) {
+    return __builtin_ia32_movmskps((Float4)truths) == 15;
+}
+#endif
+#ifdef __AVX__
+using Double4 = Register<double, 4>::Values;
+using Float8 = Register<float, 8>::Values;
+LOBATTO_INLINE Double4 square_root(Double4 a) {
+    return __builtin_ia32_sqrtpd256(a);
+}
+LOBATTO_INLINE Float8 square_root(Float8 a) {
+    return __builtin_ia32_sqrtps256(a);
+}
+LOBATTO_INLINE bool any(Register<double, 4>::Truths truths) {
+    return __builtin_ia32_movmskpd256((Double4)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<double, 4>::Truths truths) {
+    return __builtin_ia32_movmskpd256((Double4)truths) == 15;
+}
+LOBATTO_INLINE bool any(Register<float, 8>::Truths truths) {
+    return __builtin_ia32_movmskps256((Float8)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<float, 8>::Truths truths) {
+    return __builtin_ia32_movmskps256((Float8)truths) == 255;
+}
+#endif
+#if defined(__FMA__) && defined(__SSE2__)
+LOBATTO_INLINE Double2 fused(Double2 a, Double2 b, Double2 c) {
+    return __builtin_ia32_vfmaddpd(a, b, c);
+}
+LOBATTO_INLINE Float4 fused(Float4 a, Float4 b, Float4 c) {
+    return __builtin_ia32_vfmaddps(a, b, c);
+}
+LOBATTO_INLINE Double4 fused(Double4 a, Double4 b, Double4 c) {
+    return __builtin_ia32_vfmaddpd256(a, b, c);
+}
+LOBATTO_INLINE Float8 fused(Float8 a, Float8 b, Float8 c) {
+    return __builtin_ia32_vfmaddps256(a, b, c);
+}
+#endif
+#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
+constexpr int current_rounding = 4;
+using Double8 = Register<double, 8>::Values;
+using Float16 = Register<float, 16>::Values;
+typedef long long Long8 __attribute__((vector_size(64)));  // not the long of the comparisons
+LOBATTO_INLINE Double8 fused(Double8 a, Double8 b, Double8 c) {
+    return __builtin_ia32_vfmaddpd512_mask(a, b, c, static_cast<unsigned char>(-1), current_rounding);
+}
+LOBATTO_INLINE Float16 fused(Float16 a, Float16 b, Float16 c) {
+    return __builtin_ia32_vfmaddps512_mask(a, b, c, static_cast<unsigned short>(-1), current_rounding);
+}
+#ifdef __clang__
+LOBATTO_INLINE Double8 square_root(Double8 a) {
+    return __builtin_ia32_sqrtpd512(a, current_rounding);
+}
+LOBATTO_INLINE Float16 square_root(Float16 a) {
+    return __builtin_ia32_sqrtps512(a, current_rounding);
+}
+#else
+LOBATTO_INLINE Double8 square_root(Double8 a) {
+    return __builtin_ia32_sqrtpd512_mask(a, a, static_cast<unsigned char>(-1), current_rounding);
+}
+LOBATTO_INLINE Float16 square_root(Float16 a) {
+    return __builtin_ia32_sqrtps512_mask(a, a, static_cast<unsigned short>(-1), current_rounding);
+}
+#endif
+#ifndef __clang__
+// g++ takes a general permutation, with its indices in a register, for what is a shift of two registers.
+#define LOBATTO_SHIFTS 1
+template <int places>
+LOBATTO_INLINE Double8 moved_on(Double8 before, Double8 values) {
+    return (Double8)__builtin_ia32_alignq512_mask((Long8)values, (Long8)before, 8 - places, (Long8)values,
+                                                  static_cast<unsigned char>(-1));
+}
+template <int places>
+LOBATTO_INLINE Float16 moved_on(Float16 before, Float16 values) {
+    typedef int Int16 __attribute__((vector_size(64)));
+    return (Float16)__builtin_ia32_alignd512_mask((Int16)values, (Int16)before, 16 - places, (Int16)values,
+                                                  static_cast<unsigned short>(-1));
+}
+#endif
+LOBATTO_INLINE bool any(Register<double, 8>::Truths truths) {
+    return __builtin_ia32_cvtq2mask512((Long8)truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<double, 8>::Truths truths) {
+    return __builtin_ia32_cvtq2mask512((Long8)truths) == 255;
+}
+LOBATTO_INLINE bool any(Register<float, 16>::Truths truths) {
+    return __builtin_ia32_cvtd2mask512(truths) != 0;
+}
+LOBATTO_INLINE bool all(Register<float, 16>::Truths truths) {
+    return __builtin_ia32_cvtd2mask512(truths) == 65535;
+}
+#endif
+
+}  // namespace registers
+
+// width / lanes registers of `lanes` numbers each.
+template <class real, int width>
+struct Shape {
+    static_assert(width >= 1 && (width & (width - 1)) == 0, "the width of a pack is a power of two");
+    static constexpr int lanes = width < native_lanes<real> ? width : native_lanes<real>;
+    static constexpr int count = width / lanes;
+    using Each = std::make_integer_sequence<int, count>;
+};
+
+// Which lanes: what comparisons of packs give.
+template <class real, int width>
+struct Mask;
+
+// The bits of a pack's numbers, as integers: for exponents, signs and quadrants.
+template <class real, int width>
+struct Bits;
+
+template <class real, int width>
+struct Pack {
+    static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
+    using Each = typename Shape<real, width>::Each;
+    using Part = typename Register<real, lanes>::Values;
+
+    Part part[count];
+
+    Pack() = default;
+    // One register at a time: g++ keeps a Pack in registers only while it is not copied as a whole.
+    LOBATTO_INLINE Pack(const Pack& other) { copy(other, Each{}); }
+    LOBATTO_INLINE Pack& operator=(const Pack& other) {
+        copy(other, Each{});
+        return *this;
+    }
+    LOBATTO_INLINE Pack(real x) : Pack(of(LOBATTO_EACH() { return x - Part{}; })) {}  // x - 0 keeps -0
+
+    // The pack of the registers f(0), f(1), ...
+    template <class F>
+    LOBATTO_INLINE static Pack of(F f) {
+        return of(f, Each{});
+    }
+
+    LOBATTO_INLINE static Pack load(const real* from) {
+        return of(LOBATTO_EACH(i) {
+            Part x;
+            __builtin_memcpy(&x, from + i * lanes, sizeof x);
+            return x;
+        });
+    }
+    LOBATTO_INLINE void store(real* to) const { store(to, Each{}); }
+
+    LOBATTO_INLINE real operator[](int lane) const {
+        if constexpr (lanes == 1)
+            return part[lane];
+        else
+            return part[lane / lanes][lane % lanes];
+    }
+    LOBATTO_INLINE void set(int lane, real x) {
+        if constexpr (lanes == 1)
+            part[lane] = x;
+        else
+            part[lane / lanes][lane % lanes] = x;
+    }
+
+    LOBATTO_INLINE Pack operator-() const {
+        return of(LOBATTO_EACH(i) { return -part[i]; });
+    }
+    LOBATTO_INLINE Pack& operator+=(const Pack& b) { return *this = *this + b; }
+    LOBATTO_INLINE Pack& operator-=(const Pack& b) { return *this = *this - b; }
+    LOBATTO_INLINE Pack& operator*=(const Pack& b) { return *this = *this * b; }
+    LOBATTO_INLINE Pack& operator/=(const Pack& b) { return *this = *this / b; }
+
+    LOBATTO_INLINE friend Pack operator+(const Pack& a, const Pack& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] + b.part[i]; });
+    }
+    LOBATTO_INLINE friend Pack operator-(const Pack& a, const Pack& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] - b.part[i]; });
+    }
+    LOBATTO_INLINE friend Pack operator*(const Pack& a, const Pack& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] * b.part[i]; });
+    }
+    LOBATTO_INLINE friend Pack operator/(const Pack& a, const Pack& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] / b.part[i]; });
+    }
+    LOBATTO_INLINE friend Mask<real, width> operator<(const Pack& a, const Pack& b) {
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] < b.part[i]; });
+    }
+    LOBATTO_INLINE friend Mask<real, width> operator<=(const Pack& a, const Pack& b) {
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] <= b.part[i]; });
+    }
+    LOBATTO_INLINE friend Mask<real, width> operator>(const Pack& a, const Pack& b) {
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] > b.part[i]; });
+    }
+    LOBATTO_INLINE friend Mask<real, width> operator>=(const Pack& a, const Pack& b) {
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] >= b.part[i]; });
+    }
+    LOBATTO_INLINE friend Mask<real, width> operator==(const Pack& a, const Pack& b) {
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] == b.part[i]; });
+    }
+    LOBATTO_INLINE friend Mask<real, width> operator!=(const Pack& a, const Pack& b) {
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] != b.part[i]; });
+    }
+
+    LOBATTO_INLINE friend Pack fused(const Pack& a, const Pack& b, const Pack& c) {
+        if constexpr (lanes == 1)
+            return of(LOBATTO_EACH(i) { return lobatto::fused(a.part[i], b.part[i], c.part[i]); });
+        else
+            return of(LOBATTO_EACH(i) { return registers::fused(a.part[i], b.part[i], c.part[i]); });
+    }
+    LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) { return select(a < b, a, b); }
+    LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) { return select(a > b, a, b); }
+
+    LOBATTO_INLINE friend Bits<real, width> bits(const Pack& a) {
+        return Bits<real, width>::of(LOBATTO_EACH(i) {
+            typename Bits<real, width>::Part x;
+            __builtin_memcpy(&x, &a.part[i], sizeof x);
+            return x;
+        });
+    }
+
+    // Over the lanes, by halves: (0 + 2) + (1 + 3) for four.
+    LOBATTO_INLINE friend real sum(const Pack& a) {
+        if constexpr (width == 1)
+            return a.part[0];
+        else
+            return sum(a.half(0) + a.half(1));
+    }
+    LOBATTO_INLINE friend real largest(const Pack& a) {
+        if constexpr (width == 1)
+            return a.part[0];
+        else
+            return largest(maximum(a.half(0), a.half(1)));
+    }
+
+    // The first (0) or second (1) half of the lanes.
+    LOBATTO_INLINE Pack<real, (width > 1 ? width / 2 : 1)> half(int which) const {
+        using Half = Pack<real, (width > 1 ? width / 2 : 1)>;
+        if constexpr (count > 1)
+            return Half::of(LOBATTO_EACH(i) { return part[which * Half::count + i]; });
+        else
+            return half_register<Half>(which, std::make_integer_sequence<int, Half::lanes>());
+    }
+
+private:
+    template <class Half, int... i>
+    LOBATTO_INLINE Half half_register(int which, std::integer_sequence<int, i...>) const {
+        Half result;
+        if constexpr (Half::lanes == 1) {
+            result.part[0] = (*this)[which];
+        } else {
+#if __has_builtin(__builtin_shufflevector)
+            result.part[0] = which == 0 ? __builtin_shufflevector(part[0], part[0], i...)
+                                        : __builtin_shufflevector(part[0], part[0], (i + Half::lanes)...);
+#else
+            ((result.part[0][i] = part[0][which * Half::lanes + i]), ...);
+#endif
+        }
+        return result;
+    }
+    template <int... i>
+    LOBATTO_INLINE void copy(const Pack& other, std::integer_sequence<int, i...>) {
+        ((part[i] = other.part[i]), ...);
+    }
+    template <class F, int... i>
+    LOBATTO_INLINE static Pack of(F f, std::integer_sequence<int, i...>) {
+        Pack result;
+        ((result.part[i] = f(i)), ...);
+        return result;
+    }
+    template <int... i>
+    LOBATTO_INLINE void store(real* to, std::integer_sequence<int, i...>) const {
+        (__builtin_memcpy(to + i * lanes, &part[i], sizeof(Part)), ...);
+    }
+};
+
+template <class real, int width>
+struct Mask {
+    static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
+    using Each = typename Shape<real, width>::Each;
+    using Part = typename Register<real, lanes>::Truths;
+
+    Part part[count];
+
+    Mask() = default;
+    LOBATTO_INLINE Mask(bool truth)
+        : Mask(of(LOBATTO_EACH() {
+              if constexpr (lanes == 1)
+                  return truth;
+              else
+                  return Part{} - truth;
+          })) {}
+
+    template <class F>
+    LOBATTO_INLINE static Mask of(F f) {
+        return of(f, Each{});
+    }
+
+    LOBATTO_INLINE bool operator[](int lane) const {
+        if constexpr (lanes == 1)
+            return part[lane];
+        else
+            return part[lane / lanes][lane % lanes] != 0;
+    }
+    LOBATTO_INLINE void set(int lane, bool truth) {
+        if constexpr (lanes == 1)
+            part[lane] = truth;
+        else
+            part[lane / lanes][lane % lanes] = truth ? -1 : 0;
+    }
+
+    LOBATTO_INLINE Mask operator!() const {
+        if constexpr (lanes == 1)
+            return of(LOBATTO_EACH(i) { return !part[i]; });
+        else
+            return of(LOBATTO_EACH(i) { return ~part[i]; });
+    }
+    LOBATTO_INLINE friend Mask operator&(const Mask& a, const Mask& b) {
+        return of(LOBATTO_EACH(i) { return Part(a.part[i] & b.part[i]); });
+    }
+    LOBATTO_INLINE friend Mask operator|(const Mask& a, const Mask& b) {
+        return of(LOBATTO_EACH(i) { return Part(a.part[i] | b.part[i]); });
+    }
+
+    LOBATTO_INLINE friend bool any(const Mask& a) {
+        const Part joined = a.joined(Each{});
+        if constexpr (lanes == 1)
+            return joined;
+        else
+            return registers::any(joined);
+    }
+    LOBATTO_INLINE friend bool all(const Mask& a) {
+        const Part common = a.common(Each{});
+        if constexpr (lanes == 1)
+            return common;
+        else
+            return registers::all(common);
+    }
+
+    // a where the mask holds, b elsewhere.
+    LOBATTO_INLINE friend Pack<real, width> select(const Mask& mask, const Pack<real, width>& a,
+                                                   const Pack<real, width>& b) {
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return mask.part[i] ? a.part[i] : b.part[i]; });
+    }
+
+private:
+    template <class F, int... i>
+    LOBATTO_INLINE static Mask of(F f, std::integer_sequence<int, i...>) {
+        Mask result;
+        ((result.part[i] = f(i)), ...);
+        return result;
+    }
+    template <int... i>
+    LOBATTO_INLINE Part joined(std::integer_sequence<int, i...>) const {
+        return Part((part[i] | ...));
+    }
+    template <int... i>
+    LOBATTO_INLINE Part common(std::integer_sequence<int, i...>) const {
+        return Part((part[i] & ...));
+    }
+};
+
+template <class real, int width>
+struct Bits {
+    static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
+    using Each = typename Shape<real, width>::Each;
+    using Part = typename Register<real, lanes>::Integers;
+    using Naturals = typename Register<real, lanes>::Naturals;
+    using Integer = typename Register<real, 1>::Integers;
+
+    Part part[count];
+
+    Bits() = default;
+    LOBATTO_INLINE Bits(Integer x) : Bits(of(LOBATTO_EACH() { return Part{} + x; })) {}
+
+    template <class F>
+    LOBATTO_INLINE static Bits of(F f) {
+        return of(f, Each{});
+    }
+
+    LOBATTO_INLINE friend Bits operator+(const Bits& a, const Bits& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] + b.part[i]; });
+    }
+    LOBATTO_INLINE friend Bits operator-(const Bits& a, const Bits& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] - b.part[i]; });
+    }
+    LOBATTO_INLINE friend Bits operator&(const Bits& a, const Bits& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] & b.part[i]; });
+    }
+    LOBATTO_INLINE friend Bits operator|(const Bits& a, const Bits& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] | b.part[i]; });
+    }
+    LOBATTO_INLINE friend Bits operator^(const Bits& a, const Bits& b) {
+        return of(LOBATTO_EACH(i) { return a.part[i] ^ b.part[i]; });
+    }
+    LOBATTO_INLINE Bits operator~() const {
+        return of(LOBATTO_EACH(i) { return ~part[i]; });
+    }
+    LOBATTO_INLINE friend Bits operator<<(const Bits& a, int places) {
+        return of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] << places); });
+    }
+
+    LOBATTO_INLINE friend Bits operator>>(const Bits& a, int places) {  // zeros come in
+        return of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] >> places); });
+    }
+
+    // The numbers of these bits.
+    LOBATTO_INLINE friend Pack<real, width> from_bits(const Bits& a) {
+        return Pack<real, width>::of(LOBATTO_EACH(i) {
+            typename Pack<real, width>::Part x;
+            __builtin_memcpy(&x, &a.part[i], sizeof x);
+            return x;
+        });
+    }
+    // Where the last bit is set.
+    LOBATTO_INLINE friend Mask<real, width> is_odd(const Bits& a) {
+        constexpr int top = 8 * sizeof(Integer) - 1;
+        return Mask<real, width>::of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] << top) < 0; });
+    }
+
+private:
+    template <class F, int... i>
+    LOBATTO_INLINE static Bits of(F f, std::integer_sequence<int, i...>) {
+        Bits result;
+        ((result.part[i] = f(i)), ...);
+        return result;
+    }
+};
+
+// These two, like the functions of base/functions.hpp, are also found by their full names lobatto::sqrt,
+// lobatto::fabs.
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
+    if constexpr (Pack<real, width>::lanes == 1)
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::sqrt(a.part[i]); });
+    else
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return registers::square_root(a.part[i]); });
+}
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
+    if constexpr (Pack<real, width>::lanes == 1)
+        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::fabs(a.part[i]); });
+    else
+        return from_bits(bits(a) & ~bits(Pack<real, width>(real(-0.0))));
+}
+
+// 1/x for x from the smallest normal number to a quarter of the largest, within a seventh of it: the exponent with its
+// sign changed, and the significand drawn as a line.
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> rough_inverse(const Pack<real, width>& x) {
+    using Integer = typename Bits<real, width>::Integer;
+    constexpr Integer line = sizeof(real) == 8 ? Integer(0x7fde623822fc16e6) : Integer(0x7ef311c7);
+    return from_bits(Bits<real, width>(line) - bits(x));
+}
+
+// a b + c of plain numbers, of Packs, or of both: for emitted formulas, whose kernel may bear any name.
+template <class A, class B, class C>
+LOBATTO_INLINE auto fused_sum(const A& a, const B& b, const C& c) {
+    return fused(a, b, c);
+}
+
+// How many lanes a type has, and of which number.
+template <class T>
+constexpr int lanes_of = 1;
+template <class real, int width>
+constexpr int lanes_of<Pack<real, width>> = width;
+
+template <class T>
+struct RealOf {
+    using type = T;
+};
+template <class real, int width>
+struct RealOf<Pack<real, width>> {
+    using type = real;
+};
+template <class T>
+using real_of = typename RealOf<T>::type;
+
+// The last `places` lanes of `before` and then the first of `values`: a step of `places` to the right. One register.
+template <int places, class real, int width, int... lanes>
+LOBATTO_INLINE Pack<real, width> moved_on(const Pack<real, width>& before, const Pack<real, width>& values,
+                                          std::integer_sequence<int, lanes...>) {
+    Pack<real, width> result;
+#ifdef LOBATTO_SHIFTS
+    if constexpr (width * sizeof(real) == 64) {
+        result.part[0] = registers::moved_on<places>(before.part[0], values.part[0]);
+        return result;
+    }
+#endif
+#if __has_builtin(__builtin_shufflevector)
+    result.part[0] = __builtin_shufflevector(before.part[0], values.part[0], (width - places + lanes)...);
+#else
+    ((result.part[0][lanes] = lanes < places ? before.part[0][(width - places + lanes) % width]
+                                             : values.part[0][(lanes - places + width) % width]),
+     ...);
+#endif
+    return result;
+}
+template <int places, class real, int width>
+LOBATTO_INLINE Pack<real, width> moved_on(const Pack<real, width>& before, const Pack<real, width>& values) {
+    static_assert(places >= 0 && places <= width && Pack<real, width>::count == 1);
+    if constexpr (places == 0)
+        return values;
+    else if constexpr (places == width)
+        return before;
+    else
+        return moved_on<places>(before, values, std::make_integer_sequence<int, width>());
+}
+
+// x in one lane; zero in the others.
+template <int lane, int width, class real>
+LOBATTO_INLINE Pack<real, width> only_lane(real x) {
+    Pack<real, width> result = Pack<real, width>(real(0));
+    result.set(lane, x);
+    return result;
+}
+
+// The first `count` lanes; zero in the others.
+template <class real, int width, int... lanes>
+LOBATTO_INLINE Pack<real, width> first_lanes(const Pack<real, width>& values, int count,
+                                             std::integer_sequence<int, lanes...>) {
+    const real numbers[width] = {real(lanes)...};
+    return select(Pack<real, width>::load(numbers) < Pack<real, width>(real(count)), values,
+                  Pack<real, width>(real(0)));
+}
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> first_lanes(const Pack<real, width>& values, int count) {
+    return first_lanes(values, count, std::make_integer_sequence<int, width>());
+}
+
+// One lane of a value, which may be a plain number.
+template <class real, int width>
+inline void set_lane(Pack<real, width>& value, int lane, real x) {
+    value.set(lane, x);
+}
+template <class real>
+inline void set_lane(real& value, int, real x) {
+    value = x;
+}
+template <class real, int width>
+inline real lane_of(const Pack<real, width>& value, int lane) {
+    return value[lane];
+}
+template <class real>
+inline real lane_of(const real& value, int) {
+    return value;
+}
+
+}  // namespace lobatto
+
+#endif

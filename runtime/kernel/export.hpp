@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: MIT
+// Wraps an emitted kernel K into the C structure of abi.h. Compiled into every kernel library, after kernel.hpp.
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <type_traits>
+
+#include "abi.h"
+#include "kernel.hpp"
+
+namespace lobatto {
+
+// In a library of single trajectories, and where trajectories side by side would be no faster.
+struct NoEnsemble {
+    static constexpr std::int32_t lanes = 0, bytes = 0, alignment = 0;
+    static constexpr std::nullptr_t prepare{}, start{}, advance{}, state{}, energy{};
+};
+
+#ifdef LOBATTO_ENSEMBLES
+// The functions of `lanes` trajectories side by side.
+template <class K, int width>
+struct ExportLanes {
+    using real = typename K::real;
+    using Side = Ensemble<K, width>;
+    static constexpr std::int32_t lanes = width, bytes = sizeof(Side), alignment = alignof(Side);
+
+    static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
+    static real* out(void* numbers) { return static_cast<real*>(numbers); }
+
+    // `use` with the statuses of the lanes.
+    template <class Use>
+    static void with(std::int32_t* codes, const Use& use) {
+        Status status[lanes];
+        for (int lane = 0; lane < lanes; ++lane) status[lane] = static_cast<Status>(codes[lane]);
+        use(+status);
+        for (int lane = 0; lane < lanes; ++lane) codes[lane] = static_cast<std::int32_t>(status[lane]);
+    }
+    static void prepare(void* ensemble, const void* parameters, const void* step, std::int32_t* codes) {
+        with(codes, [&](Status* status) { (new (ensemble) Side)->prepare(in(parameters), *in(step), status); });
+    }
+    static void start(void* ensemble, const void* time, const void* q, const void* p, std::int32_t* codes) {
+        with(codes, [&](Status* status) { static_cast<Side*>(ensemble)->start(*in(time), in(q), in(p), status); });
+    }
+    static void advance(void* ensemble, std::int64_t steps, double tolerance, std::int32_t* codes, std::int64_t* done,
+                        std::int64_t* iterations) {
+        with(codes, [&](Status* status) {
+            static_cast<Side*>(ensemble)->advance(steps, static_cast<real>(tolerance), status, done, iterations);
+        });
+    }
+    static void state(const void* ensemble, void* q, void* p) {
+        static_cast<const Side*>(ensemble)->state(out(q), out(p));
+    }
+    static void energy(const void* ensemble, void* value) { static_cast<const Side*>(ensemble)->energy(out(value)); }
+};
+#endif
+
+// The functions of one trajectory, and those of E.
+template <class K, class E = NoEnsemble>
+struct Export {
+    using real = typename K::real;
+    using S = Stepper<K>;
+    static constexpr int n = K::coordinates;
+    static constexpr bool has_dense = K::form != Form::linear_map;
+
+    static const S& of(const void* stepper) { return *static_cast<const S*>(stepper); }
+    static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
+    static real* out(void* numbers) { return static_cast<real*>(numbers); }
+    static std::int32_t code(Status status) { return static_cast<std::int32_t>(status); }
+
+    static std::int32_t prepare(void* stepper, const void* parameters, const void* step) {
+        typename K::Parameters values;
+        for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
+        S* const fresh = new (stepper) S;
+        if (*in(step) == real(0)) return LOBATTO_TIME_STANDS_STILL;
+        if (!is_finite(*in(step))) return LOBATTO_NOT_FINITE;
+        return code(fresh->prepare(values, *in(step)));
+    }
+
+    static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
+        return code(static_cast<S*>(stepper)->start(*in(time), in(q), in(p)));
+    }
+
+    static std::int32_t advance(void* stepper, lobatto_advance* call) {
+        call->steps_done = call->records_written = call->events_written = call->iterations = 0;
+        call->iterations_most = 0;
+        call->increment_largest = call->increment_failed = 0.0;
+        if ((call->dense > 0 && (!has_dense || call->record_every != 1)) || (call->events != nullptr && K::events == 0))
+            return call->status = LOBATTO_UNSUPPORTED;
+        if constexpr (sizeof(S) <= 4096) {
+            S local = of(stepper);  // a local copy: the optimiser may keep it in registers
+            const Status status = advance_in(local, *call);
+            *static_cast<S*>(stepper) = local;
+            return call->status = code(status);
+        } else {
+            return call->status = code(advance_in(*static_cast<S*>(stepper), *call));
+        }
+    }
+
+    static Status advance_in(S& stepper, lobatto_advance& call) {
+        stepper.tolerance = static_cast<real>(call.tolerance);
+        std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
+        for (std::int64_t i = 0; i < call.steps; ++i) {
+            if (until_record == 1 && call.records_written + call.dense >= call.capacity) break;
+            if constexpr (K::events > 0) {
+                if (call.events != nullptr && call.events_written + Events<K>::most > call.event_capacity) break;
+            }
+            const Status status = stepper.step();
+            if (status != Status::ok) {
+                call.increment_failed = static_cast<double>(stepper.increment);
+                return status;
+            }
+            ++call.steps_done;
+            if constexpr (S::N > 0) {
+                call.iterations += stepper.iterations;
+                if (stepper.iterations > call.iterations_most) call.iterations_most = stepper.iterations;
+                if (static_cast<double>(stepper.increment) > call.increment_largest)
+                    call.increment_largest = static_cast<double>(stepper.increment);
+            }
+            if constexpr (K::events > 0) {
+                if (call.events != nullptr)
+                    call.events_written +=
+                        Events<K>::look(stepper, out(call.events) + call.events_written * Events<K>::columns);
+            }
+            if (--until_record == 0) {
+                if constexpr (has_dense) {
+                    for (std::int32_t d = 1; d <= call.dense; ++d)
+                        Between<K>::row(stepper, real(d) / real(call.dense + 1), next_row(call));
+                }
+                real* const row = next_row(call);
+                row[0] = stepper.time();
+                for (int k = 0; k < n; ++k) row[1 + k] = stepper.q[k];
+                stepper.momentum(row + 1 + n);
+                until_record = call.record_every;
+            }
+        }
+        return Status::ok;
+    }
+    static real* next_row(lobatto_advance& call) { return out(call.records) + call.records_written++ * (1 + 2 * n); }
+
+    static void state(const void* stepper, void* time, void* q, void* p) {
+        *out(time) = of(stepper).time();
+        for (int k = 0; k < n; ++k) out(q)[k] = of(stepper).q[k];
+        of(stepper).momentum(out(p));
+    }
+
+    static void read_two_fold(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest) {
+        if constexpr (is_clean<K>()) {
+            for (int k = 0; k < n; ++k) {
+                out(q)[k] = of(stepper).q[k];
+                out(q_rest)[k] = of(stepper).q_rest[k];
+                out(velocity)[k] = of(stepper).u[k];
+                out(velocity_rest)[k] = of(stepper).u_rest[k];
+            }
+        }
+    }
+    static constexpr auto two_fold_state = is_clean<K>() ? read_two_fold : nullptr;
+
+    static std::int32_t dense(const void* stepper, const void* theta, void* q, void* velocity) {
+        if constexpr (has_dense) {
+            if (of(stepper).has_history) {
+                of(stepper).polynomial(*in(theta), out(q), out(velocity));
+                return LOBATTO_OK;
+            }
+        }
+        return LOBATTO_UNSUPPORTED;
+    }
+
+    static std::int32_t energy(const void* stepper, const void* time, const void* q, const void* p, void* energy) {
+        return code(of(stepper).energy(*in(time), in(q), in(p), out(energy)));
+    }
+    static void momentum(const void* stepper, const void* time, const void* q, const void* velocity, void* p) {
+        of(stepper).momentum(*in(time), in(q), in(velocity), out(p));
+    }
+    static std::int32_t velocity(const void* stepper, const void* time, const void* q, const void* p, void* velocity) {
+        return code(of(stepper).velocity(*in(time), in(q), in(p), out(velocity)));
+    }
+    static void slopes(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv, void* Lq) {
+        of(stepper).slopes(*in(time), in(q), in(velocity), out(Lv), out(Lq));
+    }
+    static std::int32_t residual(const void* stepper, const void* time, const void* q, const void* p, const void* X,
+                                 void* F) {
+        return code(of(stepper).residual(*in(time), in(q), in(p), in(X), out(F)));
+    }
+    static std::int32_t jacobian(const void* stepper, const void* time, const void* q, const void* p, const void* X,
+                                 void* J) {
+        return code(of(stepper).jacobian(*in(time), in(q), in(p), in(X), out(J)));
+    }
+    static std::int32_t tangent(const void* stepper, const void* time, const void* q, const void* p, void* q1, void* p1,
+                                void* T) {
+        return code(of(stepper).tangent(*in(time), in(q), in(p), out(q1), out(p1), out(T)));
+    }
+
+    static constexpr lobatto_real kind() {
+        return sizeof(real) == 4                      ? LOBATTO_FLOAT
+               : sizeof(real) == 8                    ? LOBATTO_DOUBLE
+               : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE
+                                                      : LOBATTO_FLOAT128;
+    }
+    static constexpr std::int32_t events_of_step() {
+        if constexpr (K::events > 0)
+            return Events<K>::most;
+        else
+            return 0;
+    }
+
+    static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
+                                             sizeof(lobatto_kernel),
+                                             K::name,
+                                             K::digest,
+                                             K::method,
+                                             kind(),
+                                             sizeof(real),
+                                             static_cast<std::int32_t>(K::form),
+                                             n,
+                                             K::parameter_count,
+                                             S::nodes,
+                                             K::order,
+                                             S::N,
+                                             K::autonomous ? 1 : 0,
+                                             K::linear ? 1 : 0,
+                                             K::has_energy ? 1 : 0,
+                                             K::has_tangent ? 1 : 0,
+                                             has_dense ? 1 : 0,
+                                             K::events,
+                                             events_of_step(),
+                                             sizeof(S),
+                                             alignof(S),
+                                             prepare,
+                                             start,
+                                             advance,
+                                             state,
+                                             two_fold_state,
+                                             dense,
+                                             energy,
+                                             momentum,
+                                             velocity,
+                                             slopes,
+                                             residual,
+                                             jacobian,
+                                             tangent,
+                                             E::lanes,
+                                             E::bytes,
+                                             E::alignment,
+                                             E::prepare,
+                                             E::start,
+                                             E::advance,
+                                             E::state,
+                                             K::has_energy ? E::energy : nullptr};
+};
+
+// With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster.
+#ifdef LOBATTO_ENSEMBLES
+template <class K, int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+using Exported = std::conditional_t<(lanes > 0), Export<Alone<K>, ExportLanes<K, lanes>>, Export<K>>;
+#else
+template <class K>
+using Exported = Export<K>;
+#endif
+
+}  // namespace lobatto
+
+#define LOBATTO_EXPORT_KERNEL(K)                                                                         \
+    extern "C" __attribute__((visibility("default"))) const lobatto_kernel* lobatto_kernel_table(void) { \
+        return &lobatto::Exported<K>::table;                                                             \
+    }

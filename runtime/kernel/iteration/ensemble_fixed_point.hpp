@@ -1,0 +1,441 @@
+// SPDX-License-Identifier: MIT
+// The step of many trajectories of a separable system side by side, one in each lane, by sweeps over its nodes.
+//
+// Formula numbers (D..) refer to docs/derivation.md. The unknown is what the nodes X still have to move by (D41): with
+// the stage map M = -h^2 P A (iteration/stage_map.hpp), W and S = dW/dq at X and the sums P that X was made with,
+//     delta = d + M (S - D) delta,    d = M (W - D X) - P
+// to first order. Where S pays (K::costly) one evaluation gives both sides, and delta follows by repetition; elsewhere
+// delta = d. X moves by delta and is evaluated again until delta is small.
+//
+// No lane sees its neighbours: one that is solved stands still while others go on, and what is computed of it again
+// has the same bits. What the tests ask for does not lie on the chain of operations that a step waits for.
+#ifndef LOBATTO_KERNEL_ENSEMBLE_SWEEPS_HPP
+#define LOBATTO_KERNEL_ENSEMBLE_SWEEPS_HPP
+
+#include "../base/contract.hpp"
+#include "../base/functions.hpp"
+#include "../base/numbers.hpp"
+#include "../base/pack.hpp"
+#include "stage_map.hpp"
+
+namespace lobatto {
+
+template <class K, class T>
+struct EnsembleSweeps : StageMap<K, T> {
+    using real = typename K::real;
+    using Tables = StageMap<K, T>;
+    using Tables::h, Tables::usable, Tables::has_history, Tables::w, Tables::rest, Tables::diagonal, Tables::node_time,
+        Tables::weight, Tables::arrival, Tables::map_of;
+    using Tables::n, Tables::s, Tables::m, Tables::inner_room, Tables::absorbs, Tables::entries, Tables::maps,
+        Tables::parts;
+    using typename Tables::Going;
+    static constexpr int values = inner_room * n;  // node by node
+    static constexpr int evaluation_limit = 16;
+    // With 16 registers, one coordinate and two nodes inside take 6 (pendulum) to 13 % (Duffing) less time as a
+    // function of their own; fewer nodes 8 % more, two coordinates up to 11 %.
+    static constexpr bool is_apart = n == 1 && m == 2 && register_bytes < 64;
+
+    struct Arrays {
+        T P[values], X[values], W[values], S[inner_room * entries], d[values], delta[values], bend[values];
+        T rate[n], inverse_scale[n], inverse_next[n], inverse_linear[n];
+    };
+
+    // Of increments: the square that is small enough, and what they are measured against at least, a part of the
+    // position's size and a number.
+    struct Measure {
+        real enough, part, least;
+    };
+
+    Measure settled, near;
+    T evaluations;  // of the last step
+    T drifting[n];  // the velocity before the last kick, so that the next step need not wait for it
+    T reach;        // root of the sum of squares of a row of M, the largest
+    Workspace<Arrays> workspace;
+
+    void prepare(const typename K::Coefficients& k, real step, int lane) {
+        Tables::prepare(k, step, lane);
+        real largest = real(0);
+        for (int c = 0; c < maps; ++c)
+            for (int i = 0; i < m; ++i) {
+                real squares = real(0);
+                for (int j = 0; j < m; ++j) {
+                    const real entry = lane_of(this->map[c].inner[j][i], lane);
+                    squares += entry * entry;
+                }
+                largest = maximum(largest, squares);
+            }
+        set_lane(reach, lane, sqrt(largest));
+    }
+    void begin(const real* q, const real* u, const real* W0, int lane) {
+        Tables::begin(q, W0, lane);
+        for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * W0[c]);
+    }
+    template <class Acceleration, class Position>
+    void recall(const real* u, const Acceleration& acceleration, const Position& position, int lane) {
+        Tables::recall(acceleration, position, lane);
+        for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * acceleration(s - 1, c));
+    }
+
+    // Increments of positions are measured against what a coordinate moves by in a step. They count as nothing when
+    // they are `tolerance` (0: rounding), and S as constant when they are its root.
+    void set_tolerance(real tolerance) {
+        const real small = maximum(tolerance, Limits<real>::epsilon);
+        const real linear = maximum(Limits<real>::root_epsilon, sqrt(tolerance));
+        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
+        settled = {small * small, maximum(floor, Limits<real>::epsilon / small), Limits<real>::smallest / small};
+        near = {linear * linear, maximum(floor, real(8) * Limits<real>::epsilon / linear),
+                real(8) * Limits<real>::smallest / linear};
+    }
+
+    // One step of the lanes `going`, h from `time`. The lanes that the answer names have moved; the others stay.
+    template <class Given>
+    LOBATTO_INLINE Going step(const Given& k, real time, T* q, T* u, Going going) {
+        const auto step_in = [&](Arrays& a) LOBATTO_FORMULA {
+            begin_step(q, u, a);
+            going = going & usable;
+            if constexpr (m == 0)
+                evaluations = T(real(0));
+            else if constexpr (K::costly)
+                going = solve_with_slopes(k, time, going, a);
+            else
+                going = solve(k, time, going, a);
+            return any(going) ? finish(k, time, q, u, going, a) : going;
+        };
+        if constexpr (is_apart)
+            return workspace.apart(step_in);
+        else
+            return workspace.with(step_in);
+    }
+
+private:
+    // start + sum_j column_j r_j, r_j `stride` apart.
+    template <int terms>
+    LOBATTO_INLINE static T sum_of(const T& start, const T (*column)[parts], int p, const T* r, int stride) {
+        T even = start, odd = T(real(0));
+#pragma GCC unroll 16
+        for (int j = 0; j < terms; ++j)
+            if (terms > 3 && j % 2 == 1)
+                odd = j == 1 ? column[j][p] * r[j * stride] : fused(column[j][p], r[j * stride], odd);
+            else
+                even = fused(column[j][p], r[j * stride], even);
+        return terms > 3 ? even + odd : even;
+    }
+
+    // The measures of increments, and X from the polynomial of the step before. Each coordinate has its own: increments
+    // as small as its rounding are so whatever the others do.
+    LOBATTO_INLINE void begin_step(const T* q, const T* u, Arrays& a) const {
+        for (int c = 0; c < n; ++c) {
+            const T W0 = w[c * s + s - 1], position = fabs(q[c]);
+            a.rate[c] = fused(T(-h * K::b[0]), W0, u[c]);
+            const T moved = T(fabs(h)) * (fabs(a.rate[c]) + fabs(T(h) * W0));
+            a.inverse_scale[c] = T(real(1)) / maximum(moved, fused(T(settled.part), position, T(settled.least)));
+            a.inverse_next[c] = reach * a.inverse_scale[c];
+            a.inverse_linear[c] = T(real(1)) / maximum(moved, fused(T(near.part), position, T(near.least)));
+            const T rate = fused(T(-h * (K::b[0] + K::b[s - 1])), W0, drifting[c]);
+            const auto& of = map_of(c);
+            const T* last;
+            if constexpr (absorbs)
+                last = rest + c * s;
+            else
+                last = w + c * s;
+            for (int j = 0; j < m; ++j) {
+                T& P = a.P[j * n + c];
+                if (has_history)
+                    P = sum_of<s - 1>(of.before[0][j] * last[0], of.before + 1, j, last + 1, 1);
+                else
+                    P = of.simple[j] * last[s - 1];
+                a.X[j * n + c] = fused(of.on_velocity[j], rate, (absorbs ? of.on_position[j] * q[c] : q[c]) + P);
+            }
+        }
+    }
+    // to += M r.
+    LOBATTO_INLINE void add_mapped(const T* r, T* to) const {
+        for (int c = 0; c < n; ++c)
+            for (int j = 0; j < m; ++j) to[j * n + c] = sum_of<m>(to[j * n + c], map_of(c).inner, j, r + c, n);
+    }
+    // M (W - D X) - P; where K has a remainder, W holds W - D X while it is solved for X.
+    LOBATTO_INLINE void residual(const Arrays& a, T* r) const {
+        for (int i = 0; i < values; ++i) r[i] = -a.P[i];
+        if constexpr (absorbs && !K::has_remainder) {
+            T rest_of[values];
+            for (int i = 0; i < values; ++i) rest_of[i] = fused(-diagonal[i % n], a.X[i], a.W[i]);
+            add_mapped(rest_of, r);
+        } else {
+            add_mapped(a.W, r);
+        }
+    }
+    // (S - D) x.
+    LOBATTO_INLINE void slopes_times(const Arrays& a, const T* x, T* product) const {
+        for (int j = 0; j < m; ++j) {
+            T* const sum = product + j * n;
+            for (int c = 0; c < n; ++c)
+                if constexpr (absorbs)
+                    sum[c] = -(diagonal[c] * x[j * n + c]);
+                else
+                    sum[c] = T(real(0));
+#pragma GCC unroll 16
+            for (int e = 0; e < K::entries; ++e) {
+                const T &S = a.S[j * entries + e], &moved = x[j * n + K::entry_column[e]];
+                T& to = sum[K::entry_row[e]];
+                to = !absorbs && first_in_row.holds[e] ? S * moved : fused(S, moved, to);
+            }
+        }
+    }
+    // Whether an entry of S is the first of its row.
+    struct FirstInRow {
+        bool holds[entries]{};
+        constexpr FirstInRow() {
+            for (int e = 0; e < K::entries; ++e) {
+                holds[e] = true;
+                for (int f = 0; f < e; ++f)
+                    if (K::entry_row[f] == K::entry_row[e]) holds[e] = false;
+            }
+        }
+    };
+    static constexpr FirstInRow first_in_row{};
+
+    // The sum of (x_i scale_i)^2.
+    LOBATTO_INLINE static T size(const T* x, const T* scale) {
+        T sum[2] = {T(real(0)), T(real(0))};  // two, which do not wait for each other
+        for (int i = 0; i < values; ++i) {
+            const T relative = x[i] * scale[i % n];
+            T& part = sum[i % 2];
+            part = i < 2 ? relative * relative : fused(relative, relative, part);
+        }
+        return values > 1 ? sum[0] + sum[1] : sum[0];
+    }
+
+    template <class Given>
+    LOBATTO_INLINE void evaluate(const Given& k, real time, Arrays& a) const {
+#pragma GCC unroll 4
+        for (int j = 0; j < m; ++j)
+            if constexpr (K::costly)
+                Formulas<K>::node(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n,
+                                  a.S + j * entries);
+            else if constexpr (K::has_remainder)
+                Formulas<K>::remainder(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+            else
+                Formulas<K>::acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+    }
+    // W at the nodes X.
+    template <class Given>
+    LOBATTO_INLINE void settle(const Given& k, real time, Arrays& a) const {
+        for (int j = 0; j < m; ++j)
+            Formulas<K>::acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+    }
+
+    // X and P of these lanes move on by delta.
+    LOBATTO_INLINE static void move_on(Going going, Arrays& a) {
+        for (int i = 0; i < values; ++i) {
+            const T delta = select(going, a.delta[i], T(real(0)));
+            a.X[i] += delta;
+            a.P[i] += delta;
+        }
+    }
+    // Whether increments of this size (squared) are still worth going on, from the fourth evaluation on.
+    LOBATTO_INLINE static Going shrinks(const T& e, const T& e_before, const T& enough) {
+        return (e < T(real(0.64)) * e_before) | (e <= T(real(256)) * enough);
+    }
+
+    // The lanes whose stage equations are solved, with W at their nodes X, by evaluations alone.
+    template <class Given>
+    LOBATTO_INLINE Going solve(const Given& k, real time, Going going, Arrays& a) {
+        const T enough = T(settled.enough);
+        T e_before = T(real(0));
+        Going solved = going & !going;
+        evaluations = T(real(0));
+        for (int evaluation = 1; evaluation <= evaluation_limit && any(going); ++evaluation) {
+            evaluate(k, time, a);
+            evaluations += select(going, T(real(1)), T(real(0)));
+            residual(a, a.delta);
+            const T e = size(a.delta, a.inverse_scale);
+            // What is left, e times its ratio to the one before, is rounding; or it no longer shrinks.
+            const Going ready = going & ((e * e <= enough * e_before) | (e <= enough) |
+                                         ((e <= T(real(256)) * enough) & (e >= T(real(0.25)) * e_before)));
+            move_on(going, a);
+            solved = solved | ready;
+            going = going & !ready;
+            if (evaluation > 3) going = going & shrinks(e, e_before, enough);
+            // Not beyond 1: a coordinate that began at rest moves by any multiple of nothing.
+            e_before = minimum(e, T(real(1)));
+        }
+        settle(k, time, a);
+        return solved;
+    }
+
+    // The same by evaluations with S: X becomes the nodes, and W is carried to them. One sweep with S follows the first
+    // evaluation; it is often the last.
+    template <class Given>
+    LOBATTO_INLINE Going solve_with_slopes(const Given& k, real time, Going going, Arrays& a) {
+        evaluate(k, time, a);
+        residual(a, a.d);
+        slopes_times(a, a.d, a.bend);
+        Going at_first = sweep(a);
+        at_first = at_first & S_stands_for_W(a);  // of what the sweep has left, so not in one expression
+        evaluations = select(going, T(real(1)), T(real(0)));
+        if (any(going & !at_first)) going = evaluate_again(k, time, going, at_first, a);
+        for (int i = 0; i < values; ++i) {
+            a.X[i] += a.delta[i];
+            if constexpr (absorbs) a.bend[i] = fused(diagonal[i % n], a.delta[i], a.bend[i]);
+            a.W[i] += a.bend[i];
+        }
+        return going;
+    }
+    // The evaluations after the first, each with two sweeps; `at_first`: the lanes that need none of them.
+    template <class Given>
+    LOBATTO_INLINE Going evaluate_again(const Given& k, real time, Going going, Going at_first, Arrays& a) {
+        T e_before = T(real(0));
+        Going further = going & !at_first;
+        for (int evaluation = 2;; ++evaluation) {
+            move_on(further, a);
+            evaluate(k, time, a);
+            evaluations += select(further, T(real(1)), T(real(0)));
+            residual(a, a.d);
+            slopes_times(a, a.d, a.bend);
+            Going is_solved = sweep(a);
+            is_solved = sweep_others(at_first, is_solved, a);
+            is_solved = is_solved & S_stands_for_W(a);
+            further = going & !is_solved;
+            if (!any(further)) break;
+            if (evaluation == evaluation_limit) return going & is_solved;
+            if (evaluation >= 3) {
+                const T e = size(a.d, a.inverse_scale);
+                if (evaluation > 3) going = going & (is_solved | shrinks(e, e_before, T(settled.enough)));
+                e_before = e;
+                further = going & further;
+            }
+        }
+        return going;
+    }
+
+    LOBATTO_INLINE Going S_stands_for_W(const Arrays& a) const {
+        return size(a.delta, a.inverse_linear) <= T(near.enough);
+    }
+    // delta = d + M bend, and bend = (S - D) delta; where the next sweep would change nothing: it would move X by M
+    // times what `bend` has changed by, at most `reach` times its size.
+    LOBATTO_INLINE Going sweep(Arrays& a) const {
+        T change[values];
+        for (int i = 0; i < values; ++i) {
+            change[i] = a.bend[i];
+            a.delta[i] = a.d[i];
+        }
+        add_mapped(a.bend, a.delta);
+        slopes_times(a, a.delta, a.bend);
+        for (int i = 0; i < values; ++i) change[i] = a.bend[i] - change[i];
+        return size(change, a.inverse_next) <= T(settled.enough);
+    }
+    // Another sweep, but of the lanes `resting`, whose answer is `known`.
+    LOBATTO_INLINE Going sweep_others(Going resting, Going known, Arrays& a) const {
+        if (!any(resting)) return sweep(a);
+        T bend[values], delta[values];
+        for (int i = 0; i < values; ++i) {
+            bend[i] = a.bend[i];
+            delta[i] = a.delta[i];
+        }
+        const Going found = sweep(a);
+        for (int i = 0; i < values; ++i) {
+            a.bend[i] = select(resting, bend[i], a.bend[i]);
+            a.delta[i] = select(resting, delta[i], a.delta[i]);
+        }
+        return (known & resting) | (found & !resting);
+    }
+
+    // (D16), (D17): the end of the step, each sum of increments rounded once; then the memory of the step.
+    template <class Given>
+    LOBATTO_INLINE Going finish(const Given& k, real time, T* q, T* u, Going solved, const Arrays& a) {
+        T q1[n], u1[n], W1[n], change[n];
+        for (int c = 0; c < n; ++c) {
+            const T* const W = a.W + c;
+            q1[c] = q[c] + sum_over_nodes(T(h) * a.rate[c], arrival, W);
+            change[c] = sum_over_nodes(T(-h * K::b[0]) * w[c * s + s - 1], weight, W);
+        }
+        Formulas<K>::acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
+        T not_finite = T(real(0));
+        for (int c = 0; c < n; ++c) {
+            u1[c] = u[c] + fused(T(-h * K::b[s - 1]), W1[c], change[c]);
+            not_finite = fused(T(real(0)), q1[c] + u1[c], not_finite);
+        }
+        solved = solved & (not_finite == T(real(0)));
+        if (all(solved))
+            remember<true>(q, u, q1, u1, change, W1, solved, a);
+        else if (any(solved))
+            remember<false>(q, u, q1, u1, change, W1, solved, a);
+        return solved;
+    }
+    LOBATTO_INLINE static T sum_over_nodes(const T& start, const T* factor, const T* W) {
+        T sum = start;
+        for (int j = 0; j < m; ++j) sum = fused(factor[j], W[j * n], sum);
+        return sum;
+    }
+
+    // The end of the step becomes the state, and its accelerations the memory, of all lanes or of those solved.
+    template <bool is_all>
+    LOBATTO_INLINE void remember(T* q, T* u, const T* q1, const T* u1, const T* change, const T* W1, Going solved,
+                                 const Arrays& a) {
+        const auto keep = [&](T& old, const T& value)
+                              LOBATTO_FORMULA { old = is_all ? value : select(solved, value, old); };
+        for (int c = 0; c < n; ++c) {
+            T* const memory = w + c * s;
+            keep(memory[0], memory[s - 1]);
+            for (int j = 0; j < m; ++j) keep(memory[j + 1], a.W[j * n + c]);
+            keep(memory[s - 1], W1[c]);
+            if constexpr (absorbs) {
+                T* const r = rest + c * s;
+                keep(r[0], r[s - 1]);
+                for (int j = 0; j < m; ++j) keep(r[j + 1], fused(-diagonal[c], a.X[j * n + c], a.W[j * n + c]));
+                keep(r[s - 1], fused(-diagonal[c], q1[c], W1[c]));
+            }
+            keep(drifting[c], u[c] + change[c]);
+            keep(q[c], q1[c]);
+            keep(u[c], u1[c]);
+        }
+        has_history = true;
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::separable, Stepping::solved> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], u[n], evaluations = T(real(0));
+    EnsembleSweeps<K, T> sweeps;
+
+    const T& position(int c) const { return q[c]; }
+    void prepare(const Single<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
+    void set_tolerance(real tolerance) { sweeps.set_tolerance(tolerance); }
+    void start(const Single<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        sweeps.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
+    }
+    void momentum(const Single<K>& single, int lane, real* momentum) const {
+        real velocity[n];
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
+        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const Going moved = sweeps.step(k, time, q, u, going);
+        evaluations = sweeps.evaluations;
+        return moved;
+    }
+    // Takes over the state and the memory of the step that `single` has taken.
+    void follow(const Single<K>& single, int lane) {
+        follow_state(single, lane);
+        sweeps.recall(
+            single.u, [&](int i, int c) { return single.node_acceleration(i, c); },
+            [&](int i, int c) { return single.node_position(i, c); }, lane);
+    }
+
+private:
+    void follow_state(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(u[c], lane, single.u[c]);
+        }
+    }
+};
+
+}  // namespace lobatto
+
+#endif

@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: MIT
+// The step of any Lagrangian system by sweeps over its nodes: no equations larger than the mass matrix of one node.
+//
+// With V, P = dL/dv and F = dL/dq + forces at the r nodes, A the matrix that integrates over the node polynomials,
+// A'_ij = b_j (1 - A_ji / b_i), and pi the Legendre polynomial of degree r - 1 for Lobatto's nodes, nothing for
+// Gauss's, the Galerkin equations (D28) are (D35)
+//     Q_i = q + h sum_j A_ij V_j,   P_i = p + h sum_j A'_ij F_j + kappa pi_i,   P_i = L_v(Q_i, V_i),   sum_i b_i pi_i
+//     V_i = 0 q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j
+// A sweep takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps the
+// last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every sweep.
+// Angles are taken from those at the start of the step (base/angles.hpp).
+#ifndef LOBATTO_KERNEL_GALERKIN_HPP
+#define LOBATTO_KERNEL_GALERKIN_HPP
+
+#include <type_traits>
+
+#include "../base/angles.hpp"
+#include "../base/contract.hpp"
+#include "../base/functions.hpp"
+#include "../base/numbers.hpp"
+#include "../base/pack.hpp"
+#include "stage_map.hpp"
+
+namespace lobatto {
+
+// M = L D L^T of a symmetric matrix, in place: L below the diagonal, 1/D on it. No pivoting: a mass matrix is positive
+// definite as a rule, and where it is not, what fails shows as not finite or not converging.
+template <int n, class V>
+LOBATTO_INLINE void factor_symmetric(V* M) {
+#pragma GCC unroll 8
+    for (int k = 0; k < n; ++k) {
+        V row[n];  // L_kj D_j
+        V pivot = M[k * n + k];
+#pragma GCC unroll 8
+        for (int j = 0; j < k; ++j) {
+            row[j] = M[k * n + j];
+#pragma GCC unroll 8
+            for (int l = 0; l < j; ++l) row[j] = fused(-row[l], M[j * n + l], row[j]);
+            M[k * n + j] = row[j] * M[j * n + j];
+            pivot = fused(-row[j], M[k * n + j], pivot);
+        }
+        M[k * n + k] = V(real_of<V>(1)) / pivot;
+    }
+}
+template <int n, class V>
+LOBATTO_INLINE void solve_symmetric(const V* M, V* x) {
+#pragma GCC unroll 8
+    for (int k = 1; k < n; ++k)
+#pragma GCC unroll 8
+        for (int j = 0; j < k; ++j) x[k] = fused(-M[k * n + j], x[j], x[k]);
+    for (int k = n - 1; k >= 0; --k) {
+        x[k] *= M[k * n + k];
+#pragma GCC unroll 8
+        for (int j = k + 1; j < n; ++j) x[k] = fused(-M[j * n + k], x[j], x[k]);
+    }
+}
+
+template <class K, class T>
+struct GalerkinSweeps {
+    using real = typename K::real;
+    static constexpr int n = K::coordinates, r = K::nodes;
+    using Layout = NodeLayout<real, T, r - 1>;  // r nodes
+    using V = typename Layout::V;
+    static constexpr bool in_lanes = Layout::in_lanes;
+    static constexpr int width = Layout::width, parts = Layout::parts_of(r), entries = K::mass_entries;
+    static constexpr int evaluation_limit = 30;
+    using Going = decltype(T() < T());
+
+    static constexpr bool has_kappa() {
+        for (int i = 0; i < r; ++i)
+            if (K::legendre_polynomial[i] != real(0)) return true;
+        return false;
+    }
+
+    struct Arrays {
+        V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[parts * n * n];
+        T flat[n * parts * width], flat_v[n * parts * width], inverse_scale[n];
+        AngleTable<V, parts, K::angles> near;
+    };
+
+    V position_map[r][parts], momentum_map[r][parts];  // h A and h A', a column for each node
+    V weight[parts], legendre[parts];                  // h b and pi; zero in lanes to spare
+    V ahead[r][parts], node_time[parts];
+    real h{};
+    real tolerance{};  // of increments, relative; 0: to rounding
+    T v[n * r];        // velocities at the nodes of the last step
+    T kappa[n];        // of the last step
+    T evaluations;     // of the last step
+    T increment;       // the last one of the last step, relative
+    Workspace<Arrays> workspace;
+
+    void prepare(real step) {
+        h = step;
+        for (int i = 0; i < parts * width; ++i) {
+            const bool is_node = i < r;
+            const int node = is_node ? i : r - 1;
+            for (int j = 0; j < r; ++j) {
+                put(position_map[j], i, h * K::integration[node * r + j]);
+                put(momentum_map[j], i, h * (K::b[j] * (real(1) - K::integration[j * r + node] / K::b[node])));
+                put(ahead[j], i, K::ahead[node * r + j]);
+            }
+            put(node_time, i, h * K::c[node]);
+            put(weight, i, is_node ? h * K::b[node] : real(0));
+            put(legendre, i, K::legendre_polynomial[node]);
+        }
+    }
+
+    // Begins with this velocity.
+    void begin(const real* velocity, int lane = 0) {
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity[c]);
+            set_lane(kappa[c], lane, real(0));
+        }
+    }
+
+    // One step of the lanes `going`, h from `time`. The lanes that the answer names have moved; the others stay.
+    template <class Given>
+    Going step(const Given& k, real time, T* q, T* p, Going going) {
+        return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, going, a); });
+    }
+
+    // Displacement and velocity of coordinate c of the last step at control point j + 1 and node i.
+    T displacement(int c, int j) const {
+        T sum = T(real(0));
+        for (int i = 0; i < r; ++i) sum = fused(T(K::reach[j * r + i]), v[c * r + i], sum);
+        return T(h) * sum;
+    }
+    // The memory of a step taken otherwise.
+    template <class Velocity>
+    void recall(const Velocity& velocity, int lane = 0) {
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c)
+            for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity(c, i));
+    }
+
+private:
+    static void put(V* values, int i, real x) {
+        if constexpr (in_lanes)
+            set_lane(values[i / width], i % width, x);
+        else
+            values[i] = V(x);
+    }
+
+    // base + sum_j column_j x_j of one part.
+    LOBATTO_INLINE static V sum_of(const V& base, const V (*column)[parts], int p, const T* x) {
+        V even = base, odd = V(real(0));
+#pragma GCC unroll 16
+        for (int j = 0; j < r; ++j) {
+            V& sum = j % 2 == 0 ? even : odd;
+            sum = fused(column[j][p], V(x[j]), sum);
+        }
+        return even + odd;
+    }
+    // sum_i w_i x_i over the nodes.
+    LOBATTO_INLINE static T over_nodes(const V* w, const V* x, int stride) {
+        V total = w[0] * x[0];
+        for (int p = 1; p < parts; ++p) total = fused(w[p], x[p * stride], total);
+        if constexpr (in_lanes)
+            return sum(total);
+        else
+            return total;
+    }
+
+    template <class Given>
+    Going step_in(const Given& k, real time, T* q, T* p, Going going, Arrays& a) {
+        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
+        // Each coordinate has its own measure: increments as small as its rounding are so whatever the others do.
+        const real least = maximum(tolerance, Limits<real>::epsilon);
+        T kappa_now[n];
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            T* const flat = a.flat + c * parts * width;
+            V fastest = V(real(0));
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) {
+                V& v_part = a.v[part * n + c];
+                v_part = sum_of(V(real(0)), ahead, part, v + c * r);
+                lay_flat<1>(&v_part, 1, flat + part * width);
+                fastest = maximum(fastest, fabs(v_part));
+            }
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) a.Q[part * n + c] = sum_of(V(q[c]), position_map, part, flat);
+            T speed;
+            if constexpr (in_lanes)
+                speed = largest(fastest);
+            else
+                speed = fastest;
+            const T scale = fabs(T(h)) * speed + T(floor) * fabs(q[c]);
+            const T rounding = T(Limits<real>::epsilon / least) * fabs(q[c]) + T(Limits<real>::smallest);
+            a.inverse_scale[c] = fabs(T(h)) / maximum(scale, rounding);
+            kappa_now[c] = kappa[c];
+        }
+        if constexpr (K::angles > 0) look_around(k, time, q, a);
+        const T small = T(least);
+        Going solved = going & !going;
+        T e_before = T(Limits<real>::largest);
+        evaluations = T(real(0));
+        for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
+            evaluations = select(going, evaluations + T(real(1)), evaluations);
+            const T e = sweep(k, time, q, p, kappa_now, a);
+            if (evaluation > 4) going = going & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * small));
+            // Or no longer shrinking: the rounding of what it is computed from.
+            const Going done =
+                going & ((e <= T(real(2)) * small) | ((e <= T(real(64)) * small) & (e >= T(real(0.5)) * e_before)));
+            if (any(done)) {
+                increment = select(done, e, increment);
+                solved = solved | finish(q, p, kappa_now, done, a);
+                going = going & !done;
+            }
+            if (!any(going)) break;
+            e_before = e;
+        }
+        return solved;
+    }
+
+    // The angles at the start of the step are those that all its nodes are near; those of velocities with the velocity
+    // of the last step's last node. Nothing else of the stage is computed.
+    template <class Given>
+    LOBATTO_INLINE void look_around(const Given& k, real time, const T* q, Arrays& a) const {
+        using Start = Pack<real, lanes_of<T>>;
+        Angle<Start> angles[K::angles];
+        Start position[n], velocity[n], Lv[n], F[n], M[entries];
+        for (int c = 0; c < n; ++c) {
+            position[c] = Start(q[c]);
+            velocity[c] = Start(v[c * r + r - 1]);
+        }
+        Formulas<K>::stage(k, Start(time), static_cast<const Start*>(position), static_cast<const Start*>(velocity),
+                           +Lv, +F, +M, AnglesKept<Start>{angles});
+        const auto spread = [](const Start& x) LOBATTO_FORMULA {
+            if constexpr (in_lanes)
+                return V(x[0]);
+            else
+                return x;
+        };
+        for (int part = 0; part < parts; ++part)
+            for (int i = 0; i < K::angles; ++i)
+                a.near.of(part)[i] = {spread(angles[i].x), spread(angles[i].sine), spread(angles[i].cosine)};
+    }
+
+    // One sweep; the largest change of a velocity, relative.
+    template <class Given>
+    LOBATTO_INLINE T sweep(const Given& k, real time, const T* q, const T* p, T* kappa_now, Arrays& a) {
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) {
+            V packed[entries];
+            V* const M = a.M + part * n * n;
+            const V* const Q = a.Q + part * n;
+            const V* const velocity = a.v + part * n;
+            if constexpr (K::angles > 0)
+                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed,
+                                   AnglesNear<V>{a.near.of(part)});
+            else
+                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed);
+#pragma GCC unroll 8
+            for (int i = 0; i < n * n; ++i) M[i] = V(real(0));
+            for (int e = 0; e < entries; ++e) M[K::mass_row[e] * n + K::mass_column[e]] = packed[e];
+            factor_symmetric<n>(M);
+        }
+        // P - L_v
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            T* const flat = a.flat + c * parts * width;
+            lay_flat<parts>(a.F + c, n, flat);
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) {
+                V& residual = a.Lv[part * n + c];
+                V target = sum_of(V(p[c]) - residual, momentum_map, part, flat);
+                if constexpr (has_kappa()) target = fused(legendre[part], V(kappa_now[c]), target);
+                residual = target;
+            }
+        }
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) {
+            V* const x = a.Lv + part * n;
+            solve_symmetric<n>(a.M + part * n * n, x);
+#pragma GCC unroll 8
+            for (int c = 0; c < n; ++c) x[c] += a.v[part * n + c];  // the new velocities
+        }
+        if constexpr (has_kappa()) correct(kappa_now, a);
+        V worst = V(real(0));
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            T* const flat = a.flat_v + c * parts * width;
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) {
+                V &next = a.Lv[part * n + c], &now = a.v[part * n + c];
+                worst = maximum(worst, fabs(next - now) * V(a.inverse_scale[c]));
+                now = next;
+                lay_flat<1>(&now, 1, flat + part * width);
+            }
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) a.Q[part * n + c] = sum_of(V(q[c]), position_map, part, flat);
+        }
+        if constexpr (in_lanes)
+            return fabs(largest(worst));
+        else
+            return fabs(worst);
+    }
+
+    // kappa <- kappa + d, V <- V + M^-1 pi d with sum b pi V = 0.
+    LOBATTO_INLINE void correct(T* kappa_now, Arrays& a) {
+        V weighted[parts];  // h b pi
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
+        T S[n * n], d[n];
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) d[c] = -over_nodes(weighted, a.Lv + c, n);
+            // S = sum h b pi^2 M^-1, column by column.
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            V columns[parts * n];
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) {
+#pragma GCC unroll 8
+                for (int i = 0; i < n; ++i) columns[part * n + i] = i == c ? legendre[part] : V(real(0));
+                solve_symmetric<n>(a.M + part * n * n, columns + part * n);
+            }
+#pragma GCC unroll 8
+            for (int i = c; i < n; ++i) S[i * n + c] = over_nodes(weighted, columns + i, n);
+        }
+        factor_symmetric<n>(S);
+        solve_symmetric<n>(S, d);
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) {
+            V x[n];
+#pragma GCC unroll 8
+            for (int c = 0; c < n; ++c) x[c] = legendre[part] * V(d[c]);
+            solve_symmetric<n>(a.M + part * n * n, x);
+#pragma GCC unroll 8
+            for (int c = 0; c < n; ++c) a.Lv[part * n + c] += x[c];
+        }
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
+    }
+
+    Going finish(T* q, T* p, const T* kappa_now, Going done, Arrays& a) {
+        T q1[n], p1[n], not_finite = T(real(0));
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            q1[c] = q[c] + over_nodes(weight, a.v + c, n);
+            p1[c] = p[c] + over_nodes(weight, a.F + c, n);
+            not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
+        }
+        done = done & (not_finite == T(real(0)));
+        if (!any(done)) return done;
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            const T* const flat = a.flat_v + c * parts * width;
+            for (int i = 0; i < r; ++i) v[c * r + i] = select(done, flat[i], v[c * r + i]);
+            kappa[c] = select(done, kappa_now[c], kappa[c]);
+            q[c] = select(done, q1[c], q[c]);
+            p[c] = select(done, p1[c], p[c]);
+        }
+        return done;
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::general, Stepping::solved> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], p[n], evaluations = T(real(0));
+    GalerkinSweeps<K, T> sweeps;
+
+    const T& position(int c) const { return q[c]; }
+    void prepare(const Single<K>& single, int) { sweeps.prepare(single.step_size); }
+    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
+    void start(const Single<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        real velocity[n] = {};
+        single.velocity(single.time(), single.q, single.p, velocity);
+        sweeps.begin(velocity, lane);
+    }
+    void momentum(const Single<K>&, int lane, real* momentum) const {
+        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
+    }
+    template <class Given>
+    [[gnu::noinline]] Going step(const Given& k, real time, Going going) {
+        const Going moved = sweeps.step(k, time, q, p, going);
+        evaluations = sweeps.evaluations;
+        return moved;
+    }
+    void follow(const Single<K>& single, int lane) {
+        follow_state(single, lane);
+        sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
+    }
+
+private:
+    void follow_state(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, single.p[c]);
+        }
+    }
+};
+
+}  // namespace lobatto
+
+#endif

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// What emitted kernels stand on: Stepper<K>, the life in time of a kernel K. C++17, no allocation.
+#ifndef LOBATTO_KERNEL_HPP
+#define LOBATTO_KERNEL_HPP
+
+#include "base/angles.hpp"
+#include "base/contract.hpp"
+#include "base/functions.hpp"
+#include "base/numbers.hpp"
+#include "base/pack.hpp"
+#include "base/rows.hpp"
+#include "base/solve.hpp"
+#include "iteration/ensemble_fixed_point.hpp"
+#include "iteration/fixed_point.hpp"
+#include "iteration/galerkin.hpp"
+#include "iteration/neighbours.hpp"
+#include "iteration/stage_map.hpp"
+#include "steppers/clean.hpp"
+#include "steppers/ensemble.hpp"
+#include "steppers/events.hpp"
+#include "steppers/general.hpp"
+#include "steppers/linear.hpp"
+#include "steppers/separable.hpp"
+#include "steppers/splitting.hpp"
+
+#endif

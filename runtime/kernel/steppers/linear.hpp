@@ -1,0 +1,381 @@
+// SPDX-License-Identifier: MIT
+// Linear maps: the step of a linear system as one affine map, and what one step adds to first order.
+//
+// Formula numbers (D..) refer to docs/derivation.md.
+#ifndef LOBATTO_KERNEL_LINEAR_HPP
+#define LOBATTO_KERNEL_LINEAR_HPP
+
+#include <type_traits>
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "../base/pack.hpp"
+#include "../base/solve.hpp"
+
+namespace lobatto {
+
+// S = M^-1 V'' of one node from its stored entries to a full n x n matrix.
+template <class K>
+inline void expand_entries(const typename K::real* entries, typename K::real* S) {
+    for (int i = 0; i < K::coordinates * K::coordinates; ++i) S[i] = typename K::real(0);
+    for (int e = 0; e < K::entries; ++e) S[K::entry_row[e] * K::coordinates + K::entry_column[e]] = entries[e];
+}
+
+// What a kick u += length W(q) and a drift q += length u of explicit steps (D40) add to E, as in increment_of_step; W0
+// may be null.
+template <class K>
+inline void kick_increment(typename K::real length, const typename K::real* entries, const typename K::real* W0,
+                           typename K::real* E) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, columns = 2 * n + 1;
+    for (int e = 0; e < K::entries; ++e) {
+        const real* const from = E + K::entry_column[e] * columns;
+        real* const to = E + (n + K::entry_row[e]) * columns;
+        for (int c = 0; c < columns; ++c)
+            to[c] += length * (entries[e] * ((c == K::entry_column[e] ? real(1) : real(0)) + from[c]));
+    }
+    for (int k = 0; k < n && W0 != nullptr; ++k) E[(n + k) * columns + 2 * n] += length * W0[k];
+}
+template <class K>
+inline void drift_increment(typename K::real length, typename K::real* E) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, columns = 2 * n + 1;
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < columns; ++c)
+            E[k * columns + c] += length * ((c == n + k ? real(1) : real(0)) + E[(n + k) * columns + c]);
+}
+
+// What one step adds, in (q, u), from the S of the s nodes: E = T - I with T the tangent map (D24). E: 2n x (2n + 1);
+// its last column is the image of the constant acceleration W0 when S does not depend on q, that is, the shift of a
+// linear system with forces at q = 0. E is small for a small step and keeps its digits there, T would not.
+template <class K>
+inline bool increment_of_step(typename K::real h, const typename K::real* S, const typename K::real* W0,
+                              typename K::real* E) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, s = K::points, m = s - 2, N = n * m, columns = 2 * n + 1;
+    real v[n * columns], X[(N > 0 ? N : 1) * columns], J[N > 0 ? N * N : 1];
+    const auto unit = [](int k, int column) { return k == column ? real(1) : real(0); };
+    // force(node, values): M^-1 (V'' values + V'(0)) for column c of the values
+    const auto force = [&](int node, const real* values, int k, int column) {
+        real sum = column == 2 * n ? W0[k] : real(0);
+        for (int l = 0; l < n; ++l) sum += S[(node * n + k) * n + l] * values[l * columns + column];
+        return sum;
+    };
+    real q0[n * columns];
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < columns; ++c) q0[k * columns + c] = unit(k, c);
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < columns; ++c) v[k * columns + c] = unit(k + n, c) - h * K::b[0] * force(0, q0, k, c);
+    for (int i = 0; i < m; ++i)
+        for (int k = 0; k < n; ++k)
+            for (int c = 0; c < columns; ++c) {
+                real sum = q0[k * columns + c] + h * K::c[i + 1] * v[k * columns + c];
+                if (c == 2 * n)
+                    for (int j = 0; j < m; ++j) sum -= h * h * K::A[i * m + j] * W0[k];
+                X[(i * n + k) * columns + c] = sum;
+            }
+    for (int i = 0; i < m; ++i)
+        for (int j = 0; j < m; ++j)
+            for (int k = 0; k < n; ++k)
+                for (int l = 0; l < n; ++l)
+                    J[(i * n + k) * N + j * n + l] =
+                        (i == j && k == l ? real(1) : real(0)) + h * h * K::A[i * m + j] * S[((j + 1) * n + k) * n + l];
+    if constexpr (N > 0) {
+        if (!solve<N, columns>(J, X)) return false;
+    }
+    real* const dq = E;
+    real* const du = E + n * columns;
+    real q1[n * columns];
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < columns; ++c) {
+            real position = h * v[k * columns + c];
+            real rate = -(h * K::b[0] * force(0, q0, k, c));
+            for (int j = 0; j < m; ++j) {
+                const real w = force(j + 1, X + j * n * columns, k, c);
+                position -= h * h * (K::b[j + 1] * (real(1) - K::c[j + 1])) * w;
+                rate -= h * K::b[j + 1] * w;
+            }
+            dq[k * columns + c] = position;
+            du[k * columns + c] = rate;
+            q1[k * columns + c] = q0[k * columns + c] + position;
+        }
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < columns; ++c) du[k * columns + c] -= h * K::b[s - 1] * force(s - 1, q1, k, c);
+    return true;
+}
+
+// From (q, u) to (q, p): rows of u and columns of u are multiplied by M and M^-1; the identity stays. T: 2n x (2n + 1).
+template <class K>
+inline void to_momentum(const typename K::Coefficients& k, typename K::real* T) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, columns = 2 * n + 1;
+    real column[n], image[n];
+    for (int c = 0; c < columns; ++c) {
+        for (int i = 0; i < n; ++i) column[i] = T[(n + i) * columns + c];
+        K::momentum(k, column, image);
+        for (int i = 0; i < n; ++i) T[(n + i) * columns + c] = image[i];
+    }
+    // T M^-1 row by row: M is symmetric, so a row times M^-1 is M^-1 applied to the row.
+    for (int r = 0; r < 2 * n; ++r) {
+        K::velocity(k, T + r * columns + n, image);
+        for (int i = 0; i < n; ++i) T[r * columns + n + i] = image[i];
+    }
+}
+
+// Moves the entries of E = Phi - I (2 x 2, rows of three: q, p, shift) by at most two units in the last place each, so
+// that det Phi = 1 + tr E + det E is 1 to far below the rounding of the entries (D20). A determinant of 1 + e
+// multiplies the conserved energy by 1 + e in every step.
+template <class real>
+inline void round_to_unit_determinant(real* E) {
+    const int places[4] = {0, 1, 3, 4};
+    real candidates[4][5], best[4] = {E[0], E[1], E[3], E[4]}, least = Limits<real>::largest;
+    for (int e = 0; e < 4; ++e) {
+        const real entry = best[e];
+        // A unit in the last place, or half of one just above a power of two.
+        real unit = fabs(entry) * Limits<real>::epsilon * real(0.5);
+        while (unit > real(0) && entry + unit == entry) unit += unit;
+        for (int j = 0; j < 5; ++j) candidates[e][j] = entry + real(j % 2 == 0 ? j / 2 : -(j + 1) / 2) * unit;
+    }
+    for (const real a : candidates[0])
+        for (const real b : candidates[1])
+            for (const real c : candidates[2])
+                for (const real d : candidates[3]) {
+                    const real ad = a * d, bc = b * c;
+                    // tr E + det E, the terms and their rounding, summed without loss (TwoSum).
+                    const real terms[6] = {a, d, ad, -bc, rounded_once(a, d, -ad), -rounded_once(b, c, -bc)};
+                    real sum = real(0), lost = real(0);
+                    for (const real term : terms) {
+                        const real next = sum + term, back = next - sum;
+                        lost += (sum - (next - back)) + (term - back);
+                        sum = next;
+                    }
+                    const real defect = fabs(sum + lost);
+                    if (defect < least) {
+                        least = defect;
+                        best[0] = a;
+                        best[1] = b;
+                        best[2] = c;
+                        best[3] = d;
+                    }
+                }
+    for (int e = 0; e < 4; ++e) E[places[e]] = best[e];
+}
+
+// The affine map of one step of a linear system, in (q, p), from the constant S = M^-1 V'' and W(0) (D20, n > 1).
+template <class K>
+inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
+    using real = typename K::real;
+    constexpr int n = K::coordinates, s = K::points;
+    const real origin[n] = {};
+    real W0[n], entries[K::entries > 0 ? K::entries : 1];
+    K::node(k, origin, W0, entries);
+    if constexpr (K::is_explicit) {
+        for (int i = 0; i < 2 * n * (2 * n + 1); ++i) k.Phi_minus_I[i] = real(0);
+        for (int i = 0; i < s; ++i) {
+            kick_increment<K>(-h * K::b[i], entries, W0, k.Phi_minus_I);
+            if (i < s - 1) drift_increment<K>(h * K::drift_length[i], k.Phi_minus_I);
+        }
+    } else {
+        real S[s * n * n];
+        for (int i = 0; i < s; ++i) expand_entries<K>(entries, S + i * n * n);
+        if (!increment_of_step<K>(h, S, W0, k.Phi_minus_I)) return Status::singular_jacobian;
+    }
+    to_momentum<K>(k, k.Phi_minus_I);
+    real sum = real(0);
+    for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi_minus_I[i] - k.Phi_minus_I[i];
+    return sum == real(0) ? Status::ok : Status::not_finite;
+}
+
+// (q1, p1) = (q, p) + E (q, p) + shift, E = Phi - I; E: 2n x (2n + 1), the shift its last column.
+template <int n, class given, class number>
+inline void apply_map(const given* E, const number* q, const number* p, number* q1, number* p1) {
+    for (int r = 0; r < 2 * n; ++r) {
+        const given* const row = E + r * (2 * n + 1);
+        number sum = row[2 * n];
+        for (int k = 0; k < n; ++k) sum += row[k] * q[k];
+        for (int k = 0; k < n; ++k) sum += row[n + k] * p[k];
+        (r < n ? q1[r] : p1[r - n]) = (r < n ? q[r] : p[r - n]) + sum;
+    }
+}
+
+// (D21) H_d(z) = 1/2 ((p - w_p).q1 - (q - w_q).p1) for z = (q, p), the step z1 = z + E z + w and the shift w: conserved
+// exactly where Phi = 1 + E is symplectic, whether or not the map has a fixed point. In increments d = E z + w, so that
+// p.q and q.p do not have to cancel.
+template <int n, class given, class number>
+inline number discrete_energy(const given* E, const number* q, const number* p) {
+    number value = number(0);
+    for (int k = 0; k < n; ++k) {
+        const given *const row_q = E + k * (2 * n + 1), *const row_p = E + (n + k) * (2 * n + 1);
+        const given w_q = row_q[2 * n], w_p = row_p[2 * n];
+        number d_q = number(w_q), d_p = number(w_p);
+        for (int j = 0; j < n; ++j) d_q += row_q[j] * q[j] + row_q[n + j] * p[j];
+        for (int j = 0; j < n; ++j) d_p += row_p[j] * q[j] + row_p[n + j] * p[j];
+        value += (p[k] * d_q - q[k] * d_p) + (w_q * (p[k] + d_p) - w_p * (q[k] + d_q));
+    }
+    return value * number(0.5);
+}
+
+// The stepper of an affine map: the whole step is K::propagate.
+template <class K>
+struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
+    using typename Motion<K>::real;
+    using Motion<K>::n, Motion<K>::coefficients, Motion<K>::q;
+    static constexpr int N = 0;
+    static constexpr int nodes = K::points;
+    // Of a few coordinates and more, the rows of Phi - I lie in lanes, column after column.
+    static constexpr int width = native_lanes<real>, rows = (2 * n + width - 1) / width * width;
+    static constexpr bool in_lanes = n >= 4 && width > 1;
+    struct Nothing {};
+    real p[n]{};  // momentum
+    std::conditional_t<in_lanes, real[(2 * n + 1) * rows], Nothing> columns{};
+
+    Status prepare(const typename K::Parameters& parameters, real h) {
+        this->step_size = h;
+        const Status status = K::prepare(parameters, h, coefficients);
+        if constexpr (in_lanes)
+            for (int r = 0; r < 2 * n; ++r)
+                for (int c = 0; c <= 2 * n; ++c) columns[c * rows + r] = coefficients.Phi_minus_I[r * (2 * n + 1) + c];
+        return status;
+    }
+
+    Status start(real time, const real* position, const real* momentum) {
+        this->start_time = time;
+        this->steps = 0;
+        for (int k = 0; k < n; ++k) {
+            q[k] = position[k];
+            p[k] = momentum[k];
+        }
+        return is_finite(time + not_finite_part(q, n) + not_finite_part(p, n)) ? Status::ok : Status::not_finite;
+    }
+
+    Status step() {
+        if (this->time_stands_still()) return Status::time_stands_still;
+        real q1[n], p1[n];
+        if constexpr (in_lanes)
+            propagate(columns, q1, p1);
+        else
+            K::propagate(coefficients, +q, +p, +q1, +p1);
+        real sum = real(0);
+        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (p1[k] - p1[k]);
+        if (!(sum == real(0))) return Status::not_finite;
+        for (int k = 0; k < n; ++k) {
+            q[k] = q1[k];
+            p[k] = p1[k];
+        }
+        ++this->steps;
+        return Status::ok;
+    }
+
+    void momentum(real* momentum) const {
+        for (int k = 0; k < n; ++k) momentum[k] = p[k];
+    }
+
+    Status energy(real, const real* position, const real* momentum, real* value) const {
+        if constexpr (K::has_energy) {
+            *value = K::energy(coefficients, position, momentum);
+            return Status::ok;
+        } else {
+            return Status::unsupported;
+        }
+    }
+    void momentum(real, const real*, const real* velocity, real* momentum) const {
+        K::momentum(coefficients, velocity, momentum);
+    }
+    Status velocity(real, const real*, const real* momentum, real* velocity) const {
+        K::velocity(coefficients, momentum, velocity);
+        return Status::ok;
+    }
+    // dL/dv = M v and dL/dq = -M W.
+    void slopes(real, const real* position, const real* velocity, real* Lv, real* Lq) const {
+        real W[n];
+        K::acceleration(coefficients, position, W);
+        for (int k = 0; k < n; ++k) W[k] = -W[k];
+        K::momentum(coefficients, velocity, Lv);
+        K::momentum(coefficients, W, Lq);
+    }
+    Status residual(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
+    Status jacobian(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
+
+    // (D20), rows side by side.
+    template <class Columns>
+    void propagate(const Columns& column, real* q1, real* p1) const {
+        using V = Pack<real, width>;
+        V sum[rows / width];
+        real moved[rows];
+        for (int r = 0; r < rows / width; ++r) sum[r] = V::load(column + 2 * n * rows + r * width);
+        const auto add = [&](int c, real x) LOBATTO_FORMULA {
+#pragma GCC unroll 8
+            for (int r = 0; r < rows / width; ++r) sum[r] = fused(V::load(column + c * rows + r * width), V(x), sum[r]);
+        };
+        for (int c = 0; c < n; ++c) add(c, q[c]);
+        for (int c = 0; c < n; ++c) add(n + c, p[c]);
+        for (int r = 0; r < rows / width; ++r) sum[r].store(moved + r * width);
+        for (int k = 0; k < n; ++k) {
+            q1[k] = q[k] + moved[k];
+            p1[k] = p[k] + moved[n + k];
+        }
+    }
+
+    Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
+        if constexpr (K::has_tangent) {
+            Stepper local = *this;
+            Status status = local.start(time, position, momentum);
+            if (status == Status::ok) status = local.step();
+            if (status != Status::ok) return status;
+            for (int k = 0; k < n; ++k) {
+                q1[k] = local.q[k];
+                p1[k] = local.p[k];
+            }
+            for (int r = 0; r < 2 * n; ++r)
+                for (int c = 0; c < 2 * n; ++c)
+                    T[r * 2 * n + c] = (r == c ? real(1) : real(0)) + coefficients.Phi_minus_I[r * (2 * n + 1) + c];
+            return Status::ok;
+        } else {
+            return Status::unsupported;
+        }
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::linear_map, Stepping::solved> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    T q[n], p[n], evaluations = T(real(0));
+
+    const T& position(int c) const { return q[c]; }
+
+    void prepare(const Single<K>&, int) {}
+    void set_tolerance(real) {}
+    void start(const Single<K>& single, const real* momentum, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, momentum[c]);
+        }
+    }
+    void momentum(const Single<K>&, int lane, real* momentum) const {
+        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
+    }
+    template <class Given>
+    Going step(const Given& k, real, Going going) {
+        T q1[n], p1[n], not_finite = T(real(0));
+        K::propagate(k, +q, +p, +q1, +p1);
+        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
+        going = going & (not_finite == T(real(0)));
+        for (int c = 0; c < n; ++c) {
+            q[c] = select(going, q1[c], q[c]);
+            p[c] = select(going, p1[c], p[c]);
+        }
+        return going;
+    }
+    void follow(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[c], lane, single.q[c]);
+            set_lane(p[c], lane, single.p[c]);
+        }
+    }
+};
+
+}  // namespace lobatto
+
+#endif

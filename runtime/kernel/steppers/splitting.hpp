@@ -1,0 +1,443 @@
+// SPDX-License-Identifier: MIT
+// Steps of explicit splitting methods: kicks u -= h b_i W(q_i) and drifts q += h a_i u in turn (D40).
+//
+// Nothing is solved for, so that a step costs its gradients and no step can fail to converge. However their lengths are
+// rounded, a kick and a drift are symplectic. One trajectory goes by itself, its neighbouring coordinates in the lanes
+// of Packs where formulas join these; or several side by side.
+#ifndef LOBATTO_KERNEL_EXPLICIT_HPP
+#define LOBATTO_KERNEL_EXPLICIT_HPP
+
+#include <cstdint>
+#include <type_traits>
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "../base/pack.hpp"
+#include "../base/rows.hpp"
+#include "linear.hpp"
+
+namespace lobatto {
+
+// The lengths of a step's kicks and drifts.
+template <class K>
+struct Turns {
+    using real = typename K::real;
+    static constexpr int s = K::points;
+    static constexpr bool kicks_ends = K::b[0] != real(0);  // else a step begins and ends with a drift
+
+    real kick[s];  // -h b
+    real drift[s - 1];
+
+    void prepare(real h) {
+        for (int i = 0; i < s; ++i) kick[i] = -h * K::b[i];
+        for (int i = 0; i < s - 1; ++i) drift[i] = h * K::drift_length[i];
+    }
+};
+
+// One step of q and u; W is that at their positions, before and after, where ends are kicked. T: a number or a Pack.
+template <class K, class T, class Given>
+LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h, T* q,
+                                 T* u, T* W) {
+    constexpr int n = K::coordinates, s = K::points;
+    const auto kick = [&](int i) LOBATTO_FORMULA {
+        for (int c = 0; c < n; ++c) u[c] = fused(T(turns.kick[i]), W[c], u[c]);
+    };
+    const auto drift = [&](int i) LOBATTO_FORMULA {
+        for (int c = 0; c < n; ++c) q[c] = fused(T(turns.drift[i]), u[c], q[c]);
+    };
+    if constexpr (Turns<K>::kicks_ends) kick(0);
+    drift(0);
+    for (int i = 1; i < s - 1; ++i) {
+        Formulas<K>::acceleration(k, T(time + K::c[i] * h), static_cast<const T*>(q), W);
+        kick(i);
+        drift(i);
+    }
+    if constexpr (Turns<K>::kicks_ends) {
+        Formulas<K>::acceleration(k, T(time + h), static_cast<const T*>(q), W);
+        kick(s - 1);
+    }
+}
+
+// Takes the acceleration of a coordinate as soon as it is known, which is kicked and drifts; the last kick of a step
+// keeps accelerations instead.
+template <class K, class T, class Given, bool is_last>
+struct KickAndDrift {
+    T *q, *u, *W;
+    T kick, drift;
+    const Given& k;
+};
+template <class K, class T, class Given, bool is_last>
+LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& turn, int at, T slope) {
+    if constexpr (!K::unit_masses) slope *= turn.k.inverse_mass[at];
+    const T velocity = fused(turn.kick, slope, turn.u[at]);
+    turn.u[at] = velocity;
+    if constexpr (is_last)
+        turn.W[at] = slope;
+    else
+        turn.q[at] = fused(turn.drift, velocity, turn.q[at]);
+}
+
+// One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
+// coordinates for each kick.
+template <class K, class T, class Given>
+LOBATTO_INLINE void step_in_passing(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h,
+                                    const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
+    constexpr int n = K::coordinates, s = K::points;
+    const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
+        const KickAndDrift<K, T, Given, is_last()> turn{q1, u1, W1, T(turns.kick[i]), T(is_last ? 0 : turns.drift[i]),
+                                                        k};
+        const T* const position = q1;
+        Formulas<K>::template along_rows<InPassing>(k, T(time + K::c[i] * h), position, turn);
+    };
+    for (int c = 0; c < n; ++c) {
+        u1[c] = Turns<K>::kicks_ends ? fused(T(turns.kick[0]), W[c], u[c]) : u[c];
+        q1[c] = fused(T(turns.drift[0]), u1[c], q[c]);
+    }
+    for (int i = 1; i < s - 1; ++i) pass(i, std::false_type());
+    if constexpr (Turns<K>::kicks_ends) pass(s - 1, std::true_type());
+}
+
+// Whether positions and velocities, accelerations, and what is under way fit the 32 registers of AVX-512.
+template <class K>
+constexpr bool turns_fit_registers() {
+    using real = typename K::real;
+    constexpr int width = native_lanes<real>, parts = (K::coordinates + width - 1) / width;
+    return width * sizeof(real) == 64 && parts <= 5 && K::row_reach >= 0 && K::row_reach <= width;
+}
+
+// Positions, velocities and accelerations of neighbouring coordinates, on the way in registers or in memory; to the
+// same bits.
+template <class K, bool in_registers = turns_fit_registers<K>()>
+struct NeighbourTurns {
+    using real = typename K::real;
+    static constexpr int n = K::coordinates, s = K::points;
+    static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
+    using V = Pack<real, width>;
+
+    int now{};  // the present; 1 - now: before the last step, and room for the next
+    // Positions, velocities, and where ends are kicked accelerations.
+    alignas(V) real q[2][room]{}, u[2][room]{}, W[2][room]{};
+
+    void begin(const real* position, const real* velocity, const real* acceleration) {
+        for (int c = 0; c < n; ++c) {
+            q[now][c] = position[c];
+            u[now][c] = velocity[c];
+            W[now][c] = acceleration[c];
+        }
+    }
+    // False, and nothing has moved, where the end is not finite; what was before the last step is lost then.
+    bool step(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h) {
+        if constexpr (in_registers) {
+            V position[parts], velocity[parts], slope[parts];
+            return step_in(turns, k, time, h, Registers<V, parts>{position}, Registers<V, parts>{velocity},
+                           Registers<V, parts>{slope});
+        } else {
+            return step_in(turns, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now]);
+        }
+    }
+
+private:
+    template <class Row, class F>
+    LOBATTO_INLINE static void over_parts(const F& f) {
+        if constexpr (are_registers<Row>)
+            written_out<width>(parts * width, f);
+        else
+            for (int at = 0; at < parts * width; at += width) f(at);
+    }
+    template <class Row>
+    LOBATTO_INLINE static void accelerate(const typename K::Coefficients& k, real time, Row position, Row slope) {
+        using How = std::conditional_t<are_registers<Row>, WrittenOut, SideBySide>;
+        Formulas<K>::template along_rows<How>(k, time, position, slope);
+    }
+    template <class Row>
+    LOBATTO_INLINE bool step_in(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h,
+                                Row position, Row velocity, Row slope) {
+        over_parts<Row>([&](int at) LOBATTO_FORMULA {
+            const V start = V::load(W[now] + at);
+            V first = V::load(u[now] + at);
+            if constexpr (Turns<K>::kicks_ends) first = fused(V(turns.kick[0]), start, first);
+            store_to(slope, at, start);
+            store_to(velocity, at, first);
+            store_to(position, at, fused(V(turns.drift[0]), first, V::load(q[now] + at)));
+        });
+        for (int i = 1; i < s - 1; ++i) {
+            accelerate(k, time + K::c[i] * h, position, slope);
+            over_parts<Row>([&](int at) LOBATTO_FORMULA {
+                const V moved = fused(V(turns.kick[i]), load_from<V>(slope, at), load_from<V>(velocity, at));
+                store_to(velocity, at, moved);
+                store_to(position, at, fused(V(turns.drift[i]), moved, load_from<V>(position, at)));
+            });
+        }
+        if constexpr (Turns<K>::kicks_ends) accelerate(k, time + h, position, slope);
+        V not_finite = V(real(0));
+        over_parts<Row>([&](int at) LOBATTO_FORMULA {
+            V last = load_from<V>(velocity, at);
+            const V there = load_from<V>(position, at), bent = load_from<V>(slope, at);
+            if constexpr (Turns<K>::kicks_ends) last = fused(V(turns.kick[s - 1]), bent, last);
+            not_finite = fused(V(real(0)), last + there, not_finite);
+            there.store(q[1 - now] + at);
+            last.store(u[1 - now] + at);
+            bent.store(W[1 - now] + at);
+        });
+        if (any(not_finite != V(real(0)))) return false;
+        now = 1 - now;
+        return true;
+    }
+};
+
+template <class K, bool along_neighbours>
+struct KindOfTurns {
+    using type = NeighbourTurns<K>;
+};
+template <class K>
+struct KindOfTurns<K, false> {
+    struct type {};
+};
+
+template <class K>
+struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
+    using typename ConstantMass<K>::real;
+    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
+        ConstantMass<K>::u;
+    static constexpr int s = K::points;
+    static constexpr int nodes = s - (Turns<K>::kicks_ends ? 1 : 2);  // gradients of a step
+    static constexpr int N = 0;
+
+    // The ends of the last step, for what lies between them.
+    struct Ends {
+        std::int64_t of{-1};  // this many steps since start; -1: not computed
+        real W[2][n]{};
+    };
+    using Nothing = typename KindOfTurns<K, false>::type;
+
+    Turns<K> turns{};
+    real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
+    real q_before[n]{}, u_before[n]{};  // before the last step; likewise
+    bool has_history{};                 // what lies between the ends of the last step is known
+    mutable Ends ends{};
+    typename KindOfTurns<K, K::neighbours>::type neighbours{};
+
+    Status prepare(const typename K::Parameters& parameters, real h) {
+        step_size = h;
+        has_history = false;
+        turns.prepare(h);
+        return K::prepare(parameters, h, coefficients);
+    }
+
+    Status start(real time, const real* position, const real* momentum) {
+        this->start_time = time;
+        this->steps = 0;
+        has_history = false;
+        ends.of = -1;
+        real sum = time + not_finite_part(momentum, n);
+        for (int k = 0; k < n; ++k) {
+            q[k] = position[k];
+            sum += position[k] - position[k];
+        }
+        K::velocity(coefficients, momentum, u);
+        Formulas<K>::acceleration(coefficients, time, static_cast<const real*>(q), +W);
+        sum += not_finite_part(W, n);
+        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
+        if constexpr (K::neighbours) neighbours.begin(q, u, W);
+        return is_finite(sum) ? Status::ok : Status::not_finite;
+    }
+
+    Status step() {
+        if (this->time_stands_still()) return Status::time_stands_still;
+        if (!move(neighbours)) {
+            has_history = has_history && !K::neighbours;
+            return Status::not_finite;
+        }
+        has_history = true;
+        ++this->steps;
+        return Status::ok;
+    }
+
+    // The polynomial of degree 5 that has the positions, velocities and accelerations at both ends of the last step, at
+    // t + theta h.
+    void polynomial(real theta, real* position, real* velocity) const {
+        look_at_ends();
+        const real t = theta, t2 = t * t, t3 = t2 * t, h = step_size;
+        const real rise = t3 * (real(10) + t * (real(6) * t - real(15))),
+                   rise_slope = t2 * (real(30) + t * (real(30) * t - real(60)));
+        const real u0 = t + t3 * (t * (real(8) - real(3) * t) - real(6)),
+                   u0_slope = real(1) + t2 * (t * (real(32) - real(15) * t) - real(18));
+        const real u1 = t3 * (t * (real(7) - real(3) * t) - real(4)),
+                   u1_slope = t2 * (t * (real(28) - real(15) * t) - real(12));
+        const real a0 = real(0.5) * t2 * (real(1) + t * (t * (real(3) - t) - real(3))),
+                   a0_slope = real(0.5) * t * (real(2) + t * (t * (real(12) - real(5) * t) - real(9)));
+        const real a1 = real(0.5) * t3 * (real(1) + t * (t - real(2))),
+                   a1_slope = real(0.5) * t2 * (real(3) + t * (real(5) * t - real(8)));
+        for (int k = 0; k < n; ++k) {
+            const real begin = position_before(k), moved = q[k] - begin, from = h * velocity_before(k), to = h * u[k];
+            const real start = h * (h * ends.W[0][k]), end = h * (h * ends.W[1][k]);
+            position[k] = begin + (rise * moved + u0 * from + u1 * to - a0 * start - a1 * end);
+            velocity[k] =
+                (rise_slope * moved + u0_slope * from + u1_slope * to - a0_slope * start - a1_slope * end) / h;
+        }
+    }
+
+    // M^-1 grad V where the motion is, of coordinate c; where ends are kicked.
+    real acceleration(int c) const {
+        if constexpr (K::neighbours)
+            return neighbours.W[neighbours.now][c];
+        else
+            return W[c];
+    }
+
+    // There are no equations.
+    Status residual(real, const real*, const real*, const real*, real*) const { return Status::ok; }
+    Status jacobian(real, const real*, const real*, const real*, real*) const { return Status::ok; }
+
+    // One step from (q, p) at `time` and d(q1, p1)/d(q, p) (D24), 2n x 2n.
+    Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
+        if constexpr (K::has_tangent) {
+            Stepper local = *this;
+            Status status = local.start(time, position, momentum);
+            if (status != Status::ok) return status;
+            constexpr int columns = 2 * n + 1;
+            real full[2 * n * columns] = {}, at[n], rate[n], slope[n], entries[K::entries > 0 ? K::entries : 1];
+            for (int k = 0; k < n; ++k) {
+                at[k] = local.q[k];
+                rate[k] = local.u[k];
+            }
+            for (int i = 0; i < s; ++i) {
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +slope,
+                                  +entries);
+                for (int k = 0; k < n; ++k) rate[k] = fused(turns.kick[i], slope[k], rate[k]);
+                kick_increment<K>(turns.kick[i], entries, static_cast<const real*>(nullptr), full);
+                if (i == s - 1) break;
+                for (int k = 0; k < n; ++k) at[k] = fused(turns.drift[i], rate[k], at[k]);
+                drift_increment<K>(turns.drift[i], full);
+            }
+            status = local.step();
+            if (status != Status::ok) return status;
+            for (int k = 0; k < n; ++k) q1[k] = local.q[k];
+            local.momentum(p1);
+            to_momentum<K>(coefficients, full);
+            for (int r = 0; r < 2 * n; ++r)
+                for (int c = 0; c < 2 * n; ++c) T[r * 2 * n + c] = (r == c ? real(1) : real(0)) + full[r * columns + c];
+            return Status::ok;
+        } else {
+            (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;
+            return Status::unsupported;
+        }
+    }
+
+private:
+    bool move(Nothing&) {
+        real q1[n], u1[n], W1[n], sum = real(0);
+        for (int k = 0; k < n; ++k) {
+            q1[k] = q[k];
+            u1[k] = u[k];
+            W1[k] = W[k];
+        }
+        step_in_turn<K>(turns, coefficients, this->time(), step_size, q1, u1, W1);
+        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (u1[k] - u1[k]);
+        if (!(sum == real(0))) return false;
+        for (int k = 0; k < n; ++k) {
+            q_before[k] = q[k];
+            u_before[k] = u[k];
+            q[k] = q1[k];
+            u[k] = u1[k];
+            W[k] = W1[k];
+        }
+        return true;
+    }
+    template <class Neighbours>
+    bool move(Neighbours& all) {
+        if (!all.step(turns, coefficients, this->time(), step_size)) return false;
+        copy_lanes<n>(all.q[all.now], q);
+        copy_lanes<n>(all.u[all.now], u);
+        return true;
+    }
+
+    real position_before(int k) const {
+        if constexpr (K::neighbours)
+            return neighbours.q[1 - neighbours.now][k];
+        else
+            return q_before[k];
+    }
+    real velocity_before(int k) const {
+        if constexpr (K::neighbours)
+            return neighbours.u[1 - neighbours.now][k];
+        else
+            return u_before[k];
+    }
+    void look_at_ends() const {
+        if (ends.of == this->steps) return;
+        ends.of = this->steps;
+        real begin[n];
+        for (int k = 0; k < n; ++k) begin[k] = position_before(k);
+        Formulas<K>::acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size,
+                                  static_cast<const real*>(begin), +ends.W[0]);
+        Formulas<K>::acceleration(coefficients, this->time(), static_cast<const real*>(q), +ends.W[1]);
+    }
+};
+
+template <class K, class T>
+struct Lanes<K, T, Form::separable, Stepping::in_turn> {
+    using real = typename K::real;
+    using Going = decltype(T() < T());
+    static constexpr int n = K::coordinates;
+    int now{};  // the present; 1 - now: room for the next
+    T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
+    Turns<K> turns;
+    real h;
+
+    const T& position(int c) const { return q[now][c]; }
+    void prepare(const Single<K>& single, int) {
+        turns = single.turns;
+        h = single.step_size;
+    }
+    void set_tolerance(real) {}
+    void start(const Single<K>& single, const real*, int lane) { follow(single, lane); }
+    void momentum(const Single<K>& single, int lane, real* momentum) const {
+        real velocity[n];
+        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
+        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+    }
+    template <class Given>
+    Going step(const Given& k, real time, Going going) {
+        const int next = 1 - now;
+        T not_finite = T(real(0));
+        if constexpr (moves_in_passing<K>()) {
+            step_in_passing<K>(turns, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+            for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
+        } else {
+            T q1[n], u1[n], W1[n];
+            for (int c = 0; c < n; ++c) {
+                q1[c] = q[now][c];
+                u1[c] = u[now][c];
+                W1[c] = W[now][c];
+            }
+            step_in_turn<K>(turns, k, time, h, q1, u1, W1);
+            for (int c = 0; c < n; ++c) {
+                not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
+                q[next][c] = q1[c];
+                u[next][c] = u1[c];
+                W[next][c] = W1[c];
+            }
+        }
+        going = going & (not_finite == T(real(0)));
+        if (!all(going))
+            for (int c = 0; c < n; ++c) {
+                q[next][c] = select(going, q[next][c], q[now][c]);
+                u[next][c] = select(going, u[next][c], u[now][c]);
+                if constexpr (Turns<K>::kicks_ends) W[next][c] = select(going, W[next][c], W[now][c]);
+            }
+        now = next;
+        return going;
+    }
+    void follow(const Single<K>& single, int lane) {
+        for (int c = 0; c < n; ++c) {
+            set_lane(q[now][c], lane, single.q[c]);
+            set_lane(u[now][c], lane, single.u[c]);
+            set_lane(W[now][c], lane, single.acceleration(c));
+        }
+    }
+};
+
+}  // namespace lobatto
+
+#endif

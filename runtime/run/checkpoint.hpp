@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// A run that was stopped, in a file beside its trajectory, so that it can go on as if it never had been.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/run/checksum.hpp"
+#include "runtime/run/trajectory.hpp"
+
+namespace lobatto {
+
+struct Checkpoint {
+    std::string run;  // which run it is, in lines "what: value"; a run with other lines cannot go on from here
+    Halfway halfway;
+    std::vector<Written> files;   // the run's files at that moment
+    std::vector<double> watched;  // what else was measured so far, in an order of the caller's
+};
+
+// Appears whole or not at all, and is on the disk before the one of before goes. MachineError as PartialFile.
+void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
+
+// Nothing when there is none. MachineError when it is damaged, or another user could have written it: what is in it
+// goes into the kernel's memory.
+std::optional<Checkpoint> read_checkpoint(const std::string& path);
+
+// The first line in which `ours` differs from what stands in the checkpoint, for an error; empty when none does.
+std::string difference(const std::string& checkpoint, const std::string& ours);
+
+}  // namespace lobatto

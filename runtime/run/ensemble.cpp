@@ -1,0 +1,533 @@
+// SPDX-License-Identifier: MIT
+// Workers take groups of trajectories from a counter; the caller's thread hands them over in order, through a window.
+#include "runtime/run/ensemble.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <ctime>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <system_error>
+#include <thread>
+
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr double chunk_seconds = 0.02;      // of steps between two looks at the interruption
+constexpr double progress_seconds = 0.1;    // between two reports
+constexpr std::int64_t largest_group = 64;  // trajectories; handing one over takes about a microsecond
+constexpr std::int64_t rows_of_group = 4096;
+
+// Of this thread: other programs on the machine do not count.
+double processor_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+const double no_number = std::numeric_limits<double>::quiet_NaN();
+
+// Trajectories that take their steps together. All arrays are lane-major, status is one a lane (abi.h).
+class Lanes {
+public:
+    virtual ~Lanes() = default;
+    virtual int width() const = 0;
+    virtual void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) = 0;
+    virtual void start(double time, const std::vector<double>& q, const std::vector<double>& p,
+                       std::int32_t* status) = 0;
+    virtual void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
+                         std::int64_t* iterations) = 0;
+    virtual void state(std::vector<double>& q, std::vector<double>& p) = 0;
+    // Of (q, p), the start or the state just read; not numbers without one.
+    virtual void energy(const std::vector<double>& q, const std::vector<double>& p,
+                        std::vector<double>& energy) const = 0;
+};
+
+class OneStepper : public Lanes {
+public:
+    explicit OneStepper(const Kernel& kernel) : stepper_(kernel) {}
+    int width() const override { return 1; }
+    void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) override {
+        *status = stepper_.prepare(parameters, step);
+    }
+    void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override {
+        time_ = time;
+        if (*status == LOBATTO_OK) *status = stepper_.start(time, q, p);
+    }
+    void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
+                 std::int64_t* iterations) override {
+        lobatto_advance call{};
+        call.steps = steps;
+        call.tolerance = tolerance;
+        *status = stepper_.advance(call);
+        *steps_done = call.steps_done;
+        *iterations = call.iterations;
+    }
+    void state(std::vector<double>& q, std::vector<double>& p) override { stepper_.state(time_, q, p); }
+    void energy(const std::vector<double>& q, const std::vector<double>& p,
+                std::vector<double>& energy) const override {
+        const bool has_one =
+            stepper_.kernel()->has_energy != 0 && stepper_.energy(time_, q, p, energy[0]) == LOBATTO_OK;
+        if (!has_one) energy[0] = no_number;
+    }
+
+private:
+    LoadedStepper<double> stepper_;
+    double time_ = 0;
+};
+
+class KernelLanes : public Lanes {
+public:
+    explicit KernelLanes(const Kernel& kernel)
+        : kernel_(kernel),
+          memory_(::operator new(static_cast<std::size_t>(kernel->ensemble_bytes), alignment(kernel)),
+                  Deleter{alignment(kernel)}) {}
+    int width() const override { return kernel_->lanes; }
+    void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) override {
+        kernel_->ensemble_prepare(memory_.get(), parameters.data(), &step, status);
+    }
+    void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override {
+        kernel_->ensemble_start(memory_.get(), &time, q.data(), p.data(), status);
+    }
+    void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
+                 std::int64_t* iterations) override {
+        kernel_->ensemble_advance(memory_.get(), steps, tolerance, status, steps_done, iterations);
+    }
+    void state(std::vector<double>& q, std::vector<double>& p) override {
+        kernel_->ensemble_state(memory_.get(), q.data(), p.data());
+    }
+    void energy(const std::vector<double>&, const std::vector<double>&, std::vector<double>& energy) const override {
+        if (kernel_->ensemble_energy == nullptr)
+            std::fill(energy.begin(), energy.end(), no_number);
+        else
+            kernel_->ensemble_energy(memory_.get(), energy.data());
+    }
+
+private:
+    static std::align_val_t alignment(const Kernel& kernel) {
+        return std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)};
+    }
+    struct Deleter {
+        std::align_val_t alignment;
+        void operator()(void* memory) const { ::operator delete(memory, alignment); }
+    };
+    Kernel kernel_;
+    std::unique_ptr<void, Deleter> memory_;
+};
+
+// The most that a trajectory keeps.
+std::int64_t rows_kept(const EnsembleRequest& request) {
+    return request.every == 0 ? 1 : request.steps / request.every + 2;
+}
+
+// A trajectory with what it has kept.
+struct Ended {
+    lobatto_status status = LOBATTO_OK;
+    std::int64_t steps_done = 0, iterations = 0;
+    std::vector<double> rows, energies;
+    std::int64_t row_step = 0;  // steps before the last row
+    double energy_start = 0, energy_error_largest = 0;
+};
+
+// Who works on what. Trajectories are handed over in groups: whole lanes, so that the number of threads does not decide
+// who stands beside whom; several groups for every thread.
+struct Plan {
+    std::int64_t threads, group_size, groups, window;  // window: groups in memory
+    Plan(const Kernel& kernel, const EnsembleRequest& request) {
+        threads = thread_count(request.threads);
+        const std::int64_t lanes = std::max(kernel->lanes, 1);
+        const std::int64_t wanted =
+            std::min({largest_group, rows_of_group / rows_kept(request), request.count / (8 * threads)});
+        group_size = std::max<std::int64_t>(wanted / lanes, 1) * lanes;
+        groups = (request.count + group_size - 1) / group_size;
+        threads = std::clamp<std::int64_t>(groups, 1, threads);
+        window = 2 * threads + 2;
+    }
+};
+
+struct Group {
+    std::vector<Ended> trajectories;  // fewer than there should be when interrupted
+    double processor_seconds = 0;
+};
+
+// What all threads see.
+struct Shared {
+    std::atomic<std::int64_t> steps_gone{0};
+    std::atomic<bool> halted{false};
+};
+
+// One thread's work: trajectories of one group after another, as many at a time as there are lanes.
+class Worker {
+public:
+    Worker(const Kernel& kernel, const EnsembleRequest& request, Shared& shared)
+        : request_(request), shared_(shared), n_(static_cast<std::size_t>(kernel->coordinates)), single_(kernel) {
+        if (kernel->lanes > 0)
+            lanes_ = std::make_unique<KernelLanes>(kernel);
+        else
+            lanes_ = std::make_unique<OneStepper>(kernel);
+        const auto width = static_cast<std::size_t>(lanes_->width());
+        start_.parameters.resize(static_cast<std::size_t>(kernel->parameters));
+        start_.q.resize(n_);
+        start_.rate.resize(n_);
+        parameters_.resize(width * start_.parameters.size());
+        q_.resize(width * n_);
+        p_.resize(width * n_);
+        energy_.resize(width);
+        status_.resize(width);
+        steps_done_.resize(width);
+        iterations_.resize(width);
+    }
+
+    // Trajectories first, first + 1, ..., last - 1; without those that an interruption cut short.
+    Group run(std::int64_t first, std::int64_t last) {
+        Group group;
+        for (; first < last && !shared_.halted; first += lanes_->width()) {
+            std::vector<Ended> side_by_side(
+                static_cast<std::size_t>(std::min<std::int64_t>(lanes_->width(), last - first)));
+            if (!run_together(first, side_by_side, group.processor_seconds)) break;
+            std::move(side_by_side.begin(), side_by_side.end(), std::back_inserter(group.trajectories));
+        }
+        return group;
+    }
+
+private:
+    void place(std::size_t lane) {
+        const auto put = [&](const std::vector<double>& from, std::vector<double>& to) {
+            std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(lane * from.size()));
+        };
+        put(start_.parameters, parameters_);
+        put(start_.q, q_);
+        put(start_.rate, p_);
+    }
+
+    void begin(std::int64_t first, std::vector<Ended>& ended) {
+        const auto width = static_cast<std::size_t>(lanes_->width());
+        for (std::size_t lane = 0; lane < width; ++lane) {  // those that are left over repeat the last
+            if (lane < ended.size()) {
+                request_.start(first + static_cast<std::int64_t>(lane), start_);
+                if (request_.from_velocities) {
+                    if (single_.prepare(start_.parameters, request_.step) == LOBATTO_OK)
+                        start_.rate = single_.momentum(request_.time, start_.q, start_.rate);
+                    else
+                        std::fill(start_.rate.begin(), start_.rate.end(), no_number);
+                }
+            }
+            place(lane);
+        }
+        lanes_->prepare(parameters_, request_.step, status_.data());
+        lanes_->start(request_.time, q_, p_, status_.data());
+        lanes_->energy(q_, p_, energy_);
+        for (std::size_t lane = 0; lane < ended.size(); ++lane) {
+            ended[lane].status = static_cast<lobatto_status>(status_[lane]);
+            if (ended[lane].status != LOBATTO_OK) energy_[lane] = no_number;
+            keep(lane, ended[lane]);
+        }
+    }
+
+    void keep(std::size_t lane, Ended& ended) const {
+        const double energy = energy_[lane];
+        if (ended.energies.empty()) {
+            ended.rows.reserve(static_cast<std::size_t>(rows_kept(request_)) * (1 + 2 * n_));
+            ended.energies.reserve(static_cast<std::size_t>(rows_kept(request_)));
+            ended.energy_start = energy;
+        } else if (request_.every == 0) {
+            ended.rows.clear();
+            ended.energies.clear();
+        }
+        ended.rows.push_back(request_.time + static_cast<double>(ended.steps_done) * request_.step);
+        for (const std::vector<double>* numbers : {&q_, &p_}) {
+            const auto begin = numbers->begin() + static_cast<std::ptrdiff_t>(lane * n_);
+            ended.rows.insert(ended.rows.end(), begin, begin + static_cast<std::ptrdiff_t>(n_));
+        }
+        ended.energies.push_back(energy);
+        ended.row_step = ended.steps_done;
+        const double error = std::fabs(energy - ended.energy_start);
+        if (!(error <= ended.energy_error_largest)) ended.energy_error_largest = error;
+    }
+
+    // False: interrupted.
+    bool run_together(std::int64_t first, std::vector<Ended>& ended, double& seconds) {
+        begin(first, ended);
+        const auto going = [&] {
+            return std::any_of(ended.begin(), ended.end(), [](const Ended& e) { return e.status == LOBATTO_OK; });
+        };
+        const auto side_by_side = static_cast<std::int64_t>(ended.size());
+        std::int64_t done = 0;
+        while (done < request_.steps && going()) {
+            if (shared_.halted.load(std::memory_order_relaxed)) return false;
+            const double start = processor_seconds();
+            const std::int64_t from = done, target = done + std::min(chunk_, request_.steps - done);
+            while (done < target && going()) {
+                const std::int64_t next =
+                    request_.every == 0 ? target : std::min(target, done + request_.every - done % request_.every);
+                advance(next, next - done, ended);
+                done = next;
+            }
+            const double passed = processor_seconds() - start;
+            seconds += passed;
+            // The clock ticks coarsely against a short chunk: grow at most eightfold at a time.
+            const double pace = chunk_seconds / std::max(passed, chunk_seconds / 8);
+            chunk_ = std::max<std::int64_t>(1, std::llround(static_cast<double>(done - from) * pace));
+            shared_.steps_gone += (done - from) * side_by_side;
+        }
+        shared_.steps_gone += (request_.steps - done) * side_by_side;
+        return true;
+    }
+
+    // To step number `next`; keeps what is to be kept there, and the last good state of a trajectory that fails.
+    void advance(std::int64_t next, std::int64_t steps, std::vector<Ended>& ended) {
+        lanes_->advance(steps, request_.tolerance, status_.data(), steps_done_.data(), iterations_.data());
+        const bool kept_here = next == request_.steps || (request_.every != 0 && next % request_.every == 0);
+        bool reads = kept_here;
+        for (std::size_t lane = 0; lane < ended.size(); ++lane) reads = reads || status_[lane] != ended[lane].status;
+        if (reads) {
+            lanes_->state(q_, p_);
+            lanes_->energy(q_, p_, energy_);
+        }
+        for (std::size_t lane = 0; lane < ended.size(); ++lane) {
+            Ended& trajectory = ended[lane];
+            if (trajectory.status != LOBATTO_OK) continue;  // ended before
+            trajectory.status = static_cast<lobatto_status>(status_[lane]);
+            trajectory.steps_done += steps_done_[lane];
+            trajectory.iterations += iterations_[lane];
+            const bool failed = trajectory.status != LOBATTO_OK;
+            if (failed ? trajectory.steps_done > trajectory.row_step : kept_here) keep(lane, trajectory);
+        }
+    }
+
+    const EnsembleRequest& request_;
+    Shared& shared_;
+    std::size_t n_;
+    LoadedStepper<double> single_;  // for momenta
+    std::unique_ptr<Lanes> lanes_;
+    EnsembleStart start_;
+    std::vector<double> parameters_, q_, p_, energy_;
+    std::vector<std::int32_t> status_;
+    std::vector<std::int64_t> steps_done_, iterations_;
+    std::int64_t chunk_ = 256;
+};
+
+// Groups that are done, on their way to the caller. A group far ahead of the next one to be handed over has to wait.
+class Window {
+public:
+    explicit Window(const Plan& plan) : groups_(plan.groups), slots_(static_cast<std::size_t>(plan.window)) {}
+
+    // A worker's: the number of a group, once there is room for it; nothing when there is no more to do.
+    std::optional<std::int64_t> take() {
+        const std::int64_t group = next_++;
+        std::unique_lock lock(mutex_);
+        room_.wait(lock, [&] { return closed_ || group < handed_over_ + std::ssize(slots_); });
+        return closed_ || group >= groups_ ? std::nullopt : std::optional(group);
+    }
+    void put(std::int64_t number, Group&& group) {
+        {
+            const std::lock_guard lock(mutex_);
+            slot(number) = std::move(group);
+        }
+        news_.notify_one();
+    }
+    void fail(std::exception_ptr error) {
+        {
+            const std::lock_guard lock(mutex_);
+            error_ = std::move(error);
+        }
+        news_.notify_one();
+    }
+    // No group is given out any more.
+    void close() {
+        {
+            const std::lock_guard lock(mutex_);
+            closed_ = true;
+        }
+        room_.notify_all();
+    }
+
+    // The caller's: the next group in order; `meanwhile` is called about ten times a second. Rethrows a worker's error.
+    template <class Meanwhile>
+    Group next(Meanwhile meanwhile) {
+        std::unique_lock lock(mutex_);
+        const auto pause = std::chrono::duration<double>(progress_seconds);
+        while (!news_.wait_for(lock, pause, [&] { return error_ || slot(handed_over_); })) {
+            lock.unlock();
+            meanwhile();
+            lock.lock();
+        }
+        if (error_) std::rethrow_exception(error_);
+        Group group = *std::move(slot(handed_over_));
+        slot(handed_over_++).reset();
+        lock.unlock();
+        room_.notify_all();
+        return group;
+    }
+
+private:
+    std::optional<Group>& slot(std::int64_t number) { return slots_[static_cast<std::size_t>(number) % slots_.size()]; }
+
+    const std::int64_t groups_;
+    std::atomic<std::int64_t> next_{0};
+    std::mutex mutex_;
+    std::condition_variable room_, news_;
+    std::vector<std::optional<Group>> slots_;
+    std::int64_t handed_over_ = 0;
+    std::exception_ptr error_;
+    bool closed_ = false;
+};
+
+class Sums {
+public:
+    void add(double x) {
+        least_ = count_ == 0 || x < least_ ? x : least_;
+        largest_ = count_ == 0 || x > largest_ ? x : largest_;
+        ++count_;
+        sum_ += x;
+        squares_ += static_cast<long double>(x) * x;
+    }
+    Spread spread() const {
+        if (count_ == 0) return {no_number, no_number, no_number, no_number};
+        const auto count = static_cast<long double>(count_);
+        return {least_, largest_, static_cast<double>(sum_ / count), static_cast<double>(std::sqrt(squares_ / count))};
+    }
+
+private:
+    std::int64_t count_ = 0;
+    double least_ = 0, largest_ = 0;
+    long double sum_ = 0, squares_ = 0;
+};
+
+// What is said of all of them.
+class Reduction {
+public:
+    explicit Reduction(std::size_t n) : n_(n), q_(n), p_(n) {}
+
+    void add(const EnsembleTrajectory& trajectory, EnsembleResult& result) {
+        ++result.trajectories;
+        ++result.count_of[static_cast<std::size_t>(trajectory.status)];
+        result.steps_done += trajectory.steps_done;
+        result.iterations += trajectory.iterations;
+        if (trajectory.status != LOBATTO_OK) return;
+        const double error = trajectory.energy_error_largest;
+        if (!std::isnan(error) && (result.energy_error_index < 0 || error > result.energy_error_largest)) {
+            result.energy_error_largest = error;
+            result.energy_error_index = trajectory.index;
+        }
+        const double* const state = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns + 1;
+        for (std::size_t k = 0; k < n_; ++k) {
+            q_[k].add(state[k]);
+            p_[k].add(state[n_ + k]);
+        }
+        if (!std::isnan(trajectory.energy_error_final)) energy_error_.add(trajectory.energy_error_final);
+    }
+    void finish(EnsembleResult& result) const {
+        for (std::size_t k = 0; k < n_; ++k) {
+            result.q.push_back(q_[k].spread());
+            result.p.push_back(p_[k].spread());
+        }
+        result.energy_error = energy_error_.spread();
+    }
+
+private:
+    std::size_t n_;
+    std::vector<Sums> q_, p_;
+    Sums energy_error_;
+};
+
+EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
+    EnsembleTrajectory trajectory;
+    trajectory.index = index;
+    trajectory.status = ended.status;
+    trajectory.steps_done = ended.steps_done;
+    trajectory.iterations = ended.iterations;
+    const std::int64_t count = std::ssize(ended.energies);
+    trajectory.kept = {ended.rows.data(), ended.energies.data(), count,
+                       static_cast<int>(std::ssize(ended.rows) / count)};
+    trajectory.energy_start = ended.energy_start;
+    trajectory.energy_error_final = ended.energies.back() - ended.energy_start;
+    trajectory.energy_error_largest = ended.energy_error_largest;
+    return trajectory;
+}
+
+}  // namespace
+
+int thread_count(int threads) {
+    return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
+    const Plan plan(kernel, request);
+    const double rows = static_cast<double>(rows_kept(request)) * static_cast<double>(plan.group_size);
+    return sizeof(double) * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 1);
+}
+
+EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
+    const auto start = std::chrono::steady_clock::now();
+    EnsembleResult result;
+    result.lanes = std::max(kernel->lanes, 1);
+    const Plan plan(kernel, request);
+    result.threads = static_cast<int>(plan.threads);
+
+    Shared shared;
+    Window window(plan);
+    Reduction reduction(static_cast<std::size_t>(kernel->coordinates));
+    const auto work = [&] {
+        try {
+            Worker worker(kernel, request, shared);
+            while (const auto group = window.take())
+                window.put(*group, worker.run(*group * plan.group_size,
+                                              std::min((*group + 1) * plan.group_size, request.count)));
+        } catch (...) {
+            window.fail(std::current_exception());
+        }
+    };
+    std::vector<std::jthread> workers;
+    struct Halt {  // before the workers are waited for, also when an exception ends this function
+        Shared& shared;
+        Window& window;
+        ~Halt() {
+            shared.halted = true;
+            window.close();
+        }
+    } const halt{shared, window};
+    try {
+        for (int i = 0; i < result.threads; ++i) workers.emplace_back(work);
+    } catch (const std::system_error& error) {
+        throw MachineError(fmt::format("cannot start {} threads: {}. Ask for fewer with --threads", result.threads,
+                                       error.code().message()));
+    }
+
+    auto last_progress = std::chrono::steady_clock::now();
+    const auto meanwhile = [&] {
+        if (request.interrupted != nullptr && *request.interrupted != 0) shared.halted = true;
+        const auto now = std::chrono::steady_clock::now();
+        if (!request.progress || now - last_progress < std::chrono::duration<double>(progress_seconds)) return;
+        last_progress = now;
+        request.progress(shared.steps_gone);
+    };
+    for (std::int64_t number = 0; number < plan.groups && !result.interrupted; ++number) {
+        const Group group = window.next(meanwhile);
+        result.processor_seconds += group.processor_seconds;
+        for (const Ended& ended : group.trajectories) {
+            const EnsembleTrajectory trajectory = view(result.trajectories, ended);
+            reduction.add(trajectory, result);
+            if (request.sink) request.sink(trajectory);
+        }
+        result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);
+        meanwhile();
+    }
+    reduction.finish(result);
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return result;
+}
+
+}  // namespace lobatto

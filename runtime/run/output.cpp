@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// Rows as text, in whole blocks, and back.
+#include "runtime/run/output.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+void append_number(std::string& text, double value) {
+    char digits[32];
+    text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+}
+
+std::string exact_text(double value) {
+    std::string text;
+    append_number(text, value);
+    return text;
+}
+
+std::string text_of(const TrajectoryHeader& header) {
+    std::string text =
+        fmt::format("# lobatto {}\n# scene: {}\n# method: {}\n# kernel: {}\n",
+                    header.events.empty() ? "trajectory" : "events", header.scene, header.method, header.kernel);
+    const char* separator = "# parameters: ";
+    for (const auto& [name, value] : header.parameters) {
+        text += fmt::format("{}{} = {}", separator, name, exact_text(value));
+        separator = ", ";
+    }
+    if (!header.parameters.empty()) text += '\n';
+    for (std::size_t i = 0; i < header.events.size(); ++i)
+        text += fmt::format("# event {}: {}\n", i + 1, header.events[i]);
+    separator = "# columns: ";
+    for (const auto& [name, unit] : header.columns) {
+        text += separator + (unit.empty() ? name : fmt::format("{} [{}]", name, unit));
+        separator = ", ";
+    }
+    separator = "\n";
+    for (const auto& [name, unit] : header.columns) {
+        text += separator + name;
+        separator = ",";
+    }
+    return text + '\n';
+}
+
+TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header, const Written& kept)
+    : file_(path, "the trajectory", kept.size),
+      energy_(header.energy),
+      columns_(header.columns.size() - (header.energy ? 1 : 0)),
+      text_(text_of(header)) {
+    if (kept.size == 0) {
+        flush();
+    } else {
+        add_to_checksum(kept.size);
+        if (file_.read(0, text_.size()) != text_ || checksum_.written() != kept)
+            throw MachineError(
+                fmt::format("cannot go on with the trajectory in {}: it is not what the run had written. Run without "
+                            "--resume to begin anew",
+                            path));
+        text_.clear();
+    }
+}
+
+// What stands in the file.
+void TrajectoryFile::add_to_checksum(std::int64_t size) {
+    constexpr std::int64_t block = 1 << 20;
+    std::string bytes;
+    for (std::int64_t at = 0; at < size; at += std::ssize(bytes)) {
+        bytes = file_.read(at, static_cast<std::size_t>(std::min(block, size - at)));
+        if (bytes.empty()) return;
+        checksum_.add(bytes);
+    }
+}
+
+void TrajectoryFile::write(const Records& records) {
+    for (std::int64_t i = 0; i < records.count; ++i) {
+        append(records.rows + i * records.columns, columns_);
+        if (energy_) {
+            text_ += ',';
+            append_number(text_, records.energy[i]);
+        }
+        text_ += '\n';
+    }
+    flush();
+}
+
+void TrajectoryFile::write(const EventRecords& records) {
+    for (std::int64_t i = 0; i < records.count; ++i) {
+        const double* row = records.rows + i * records.columns;
+        append_number(text_, row[0] + 1);
+        text_ += ',';
+        append(row + 1, columns_ - 1);
+        text_ += '\n';
+    }
+    flush();
+}
+
+void TrajectoryFile::append(const double* row, std::size_t count) {
+    for (std::size_t column = 0; column < count; ++column) {
+        if (column > 0) text_ += ',';
+        append_number(text_, row[column]);
+    }
+}
+
+void TrajectoryFile::flush() {
+    file_.write(text_);
+    checksum_.add(text_);
+    text_.clear();
+}
+
+TrajectoryTable read_trajectory(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw MachineError(fmt::format("cannot read {}: {}", path, std::strerror(errno)));
+    TrajectoryTable table;
+    for (std::string line; std::getline(file, line) && !file.eof();) {
+        if (line.starts_with("# ")) {
+            table.comments.push_back(line.substr(2));
+            continue;
+        }
+        const bool names = table.columns.empty();
+        if (!names) table.rows.emplace_back();
+        for (std::size_t begin = 0; begin <= line.size();) {
+            const std::size_t end = std::min(line.find(',', begin), line.size());
+            if (names) {
+                table.columns.push_back(line.substr(begin, end - begin));
+            } else {
+                double value = 0;
+                const auto read = std::from_chars(line.data() + begin, line.data() + end, value);
+                if (read.ec != std::errc() || read.ptr != line.data() + end)
+                    throw MachineError(fmt::format("{} is not a trajectory file: '{}' is not a number", path,
+                                                   line.substr(begin, end - begin)));
+                table.rows.back().push_back(value);
+            }
+            begin = end + 1;
+        }
+    }
+    return table;
+}
+
+}  // namespace lobatto

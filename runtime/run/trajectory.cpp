@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: MIT
+// The host's side of a run: how many steps to ask the kernel for at a time, and what to say when it stops.
+#include "runtime/run/trajectory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+
+namespace lobatto {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Of this thread: other programs on the machine do not count.
+double processor_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+constexpr std::int64_t rows_at_once = 4096;  // the records in memory, however long the run
+constexpr double block_seconds = 0.02;       // of a block of steps: an interruption is noticed within about twice this
+constexpr double progress_seconds = 0.1;
+constexpr double checkpoint_seconds = 0.1;    // between two checkpoints, unless
+constexpr double checkpoint_part = 1.0 / 50;  // of the time would go into them
+
+// Watches the kept states go by: their energies, and the sink.
+class Keeper {
+public:
+    Keeper(const LoadedStepper<double>& stepper, const TrajectoryRequest& request, TrajectoryResult& result)
+        : stepper_(stepper), request_(request), result_(result), n_(request.q.size()), q_(n_), p_(n_) {
+        result_.energy_start = energy(request.time, request.q.data(), request.p.data());
+    }
+
+    // `between`: that many of every between + 1 rows lie between two steps.
+    void keep(const double* rows, std::int64_t count, int between) {
+        const std::size_t columns = 1 + 2 * n_;
+        const double* energies = nullptr;
+        if (has_energy()) {
+            energies_.resize(static_cast<std::size_t>(count));
+            for (std::size_t i = 0; i < energies_.size(); ++i) {
+                const double* const row = rows + i * columns;
+                energies_[i] = energy(row[0], row + 1, row + 1 + n_);
+                if ((i + 1) % static_cast<std::size_t>(between + 1) != 0) continue;
+                result_.energy_error_final = energies_[i] - result_.energy_start;
+                const double error = std::fabs(result_.energy_error_final);
+                if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
+            }
+            energies = energies_.data();
+        } else {
+            result_.energy_error_final = result_.energy_error_largest = std::nan("");
+        }
+        if (request_.sink && count > 0) request_.sink({rows, energies, count, static_cast<int>(columns)});
+    }
+
+    void keep_last() {
+        std::vector<double> row{result_.time};
+        row.insert(row.end(), result_.q.begin(), result_.q.end());
+        row.insert(row.end(), result_.p.begin(), result_.p.end());
+        keep(row.data(), 1, 0);
+    }
+
+private:
+    bool has_energy() const { return stepper_.kernel()->has_energy != 0; }
+
+    double energy(double time, const double* q, const double* p) {
+        double energy = 0;
+        std::copy_n(q, n_, q_.begin());
+        std::copy_n(p, n_, p_.begin());
+        return stepper_.energy(time, q_, p_, energy) == LOBATTO_OK ? energy : std::nan("");
+    }
+
+    const LoadedStepper<double>& stepper_;
+    const TrajectoryRequest& request_;
+    TrajectoryResult& result_;
+    std::size_t n_;
+    std::vector<double> q_, p_, energies_;
+};
+
+// Hands out checkpoints, at the right times.
+class Checkpoints {
+public:
+    explicit Checkpoints(const TrajectoryRequest& request) : request_(request) {}
+
+    void look(const LoadedStepper<double>& stepper, const TrajectoryResult& result) {
+        if (!request_.checkpoint || seconds_since(last_) < pause_) return;
+        const Clock::time_point start = Clock::now();
+        request_.checkpoint({result, stepper.memory()});
+        last_ = Clock::now();
+        pause_ = std::max(checkpoint_seconds, seconds_since(start) / checkpoint_part);
+    }
+    void at_once(const LoadedStepper<double>& stepper, const TrajectoryResult& result) {
+        pause_ = 0;
+        look(stepper, result);
+    }
+
+private:
+    const TrajectoryRequest& request_;
+    Clock::time_point last_ = Clock::now();
+    double pause_ = checkpoint_seconds;
+};
+
+}  // namespace
+
+std::string list_text(const std::vector<double>& values) {
+    constexpr std::size_t shown = 16;
+    if (values.size() <= shown) return fmt::format("({:.6g})", fmt::join(values, ", "));
+    return fmt::format("({:.6g}, ... {} in all)", fmt::join(values.begin(), values.begin() + shown, ", "),
+                       values.size());
+}
+
+TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request) {
+    TrajectoryResult result;
+    result.time = request.time;
+    result.q = request.q;
+    result.p = request.p;
+    LoadedStepper<double> stepper(kernel);
+    result.status = stepper.prepare(request.parameters, request.step);
+    if (result.status == LOBATTO_OK) result.status = stepper.start(request.time, request.q, request.p);
+    if (result.status != LOBATTO_OK) return result;
+    result.started = true;
+
+    Keeper keeper(stepper, request, result);
+    if (request.from == nullptr) {
+        keeper.keep_last();
+    } else {
+        result = request.from->result;
+        result.started = true;
+        result.interrupted = false;
+        stepper.restore(request.from->stepper);
+    }
+    Checkpoints checkpoints(request);
+
+    const std::int64_t rows_of_step = 1 + request.dense;
+    const std::int64_t rows = std::clamp<std::int64_t>(request.steps / request.every, 1,
+                                                       std::max<std::int64_t>(rows_at_once / rows_of_step, 1)) *
+                              rows_of_step;
+    const std::size_t columns = 1 + 2 * request.q.size();
+    std::vector<double> records(static_cast<std::size_t>(rows) * columns), events;
+    const bool seeks_events = request.events && kernel->events > 0;
+    const std::int64_t event_rows = seeks_events ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
+    events.resize(static_cast<std::size_t>(event_rows) * (1 + columns));
+    std::int64_t block = 256;
+    Clock::time_point last_progress = Clock::now();
+    while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
+        result.interrupted = request.interrupted != nullptr && *request.interrupted != 0;
+        if (result.interrupted) {
+            checkpoints.at_once(stepper, result);
+            break;
+        }
+
+        lobatto_advance call{};
+        call.tolerance = request.tolerance;
+        call.steps = std::min(block, request.steps - result.steps_done);
+        call.record_every = request.every;
+        call.records = records.data();
+        call.capacity = rows;
+        call.dense = request.dense;
+        call.events = seeks_events ? events.data() : nullptr;
+        call.event_capacity = event_rows;
+        const Clock::time_point start = Clock::now();
+        const double processor_start = processor_seconds();
+        result.status = stepper.advance(call);
+        result.seconds += processor_seconds() - processor_start;
+        const double seconds = seconds_since(start);
+
+        result.steps_done += call.steps_done;
+        result.iterations += call.iterations;
+        result.iterations_most = std::max(result.iterations_most, call.iterations_most);
+        result.increment_largest = std::max(result.increment_largest, call.increment_largest);
+        result.increment_failed = call.increment_failed;
+        stepper.state(result.time, result.q, result.p);
+        result.events += call.events_written;
+        if (call.events_written > 0)
+            request.events({events.data(), call.events_written, static_cast<int>(1 + columns)});
+        keeper.keep(records.data(), call.records_written, request.dense);
+
+        // The clock ticks coarsely against a short block: grow at most eightfold at a time.
+        const double pace = block_seconds / std::max(seconds, block_seconds / 8);
+        block = std::max<std::int64_t>(1, std::llround(static_cast<double>(call.steps_done) * pace));
+        if (request.progress && seconds_since(last_progress) > progress_seconds) {
+            last_progress = Clock::now();
+            request.progress(result.steps_done);
+        }
+        if (result.status == LOBATTO_OK) checkpoints.look(stepper, result);
+    }
+    if (result.steps_done % request.every != 0) keeper.keep_last();
+    return result;
+}
+
+std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request) {
+    const std::string smaller = fmt::format("a smaller step, such as h = {:.6g}", request.step / 2);
+    std::string why, advice;
+    switch (result.status) {
+        case LOBATTO_OK:
+            return {};
+        case LOBATTO_NOT_CONVERGED:
+            why = fmt::format(
+                "the iteration for the positions inside the step did not converge: its last increment was {:.2g} "
+                "of the displacement "
+                "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
+                "of the potential",
+                result.increment_failed);
+            advice = smaller + ", or start elsewhere";
+            break;
+        case LOBATTO_NOT_FINITE:
+            if (!result.started) {
+                why =
+                    "a number computed from the parameters, the step and this start alone is infinite or not a number: "
+                    "they are too large or too small together, or the start is at a singularity";
+                advice = "other units, so that numbers are nearer to 1, or start elsewhere";
+                break;
+            }
+            why =
+                "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
+                "potential or away to infinity, or the "
+                "step is too long for the method to be stable";
+            advice = smaller + ", an earlier end, or start elsewhere";
+            break;
+        case LOBATTO_SINGULAR_JACOBIAN:
+            why =
+                "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
+                "This h meets a resonance of the forces there";
+            advice = smaller + ", or a slightly different one";
+            break;
+        case LOBATTO_SINGULAR_MASS:
+            why =
+                "the mass matrix has no inverse for these parameters or at this state, so that momenta do not "
+                "determine velocities";
+            advice =
+                "other values of the parameters that stand before the squared velocities, or start elsewhere; none of "
+                "the "
+                "masses may vanish";
+            break;
+        case LOBATTO_UNSUPPORTED:
+            why =
+                "the kernel was compiled without what is asked of it: states between steps, events, energies or "
+                "tangent "
+                "maps";
+            advice = "to compile it from a scene whose [output] asks for it";
+            break;
+        case LOBATTO_TIME_STANDS_STILL:
+            why =
+                fmt::format("t + h equals t in double precision: h = {:.6g} is below the rounding of t", request.step);
+            advice = "a larger step, or a start time nearer to zero";
+            break;
+    }
+    const std::string where =
+        !result.started ? fmt::format("the run cannot begin at t = {:.6g}", result.time)
+        : result.steps_done == 0
+            ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
+            : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);
+    return fmt::format("{}, from q = {}, p = {}: {}. Try {}.", where, list_text(result.q), list_text(result.p), why,
+                       advice);
+}
+
+}  // namespace lobatto

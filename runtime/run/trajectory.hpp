@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// Drives one trajectory: blocks of steps inside the kernel, records to a sink, progress, interruption, diagnosis of a
+// stop.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "runtime/build/library.hpp"
+#include "runtime/kernel/abi.h"
+
+namespace lobatto {
+
+// Kept states: rows of t, q[n], p[n], row-major as the kernel writes them, and the energy of each.
+struct Records {
+    const double* rows = nullptr;    // count x columns
+    const double* energy = nullptr;  // count: H(t, q, p); null when the kernel has no energy
+    std::int64_t count = 0;
+    int columns = 0;  // 1 + 2n
+};
+
+// Where event functions vanished: rows of event number, t, q[n], p[n], in the order of the motion.
+struct EventRecords {
+    const double* rows = nullptr;  // count x columns
+    std::int64_t count = 0;
+    int columns = 0;  // 2 + 2n
+};
+
+struct TrajectoryResult {
+    lobatto_status status = LOBATTO_OK;
+    bool started = false;  // parameters, step and start were accepted
+    bool interrupted = false;
+    std::int64_t steps_done = 0;
+    std::int64_t iterations = 0;
+    std::int32_t iterations_most = 0;
+    double increment_largest = 0;
+    double increment_failed = 0;
+    double time = 0;                  // of the last good state
+    std::vector<double> q, p;         // the last good state
+    double seconds = 0;               // of processor time inside the kernel
+    std::int64_t events = 0;          // found
+    double energy_start = 0;          // not a number when the kernel has no energy, and the errors with it
+    double energy_error_largest = 0;  // max over the kept states at steps |H - H(0)|, absolute; H in double, so about
+                                      // |H| 2^-53 of it is rounding
+    double energy_error_final = 0;    // H - H(0) at the last good state
+};
+
+// Where a run stood between two steps: what it had found, and all that its stepper knew.
+struct Halfway {
+    TrajectoryResult result;
+    std::string stepper;  // LoadedStepper::memory
+};
+
+struct TrajectoryRequest {
+    std::vector<double> parameters;  // scene order
+    std::vector<double> q, p;        // n each
+    double time = 0;
+    double step = 0;         // h; may be negative
+    double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
+    std::int64_t steps = 0;  // >= 0
+    std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
+    int dense = 0;           // states between two steps, on the step's polynomial; above 0 needs every = 1
+    std::function<void(const Records&)> sink;         // called for each block, in order
+    std::function<void(const EventRecords&)> events;  // likewise; nothing: events are not sought
+    std::function<void(std::int64_t done)> progress;  // called about ten times a second
+    const volatile int* interrupted = nullptr;        // stop between blocks once it is not zero
+    // Called about ten times a second, less often where it takes longer than a fiftieth of the time, and when the run
+    // is interrupted; all that came before has gone to the sinks. Going on from there gives the bits of a run that was
+    // never stopped.
+    std::function<void(const Halfway&)> checkpoint;
+    const Halfway* from = nullptr;  // where to go on; of a run with this request and this kernel's object
+};
+
+TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request);
+
+// (1.25, -3); of long lists the beginning and the number.
+std::string list_text(const std::vector<double>& values);
+
+// What to tell a person when a run stopped: step, time, state, residual, why, and what to try. One paragraph.
+std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request);
+
+}  // namespace lobatto

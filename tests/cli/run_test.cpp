@@ -1,0 +1,523 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto run from the outside: what it prints, writes and returns, also when it is interrupted, killed or refused.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <regex>
+#include <thread>
+
+#include "runtime/measure/reference.hpp"
+#include "runtime/run/output.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
+const std::string oscillator = LOBATTO_SOURCE_DIR "/scenes/harmonic_oscillator.toml";
+
+// A folder for trajectories.
+struct Place {
+    test::TemporaryFolder folder;
+    std::string file(const std::string& name = "run.csv") const { return folder / name; }
+
+    test::Finished run(std::vector<std::string> arguments) const {
+        arguments.insert(arguments.begin(), {LOBATTO_PROGRAM, "run"});
+        return test::run(arguments);
+    }
+};
+
+// Starts a run that would take hours, waits until it has written states, sends the signal.
+struct Signalled {
+    int exit_code = -1;  // 128 + signal when the signal ended it
+    std::string err;
+};
+Signalled signal_long_run(const Place& place, int signal) {
+    const std::string out = place.file(), partial = out + ".partial", err = place.file("err");
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+        ::dup2(::open("/dev/null", O_WRONLY), 1);
+        ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT, 0600), 2);
+        ::execl(LOBATTO_PROGRAM, LOBATTO_PROGRAM, "run", pendulum.c_str(), "--until", "1e9", "--every", "1000", "-o",
+                out.c_str(), nullptr);
+        ::_exit(127);
+    }
+    for (int tries = 0; tries < 3000; ++tries) {
+        if (std::filesystem::exists(partial) && std::filesystem::file_size(partial) > 10000) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    ::kill(pid, signal);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), test::read_file(err)};
+}
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+// Runs into infinity at t = 1.717, the integral of dy / sqrt(2 (y^3 - 1)) from 1 on, y = -x.
+const char* const escape =
+    "title = \"Escape\"\n"
+    "lagrangian = \"x'^2/2 - x^3\"\n"
+    "[coordinates]\nx = { position = -1, velocity = 0 }\n"
+    "[method]\nfamily = \"lobatto\"\npoints = 4\n"
+    "[run]\nstep = 0.1\nuntil = 10\n";
+
+}  // namespace
+
+TEST_CASE("a run says how good it is and where its trajectory is") {
+    const Place place;
+    const test::Finished first = place.run({pendulum, "-o", place.file()});
+    CHECK(first.exit_code == 0);
+    CHECK(first.err == "");
+    const std::regex table(
+        "\\S+scenes/pendulum.toml: kernel [0-9a-f]{16}, derived in 0\\.\\d\\d s, (compiled in \\d+\\.\\d\\d s|found "
+        "compiled in the cache)\n"
+        "  steps                   2400, h = 0.05, to t = 120\n"
+        "  time per step           \\S+ [nu]s\n"
+        "  iterations              \\d\\.\\d\\d per step, at most \\d\n"
+        "  energy error            \\S+ at most, relative \\S+\n"
+        "  symplectic defect       \\S+\n"
+        "  position error          \\S+ rad at most, against the exact elliptic solution\n"
+        "  estimated error         \\S+ of the amplitude at the end\n"
+        "  trajectory              \\S+/run.csv, 2401 states\n");
+    CHECK_MESSAGE(std::regex_match(first.out, table), first.out);
+    const test::Finished second = place.run({pendulum, "-o", place.file("again.csv")});
+    CHECK(contains(second.out, ", found compiled in the cache\n"));
+    CHECK(test::read_file(place.file()) == test::read_file(place.file("again.csv")));
+}
+
+TEST_CASE("the trajectory file follows the exact solution and names its columns") {
+    const Place place;
+    REQUIRE(place.run({pendulum, "-o", place.file(), "--quiet"}).out == "");
+    const TrajectoryTable table = read_trajectory(place.file());
+    REQUIRE(table.comments.size() == 6);
+    CHECK(table.comments[0] == "lobatto trajectory");
+    CHECK(table.comments[1] == "scene: A plane pendulum");
+    CHECK(table.comments[2] == "method: Lobatto, 4 points, h = 0.05");
+    CHECK(table.comments[3].starts_with("kernel: "));
+    CHECK(table.comments[4] == "parameters: m = 1, omega = 6.283185307179586");
+    CHECK(table.comments[5] == "columns: t, q [rad], p_q, H");
+    CHECK(table.columns == std::vector<std::string>{"t", "q", "p_q", "H"});
+    REQUIRE(table.rows.size() == 2401);
+    const long double pi = std::acos(-1.0L);
+    double largest = 0;
+    for (const std::vector<double>& row : table.rows) {
+        const PhasePoint exact = pendulum_solution(4 * pi * pi, pi / 2, 0, static_cast<long double>(row[0]));
+        largest = std::fmax(largest, std::fabs(row[1] - static_cast<double>(exact.q)));
+    }
+    CHECK(largest > 1e-8);  // the method's own error; measured 4.4e-8
+    CHECK(largest < 1e-7);
+}
+
+TEST_CASE("--tolerance takes the place of the scene's, and a loose one costs digits and saves evaluations") {
+    const Place place;
+    const auto energy_error = [](const Place& in, const std::string& name) {
+        const TrajectoryTable table = read_trajectory(in.file(name));
+        double largest = 0;
+        for (const std::vector<double>& row : table.rows)
+            largest = std::fmax(largest, std::fabs(row[3] / table.rows[0][3] - 1));
+        return largest;
+    };
+    const std::string scene = place.folder / "scene.toml";
+    std::string text = test::read_file(pendulum);
+    const std::string section = "[method]\n";
+    text.insert(text.find(section) + section.size(), "tolerance = 1e-6\n");
+    test::write_text(scene, text);
+    place.run({pendulum, "-o", place.file("rounding.csv")});
+    const std::string option = place.run({pendulum, "--tolerance", "1e-6", "-o", place.file("option.csv")}).out;
+    const std::string in_scene = place.run({scene, "-o", place.file("scene.csv")}).out;
+    place.run({scene, "--tolerance", "1e-15", "-o", place.file("over.csv")});
+    CHECK(contains(option, "1.00 per step"));
+    CHECK(contains(in_scene, "1.00 per step"));
+    const double rounding = energy_error(place, "rounding.csv"), loose = energy_error(place, "option.csv");
+    CHECK(rounding < 1e-7);        // 6.4e-8, the method's own error
+    CHECK(loose > 10 * rounding);  // 7.9e-6
+    CHECK(energy_error(place, "scene.csv") == loose);
+    CHECK(energy_error(place, "over.csv") == doctest::Approx(rounding).epsilon(1e-3));
+}
+
+TEST_CASE("a linear system needs no iteration and conserves its discrete energy") {
+    const Place place;
+    const test::Finished done = place.run({oscillator, "--until", "50", "-o", place.file()});
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.out, "  iterations              none: the step is a linear map\n"));
+    CHECK(contains(done.out, " at most, against the exact solution\n"));
+    std::smatch found;
+    REQUIRE(std::regex_search(done.out, found, std::regex("discrete energy error   relative (\\S+) at most\n")));
+    CHECK(std::stod(found[1]) < 1e-12);  // rounding of 1000 steps; measured 1.7e-13
+    REQUIRE(std::regex_search(done.out, found, std::regex("energy error            (\\S+) at most")));
+    CHECK(std::stod(found[1]) > 1e-7);  // while the energy itself sways; measured 1.1e-6
+}
+
+TEST_CASE("the command line replaces values of the scene, with one kernel for all") {
+    const Place place;
+    place.run({pendulum, "-o", place.file("first.csv"), "--quiet"});
+    const test::Finished done = place.run({pendulum, "-o", place.file(), "--set", "omega=2", "--set", "m=1/4", "--step",
+                                           "pi/omega/8", "--until", "2*pi", "--every", "4"});
+    CHECK(done.exit_code == 0);
+    CHECK(
+        contains(done.out, "found compiled in the cache\n  steps                   32, h = 0.19635, to t = 6.28319\n"));
+    const TrajectoryTable table = read_trajectory(place.file());
+    CHECK(table.comments[4] == "parameters: m = 0.25, omega = 2");
+    CHECK(table.rows.size() == 9);
+    CHECK(table.rows.front()[3] == doctest::Approx(0.25 * 4));  // H = m omega^2 (1 - cos(pi/2))
+    const test::Finished explicit_one = place.run({pendulum, "-o", place.file(), "--points", "2", "--until", "1"});
+    CHECK(contains(explicit_one.out, "  iterations              none: the step is explicit\n"));
+    CHECK(read_trajectory(place.file()).comments[2] == "method: Lobatto, 2 points, h = 0.05");
+    const test::Finished split = place.run({pendulum, "-o", place.file(), "--splitting", "14", "--until", "1"});
+    CHECK(contains(split.out, "  iterations              none: the step is explicit\n"));
+    CHECK(read_trajectory(place.file()).comments[2] == "method: splitting, 14 stages, h = 0.05");
+}
+
+TEST_CASE("an end that is no multiple of the step is said, not overrun") {
+    const Place place;
+    const test::Finished done = place.run({pendulum, "-o", place.file(), "--step", "0.3", "--until", "1"});
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.out, "  steps                   3, h = 0.3, to t = 0.9\n"));
+    CHECK(contains(done.out,
+                   "\nThe end time is not a multiple of the step: the run ends at the last multiple before it.\n"));
+    CHECK(!contains(place.run({pendulum, "-o", place.file(), "--step", "0.1", "--until", "0.3"}).out, "multiple"));
+    const test::Finished none = place.run({pendulum, "-o", place.file(), "--until", "0"});
+    CHECK(contains(none.out, "  steps                   0, h = 0.05, to t = 0\n"));
+    CHECK(contains(none.out, ", 1 state\n"));
+}
+
+TEST_CASE("without -o the trajectory goes to the folder out under the current one") {
+    const Place place;
+    const std::string command = "cd '" + place.folder.string() + "' && '" LOBATTO_PROGRAM "' run '" + pendulum + "'";
+    const test::Finished done = test::run({"sh", "-c", command});
+    CHECK(contains(done.out, "  trajectory              out/pendulum.csv, 2401 states\n"));
+    CHECK(read_trajectory(place.folder / "out/pendulum.csv").rows.size() == 2401);
+}
+
+TEST_CASE("wrong values on the command line are refused with exit code 2") {
+    const Place place;
+    const auto refusal = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), pendulum);
+        arguments.insert(arguments.end(), {"-o", place.file()});
+        const test::Finished done = place.run(arguments);
+        CHECK(done.exit_code == 2);
+        CHECK(done.out == "");
+        CHECK(!std::filesystem::exists(place.file()));
+        return done.err;
+    };
+    CHECK(refusal({"--set", "omgea=2"}) ==
+          "--set:1:1: unknown parameter 'omgea'; declared: m, omega. Did you mean 'omega'?\n  1 | omgea=2\n   "
+          " | ^\n");
+    CHECK(refusal({"--set", "m"}) == "--set:1:1: expected name=value, such as --set m=2\n  1 | m\n    | ^\n");
+    for (const std::string value : {"0", "-1e-6", "0.002", "nan", "small"})
+        CHECK(contains(refusal({"--tolerance", value}), "--tolerance: the tolerance is " + value +
+                                                            "; it must be above 0 and at most 0.001; leave it "
+                                                            "out to iterate to rounding\n"));
+    CHECK(contains(refusal({"--set", "m=2*omega"}), "--set:1:5: unknown name 'omega' in the value of m"));
+    CHECK(contains(refusal({"--step", "2*"}), "--step:1:3: "));
+    const std::string range = " must be 0, or of a size between 1e-300 and 1e300\n";
+    CHECK(refusal({"--set", "m=1e400"}) == "--set:1:3: the value of m" + range + "  1 | m=1e400\n    |   ^\n");
+    CHECK(contains(refusal({"--set", "omega=1e-400"}), "--set:1:7: the value of omega" + range));
+    CHECK(contains(refusal({"--step", "1e400"}), "--step:1:1: the step" + range));
+    CHECK(contains(refusal({"--until", "m*1e400"}), "--until:1:1: the end time" + range));
+    CHECK(refusal({"--step", "-0.1"}) == "--step: the step must be positive, but is -0.1\n");
+    CHECK(refusal({"--until", "-1"}) == "--until: the end time must not be negative, but is -1\n");
+    CHECK(refusal({"--until", "1e30"}) ==
+          pendulum + ": 2e+31 steps are too many to count; make the step larger or the end time smaller\n");
+    CHECK(refusal({"--every", "0"}) ==
+          "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
+    CHECK(contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
+    CHECK(contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
+    CHECK(contains(refusal({"--splitting", "12"}), "lobatto: --splitting: 12 not in {6,11,14,17,35}"));
+    CHECK(contains(refusal({"--splitting", "11", "--points", "4"}), "excludes"));
+    CHECK(refusal({"--splitting", "11", "--tolerance", "1e-9"}) ==
+          pendulum + ": splitting methods iterate nothing; leave out --tolerance\n");
+    CHECK(refusal({"--splitting", "11", "--arithmetic", "clean"}) ==
+          pendulum +
+              ": splitting methods have no clean arithmetic; choose another method (--points 8), or plain arithmetic "
+              "(--arithmetic plain)\n");
+    CHECK(refusal({"--splitting", "11", "--general"}) ==
+          pendulum +
+              ": splitting methods have no general path; leave out --general, or choose another method (--points 4)\n");
+}
+
+TEST_CASE("a splitting method refuses masses that vary, and number types with more digits than its coefficients") {
+    const Place place;
+    const std::string folded = std::string(LOBATTO_SOURCE_DIR) + "/scenes/double_pendulum.toml";
+    const test::Finished refused = place.run({folded, "-o", place.file(), "--splitting", "11"});
+    CHECK(refused.exit_code == 2);
+    CHECK(contains(refused.err, "double_pendulum.toml:"));
+    CHECK(contains(refused.err, "splitting methods need a constant mass matrix and forces without velocities, but "));
+    CHECK(contains(refused.err, "; choose Lobatto (--points 4) or Gauss (--stages 3)"));
+    const auto emitted = [&](const char* stages, const char* precision) {
+        return test::run({LOBATTO_PROGRAM, "emit", pendulum, "--splitting", stages, "--precision", precision, "-o",
+                          place.file("emitted"), "--no-support"});
+    };
+    const test::Finished wide = emitted("11", "long-double");
+    CHECK(wide.exit_code == 2);
+    CHECK(contains(wide.err,
+                   "the coefficients of splitting, 11 stages are known to 15 digits, too few for this number "
+                   "type; choose double, or Lobatto (--points 8)"));
+    CHECK(emitted("17", "long-double").exit_code == 0);
+    CHECK(emitted("35", "quadruple").exit_code == 0);
+}
+
+TEST_CASE("a run that stops keeps what was computed, explains itself and returns 3") {
+    const Place place;
+    const std::string scene = place.file("escape.toml");
+    test::write_text(scene, escape);
+    const test::Finished done = place.run({scene, "-o", place.file()});
+    CHECK(done.exit_code == 3);
+    const TrajectoryTable table = read_trajectory(place.file());
+    REQUIRE(table.rows.size() > 10);
+    CHECK(table.rows.back()[0] == doctest::Approx(1.6));
+    CHECK(table.rows.back()[1] < -10);
+    CHECK(contains(done.out, " of 100, h = 0.1, to t = "));
+    CHECK(contains(done.out, "run.csv, " + std::to_string(table.rows.size()) + " states\n"));
+    CHECK(done.err.starts_with("lobatto: " + scene + ": the run stopped in step " + std::to_string(table.rows.size()) +
+                               ", after t = "));
+    CHECK(done.err.ends_with(" What was computed is in " + place.file() + ".\n"));
+}
+
+TEST_CASE("a start that is impossible returns 3 and leaves the file of before") {
+    const Place place;
+    test::write_text(place.file(), "of before\n");
+    const test::Finished done = place.run({pendulum, "--set", "m=0", "-o", place.file()});
+    CHECK(done.exit_code == 3);
+    CHECK(contains(done.err, "the mass matrix has no inverse for these parameters"));
+    CHECK(test::read_file(place.file()) == "of before\n");
+}
+
+TEST_CASE("an interrupted run keeps what was computed, says so and returns 130") {
+    for (const int signal : {SIGINT, SIGTERM}) {
+        const Place place;
+        const Signalled run = signal_long_run(place, signal);
+        CHECK(run.exit_code == 130);
+        CHECK(run.err.starts_with("lobatto: interrupted at t = "));
+        CHECK(run.err.ends_with("; what was computed is in " + place.file() +
+                                ". The same command with --resume goes on from there.\n"));
+        const TrajectoryTable table = read_trajectory(place.file());
+        CHECK(table.rows.size() > 100);
+        CHECK(!std::filesystem::exists(place.file() + ".partial"));
+    }
+}
+
+TEST_CASE("kill -9 leaves readable rows beside the file of before") {
+    const Place place;
+    test::write_text(place.file(), "of before\n");
+    CHECK(signal_long_run(place, SIGKILL).exit_code == 128 + SIGKILL);
+    CHECK(test::read_file(place.file()) == "of before\n");
+    const TrajectoryTable table = read_trajectory(place.file() + ".partial");
+    REQUIRE(table.rows.size() > 100);
+    for (const std::vector<double>& row : table.rows) REQUIRE(row.size() == 4);
+    CHECK(table.rows[7][0] == doctest::Approx(7 * 1000 * 0.05).epsilon(1e-14));
+    CHECK(place.run({pendulum, "-o", place.file()}).exit_code == 0);  // what is left does not stand in the way
+    CHECK(read_trajectory(place.file()).rows.size() == 2401);
+}
+
+TEST_CASE("a machine that refuses to write is an error of exit code 4") {
+    const Place place;
+    const test::Finished missing = place.run({pendulum, "-o", place.file("none/run.csv")});
+    CHECK(missing.exit_code == 4);
+    CHECK(missing.err == "lobatto: cannot write the trajectory to " + place.file("none/run.csv.partial") +
+                             ": No such file or directory. Create its folder first, or choose another place with -o\n");
+    const test::Finished full = place.run({pendulum, "-o", "/dev/full", "--quiet"});
+    CHECK(full.exit_code == 4);
+    CHECK(full.err ==
+          "lobatto: cannot write the trajectory to /dev/full: No space left on device. Free some space, or choose "
+          "another place with -o\n");
+}
+
+TEST_CASE("a reader that goes away does not cost the trajectory") {
+    const Place place;
+    const test::Finished done =
+        test::run({"sh", "-c", "'" LOBATTO_PROGRAM "' run '" + pendulum + "' -o '" + place.file() + "' | true"});
+    CHECK(done.err == "");
+    CHECK(read_trajectory(place.file()).rows.size() == 2401);
+    // Rows to a pipe that closes.
+    const test::Finished head = test::run(
+        {"sh", "-c",
+         "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
+    CHECK(head.out == "t,q,p_q,H\n");
+    const std::string gone = "lobatto: cannot write the trajectory to /dev/stdout: Broken pipe. Its reader has gone\n";
+    CHECK(head.err == gone);
+    // Nor is the error lost when there is more to say on the same pipe.
+    const test::Finished talkative =
+        test::run({"sh", "-c",
+                   "{ '" LOBATTO_PROGRAM "' run '" + pendulum +
+                       "' --until 1e5 -o /dev/stdout; echo $? >&2; } | head -1 > /dev/null"});
+    CHECK(talkative.err == gone + "4\n");
+}
+
+TEST_CASE("a run keeps only what the scene asks for") {
+    const Place place;
+    const auto scene_with = [&](const std::string& output) {
+        const std::string path = place.file("scene.toml");
+        test::write_text(path,
+                         "title = \"Two\"\nlagrangian = \"(a'^2 + b'^2)/2 - a^2 - b^4 - a*b\"\n"
+                         "[coordinates]\na = { position = 1, velocity = 0 }\nb = { position = 0, velocity = 1 }\n"
+                         "[run]\nstep = 0.1\nuntil = 1\n[output]\n" +
+                             output);
+        return path;
+    };
+    const test::Finished bare =
+        place.run({scene_with("momenta = false\nenergy = false\ntangent = false\n"), "-o", place.file()});
+    CHECK(bare.err == "");
+    CHECK(read_trajectory(place.file()).columns == std::vector<std::string>{"t", "a", "b"});
+    CHECK(!contains(bare.out, "energy"));
+    CHECK(!contains(bare.out, "symplectic"));
+    const TrajectoryTable kept = read_trajectory(place.file());
+    const test::Finished full = place.run({scene_with(""), "-o", place.file()});
+    const TrajectoryTable all = read_trajectory(place.file());
+    CHECK(all.columns == std::vector<std::string>{"t", "a", "b", "p_a", "p_b", "H"});
+    CHECK(contains(full.out, "  energy error "));
+    CHECK(contains(full.out, "  symplectic defect "));
+    REQUIRE(kept.rows.size() == all.rows.size());
+    for (std::size_t i = 0; i < kept.rows.size(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) CHECK(kept.rows[i][k] == all.rows[i][k]);
+}
+
+TEST_CASE("states between steps lie on the motion, and those at steps are unchanged") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    const std::string text = test::read_file(pendulum);
+    test::write_text(scene, text);
+    REQUIRE(place.run({scene, "--until", "2", "-o", place.file("steps.csv"), "--quiet"}).err == "");
+    test::write_text(scene, std::regex_replace(text, std::regex("every = 1"), "dense = 3"));
+    const test::Finished done = place.run({scene, "--until", "2", "-o", place.file()});
+    CHECK(done.err == "");
+    CHECK(contains(done.out, ", 161 states\n"));
+    const TrajectoryTable steps = read_trajectory(place.file("steps.csv")), dense = read_trajectory(place.file());
+    REQUIRE(steps.rows.size() == 41);
+    REQUIRE(dense.rows.size() == 161);
+    const long double pi = std::acos(-1.0L);
+    double largest = 0;
+    for (std::size_t i = 0; i < dense.rows.size(); ++i) {
+        if (i % 4 == 0) CHECK(dense.rows[i][1] == steps.rows[i / 4][1]);
+        const PhasePoint exact = pendulum_solution(4 * pi * pi, pi / 2, 0, static_cast<long double>(dense.rows[i][0]));
+        largest = std::fmax(largest, std::fabs(dense.rows[i][1] - static_cast<double>(exact.q)));
+    }
+    CHECK(place.run({scene, "--every", "2", "-o", place.file()}).err ==
+          "--every: the scene asks for states between two steps (dense = 3), so all steps are kept\n");
+    CHECK(largest > 1e-7);  // the cubic's own error, h^4 q''''/384 and more: a straight line has 8e-3
+    CHECK(largest < 1e-4);
+}
+
+TEST_CASE("events go to a file beside the trajectory, each on the exact motion") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene, test::read_file(pendulum) + "events = [\"q = 0 rising\", \"q\' = 0\"]\n");
+    const test::Finished done = place.run({scene, "--until", "11.9", "-o", place.file()});
+    CHECK(done.err == "");
+    CHECK(contains(done.out, "  events                  10 of 'q = 0 rising'\n"));
+    CHECK(contains(done.out, "                          20 of 'q' = 0', in " + place.file("run.events.csv") + "\n"));
+    const TrajectoryTable table = read_trajectory(place.file("run.events.csv"));
+    CHECK(table.comments[0] == "lobatto events");
+    CHECK(table.comments[5] == "event 1: q = 0 rising");
+    CHECK(table.comments[6] == "event 2: q' = 0");
+    CHECK(table.columns == std::vector<std::string>{"event", "t", "q", "p_q"});
+    REQUIRE(table.rows.size() == 30);
+    // A swing from 90 degrees takes 4 K(sin 45)/(2 pi) = 1.1803405990161.
+    for (std::size_t i = 0, rising = 0; i < table.rows.size(); ++i) {
+        const std::vector<double>& row = table.rows[i];
+        if (row[0] != 1) continue;
+        CHECK(row[1] == doctest::Approx(1.1803405990161 * (0.75 + static_cast<double>(rising++))).epsilon(1e-5));
+        CHECK(std::fabs(row[2]) < 1e-12);
+        CHECK(row[3] > 0);
+    }
+}
+
+TEST_CASE("what a drive or friction does to the energy is called a change, and no symplecticity is promised") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "title = \"Damped\"\nlagrangian = \"x'^2/2 - x^4/4\"\n"
+                     "[coordinates]\nx = { position = 1, velocity = 0 }\n[forces]\nx = \"-x'/10\"\n"
+                     "[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished damped = place.run({scene, "-o", place.file()});
+    CHECK(damped.err == "");
+    CHECK(std::regex_search(damped.out, std::regex("\n  energy change           0\\.\\d+ at most\n")));
+    CHECK(!contains(damped.out, "symplectic"));
+    test::write_text(scene,
+                     "title = \"Driven\"\ntime = \"t\"\nlagrangian = \"x'^2/2 - x^4/4 + x*sin(t)\"\n"
+                     "[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished driven = place.run({scene, "-o", place.file()});
+    CHECK(driven.err == "");
+    CHECK(contains(driven.out, "\n  energy change "));
+    CHECK(contains(driven.out, "\n  symplectic defect "));  // a step is still symplectic
+}
+
+TEST_CASE("a motion where rest is impossible has an energy") {
+    // A free particle seen from a frame that rotates: from 1/w on whoever rests there moves faster than light.
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "lagrangian = \"-sqrt(1 - (x' - w*y)^2 - (y' + w*x)^2)\"\n[coordinates]\nx = { position = 0, "
+                     "velocity = 0.3 }\ny = { position = 0, velocity = 0.2 }\n[parameters]\nw = 0.5\n[run]\nstep = "
+                     "0.05\nuntil = 10\n");
+    const test::Finished finished = place.run({scene, "-o", place.file()});
+    CHECK(finished.exit_code == 0);
+    CHECK(finished.err == "");
+    CHECK(!contains(finished.out, "nan"));
+    const std::vector<double> last = read_trajectory(place.file()).rows.back();
+    CHECK(last[1] * last[1] + last[2] * last[2] == doctest::Approx(13).epsilon(1e-9));
+}
+
+TEST_CASE("the stability limit is the same in any unit of mass") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    const auto warns = [&](const char* formula, const char* mass) {
+        test::write_text(scene, fmt::format("lagrangian = \"m*({})\"\n[coordinates]\nq = {{ position = 1, velocity = 0 "
+                                            "}}\n[parameters]\nm = 1\n[run]\nstep = 0.1\nuntil = 2\n",
+                                            formula));
+        return contains(place.run({scene, "--set", std::string("m=") + mass, "-o", place.file()}).err,
+                        "beyond the linear stability limit");
+    };
+    for (const char* mass : {"1", "1e9", "1e-9"}) {
+        CHECK(!warns("q'^2/2 - q^2/2 - q^4/40", mass));
+        CHECK(warns("q'^2/2 + 33^2*cos(q)", mass));
+    }
+}
+
+TEST_CASE("clean steps have the events and the states between steps of plain ones, to rounding") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 0.7, "
+                     "velocity = 0 }\ny = { position = 0, velocity = 1.3627 }\n[method]\npoints = 6\n"
+                     "[run]\nstep = 0.05\nuntil = 20\n[output]\ndense = 3\nevents = [\"x = 0\", \"y = 0 rising\"]\n");
+    const auto tables = [&](const std::string& arithmetic) {
+        CHECK(place.run({scene, "--arithmetic", arithmetic, "-o", place.file(), "--quiet"}).err == "");
+        return std::pair(read_trajectory(place.file()).rows, read_trajectory(place.file("run.events.csv")).rows);
+    };
+    const auto plain = tables("plain"), clean = tables("clean");
+    REQUIRE(clean.first.size() == 1601);
+    REQUIRE(clean.second.size() == plain.second.size());
+    CHECK(clean.second.size() > 6);
+    double worst = 0, worst_event = 0;
+    for (std::size_t i = 0; i < plain.first.size(); ++i)
+        for (std::size_t k = 0; k < plain.first[i].size(); ++k)
+            worst = std::fmax(worst, std::fabs(plain.first[i][k] - clean.first[i][k]));
+    for (std::size_t i = 0; i < plain.second.size(); ++i)
+        for (std::size_t k = 0; k < plain.second[i].size(); ++k)
+            worst_event = std::fmax(worst_event, std::fabs(plain.second[i][k] - clean.second[i][k]));
+    CHECK(worst < 1e-12);
+    CHECK(worst > 0);
+    CHECK(worst_event < 1e-12);
+}
+
+TEST_CASE("a run without shortcuts gives the same motion to rounding") {
+    const Place place;
+    const auto last = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments{pendulum, "--until", "5", "-o", place.file(), "--quiet"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        CHECK(place.run(arguments).err == "");
+        return read_trajectory(place.file()).rows.back();
+    };
+    const std::vector<double> with = last({}), without = last({"--general"});
+    for (std::size_t k = 0; k < with.size(); ++k) CHECK(with[k] == doctest::Approx(without[k]).epsilon(1e-11));
+}

@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The passes and the emitted text: what is saved, what is hoisted, and that any scene becomes C++ that compiles.
+#include "generator/emit/kernel.hpp"
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <regex>
+
+#include "analysis/support_text.hpp"
+#include "generator/emit/function_text.hpp"
+#include "generator/pipeline.hpp"
+#include "generator/programs/programs.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+struct SceneText {
+    std::string name, lagrangian;
+    std::vector<std::string> coordinates, parameters;
+    std::string title = "a test";
+    std::string unit = "";
+};
+
+Derivation derivation_of(const SceneText& scene, int points) {
+    std::string text = "title = '" + scene.title + "'\nlagrangian = \"" + scene.lagrangian + "\"\n[coordinates]\n";
+    for (const std::string& name : scene.coordinates)
+        text += name + " = { position = 1, velocity = 0, unit = '" + scene.unit + "' }\n";
+    text += "[parameters]\n";
+    int value = 0;
+    for (const std::string& name : scene.parameters)
+        text += fmt::format("{} = 1.{}\n", name, ++value);  // 1.1, 1.2, ...
+    text += fmt::format("[method]\nfamily = \"lobatto\"\npoints = {}\n[run]\nstep = 0.01\nuntil = 1\n", points);
+    return derive(read_scene(Source(scene.name + ".toml", text)));
+}
+
+KernelSource kernel(const SceneText& scene, int points = 4) {
+    return emit(derivation_of(scene, points));
+}
+
+// The text of one function of the kernel, from its signature to its closing brace.
+std::string body(const std::string& header, const std::string& function) {
+    const std::size_t begin = header.find(" " + function + "(");
+    if (begin == std::string::npos) return "";
+    return header.substr(begin, header.find("\n    }\n", begin) - begin);
+}
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+    std::size_t count = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+    return count;
+}
+
+// Compiles the header and ten steps with every warning an error; runs them; the compiler's complaints, or "".
+std::string complaints(const KernelSource& source) {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "kernel.hpp", support_text());
+    test::write_text(folder / (source.name + ".hpp"), source.header);
+    test::write_text(folder / "program.cpp",
+                     fmt::format("#include \"{0}.hpp\"\n"
+                                 "using K = lobatto::kernels::{0};\n"
+                                 "template struct lobatto::Stepper<K>;\n"
+                                 "int main() {{\n"
+                                 "    lobatto::Stepper<K> stepper;\n"
+                                 "    double q[K::coordinates], p[K::coordinates] = {{}};\n"
+                                 "    for (double& x : q) x = 1;\n"
+                                 "    if (stepper.prepare({{}}, 0.01) != lobatto::Status::ok) return 2;\n"
+                                 "    if (stepper.start(0, q, p) != lobatto::Status::ok) return 3;\n"
+                                 "    for (int i = 0; i < 10; ++i)\n"
+                                 "        if (stepper.step() != lobatto::Status::ok) return 4;\n"
+                                 "    return K::energy(stepper.coefficients, stepper.q, p) == 12345 ? 5 : 0;\n"
+                                 "}}\n",
+                                 source.name));
+    const std::string program = folder / "program";
+    const test::Finished compiled =
+        test::run({"g++", "-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-I", folder.string(),
+                   folder / "program.cpp", "-o", program});
+    if (compiled.exit_code != 0) return compiled.err;
+    const int code = test::run({program}).exit_code;
+    return code == 0 ? "" : fmt::format("the program ended with {}", code);
+}
+
+void check_compiles(const SceneText& scene, const std::vector<int>& all_points = {2, 3, 4, 5}) {
+    for (const int points : all_points) {
+        INFO(scene.name << " with " << points << " points");
+        CHECK(complaints(kernel(scene, points)) == "");
+    }
+}
+
+const SceneText pendulum{"pendulum", "m*q'^2/2 - m*omega^2*(1 - cos(q))", {"q"}, {"m", "omega"}};
+const SceneText coupled{
+    "coupled", "m*x'^2/2 + x'*y'/3 + y'^2/2 - k*x^4 - x*y^3 - sin(x)*cos(x)", {"x", "y"}, {"m", "k"}};
+
+}  // namespace
+
+TEST_CASE("every pass keeps operations to count, and the report begins with the programs as derived") {
+    const KernelSource source = kernel(coupled);
+    REQUIRE(source.report.size() == 8);
+    CHECK(source.report.front().pass == "as derived");
+    for (const PassReport& row : source.report) {
+        INFO(row.pass);
+        CHECK(row.after.additions > 10);
+        CHECK(row.after.multiplications > 10);
+        CHECK(row.after.divisions > 0);
+        CHECK(row.after.functions > 0);
+        CHECK(row.disagreement < 1e-40);
+    }
+    CHECK(source.report.back().after.total() < source.report.front().after.total());
+}
+
+TEST_CASE("powers are multiplications: no pow and no power operator is emitted") {
+    const std::string header = kernel({"powers", "q'^2/2 - q^7/7 - a^5*q^12*cos(q)^3", {"q"}, {"a"}}).header;
+    CHECK(header.find("pow(") == std::string::npos);
+    CHECK(body(header, "node").find('^') == std::string::npos);
+    const std::string real_exponent = kernel({"real_exponent", "q'^2/2 - (1 + q^2)^(1/3)", {"q"}, {}}).header;
+    CHECK(real_exponent.find("lobatto::pow(") != std::string::npos);  // and a real exponent still is one
+}
+
+TEST_CASE("Horner's scheme saves operations on a quartic") {
+    const KernelSource source =
+        kernel({"quartic", "q'^2/2 - (a*q^4 + b*q^3 + c*q^2 + d*q)", {"q"}, {"a", "b", "c", "d"}});
+    REQUIRE(source.report[2].pass == "factor sums (Horner)");
+    CHECK(source.report[2].after.total() < source.report[1].after.total());
+    // 4 a q^3 + 3 b q^2 + 2 c q + d: three multiplications by q and three additions.
+    const std::string acceleration = body(source.header, "acceleration");
+    CHECK(count_of(acceleration, " * ") == 3);
+    CHECK(count_of(acceleration, " + ") == 3);
+}
+
+TEST_CASE("sine and cosine of one argument become one call, and a lone sine stays alone") {
+    const KernelSource source = kernel(pendulum);
+    CHECK(count_of(body(source.header, "node"), "sincos(") == 1);
+    CHECK(body(source.header, "node").find("::sin(") == std::string::npos);
+    CHECK(count_of(body(source.header, "acceleration"), "::sin(") == 1);
+    CHECK(body(source.header, "acceleration").find("sincos(") == std::string::npos);
+}
+
+TEST_CASE("what sweeps evaluate is given sine and cosine of what moves, in packs of double, and of nothing else") {
+    const auto has = [](const KernelSource& source, const std::string& text) {
+        return source.header.find(text) != std::string::npos;
+    };
+    const KernelSource one = kernel(pendulum);
+    CHECK(has(one, "int angles = 1;"));
+    CHECK(body(one.header, "node").find("Angles angle = {}") != std::string::npos);
+    CHECK(count_of(body(one.header, "node"), "angle.sincos(0, q[0], ") == 1);
+    const KernelSource two = kernel({"two", "a'^2 + b'^2 + a'*b'*cos(a - b) + cos(a) + cos(b)", {"a", "b"}, {}});
+    CHECK(has(two, "int angles = 2;"));
+    CHECK(count_of(two.header, "class Angles = lobatto::AnglesAnew") == 1);
+    CHECK(count_of(body(two.header, "stage"), "angle.sincos(") == 2);
+    CHECK(body(two.header, "stage").find("lobatto::sincos(") == std::string::npos);
+    CHECK(count_of(two.header, "angle.sincos(") == 2);
+    // A lone sine; beside a quotient that needs its digits; time; other precisions.
+    EmitOptions single;
+    single.precision = Precision::single;
+    for (const KernelSource& none :
+         {kernel({"lone", "q'^2/2*(1 + q^2) + cos(q)", {"q"}, {}}),
+          kernel({"quotient", "q'^2/2 + p'^2/2 + sin(sqrt(p^2 + q^2))/sqrt(p^2 + q^2)", {"q", "p"}, {}}),
+          emit(
+              derive(read_scene(Source("time.toml",
+                                       "title = 'time'\nlagrangian = \"q'^2*(1 + q^2) + q*sin(t)*cos(t)\"\ntime = 't'\n"
+                                       "[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\nfamily = "
+                                       "\"lobatto\"\npoints = 4\n[run]\nstep = 0.01\nuntil = 1\n")))),
+          emit(derivation_of(pendulum, 4), single)}) {
+        CHECK(has(none, "int angles = 0;"));
+        CHECK_FALSE(has(none, "angle.sincos"));
+        CHECK_FALSE(has(none, "class Angles"));
+    }
+}
+
+TEST_CASE("what the stage map leaves of the forces is a function of its own, without what cancels") {
+    const SceneText star{"star", "(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - x^2*y + y^3/3", {"x", "y"}, {}};
+    const std::string header = kernel(star, 6).header;
+    CHECK(header.find("bool has_remainder = true;") != std::string::npos);
+    // R = (2 x y, x^2 - y^2): no term is linear.
+    const std::string remainder = body(header, "remainder");
+    INFO(remainder);
+    CHECK(count_of(remainder, "x * x") == 1);
+    CHECK(count_of(remainder, "y * y") == 1);
+    CHECK(count_of(remainder, " - ") == 1);
+    CHECK(count_of(remainder, " + ") == 0);
+    // An offset: the terms that cancel do so after expansion.
+    CHECK(count_of(body(kernel({"offset", "x'^2/2 - (x - 1)^2/2 - x^3/30", {"x"}, {}}, 6).header, "remainder"),
+                   " * ") <= 2);
+    // Towers of powers are not written out: no memory has room for their terms.
+    const std::string tower =
+        kernel({"tower", "q'^2/2 + p'^2/2 - (q^2 + p^2)/2 - ((p + q^64)^64 + q)^64", {"q", "p"}, {}}, 6).header;
+    CHECK(tower.size() < 20000);
+    // Nothing is left out of these: no quadratic part; forces for which sweeps take second derivatives.
+    for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
+                                    kernel({"costly", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
+        CHECK(none.find("bool has_remainder = false;") != std::string::npos);
+        CHECK(none.find("void remainder(") == std::string::npos);
+    }
+}
+
+TEST_CASE("what acceleration and its derivative have in common is computed once in node") {
+    const std::string node = body(kernel({"shared", "q'^2/2 - exp(a*sin(q)^2)", {"q"}, {"a"}}).header, "node");
+    CHECK(count_of(node, "exp(") == 1);
+    CHECK(count_of(node, "sincos(") == 1);
+}
+
+TEST_CASE("node computes nothing that depends on parameters and step size only") {
+    const SceneText scene{
+        "hoisting", "m*q'^2/2 - sqrt(a)*b*cos(q)/(a + b) - exp(a*b)*q^4/m - (a + b)^3*q^3", {"q"}, {"m", "a", "b"}};
+    Programs programs = build_programs(derivation_of(scene, 4));
+    optimise(programs);
+    std::vector<Id> roots;
+    for (const Program& program : programs.programs)
+        if (program.name == "node")
+            for (const Output& output : program.outputs) roots.push_back(output.value);
+    REQUIRE(roots.size() == 2);
+    const Hoisted hoisted(programs);
+    long early = 0;
+    for (const Id id : programs.graph.topological(roots)) {
+        if (programs.graph[id].stage <= Stage::step_size) continue;
+        for (const Id operand : programs.graph[id].operands) {
+            const Stage stage = programs.graph[operand].stage;
+            if (stage != Stage::parameter && stage != Stage::step_size) continue;
+            ++early;
+            CHECK(hoisted.names.count(operand) == 1);
+        }
+    }
+    CHECK(early >= 3);
+    const std::string node = body(kernel(scene).header, "node");
+    CHECK(node.find("exp(") == std::string::npos);
+    CHECK(node.find("sqrt(") == std::string::npos);
+    CHECK(node.find(" / ") == std::string::npos);
+    // At most one operand of any multiplication is a coefficient.
+    CHECK_FALSE(std::regex_search(node, std::regex(R"(k\.\w+ [*/] k\.\w+)")));
+}
+
+TEST_CASE("names that are C++ keywords compile" * doctest::test_suite("slow")) {
+    check_compiles({"keywords",
+                    "double*new'^2/2 - struct*cos(new) - operator*new^4 - real*new^3/(1 + new^2)",
+                    {"new"},
+                    {"double", "struct", "operator", "real"}},
+                   {3, 4});
+}
+
+TEST_CASE("names of macros compile, and names that differ by an underscore stay apart" * doctest::test_suite("slow")) {
+    check_compiles({"NAN",
+                    "M_PI*q'^2/2 - INFINITY*q^4 - INT64_MAX*cos(q) - real*q^6 - real_*sin(q)",
+                    {"q"},
+                    {"M_PI", "INFINITY", "INT64_MAX", "real", "real_"}},
+                   {4});
+    check_compiles({"Status", "q'^2/2 - HUGE_VAL*q^2/2", {"q"}, {"HUGE_VAL"}}, {4});
+}
+
+TEST_CASE("a derivative that cancels to nothing is no disagreement between passes") {
+    check_compiles(
+        {"nothing", "x'^2/2 + y'^2/2 - sqrt(x^2) - tan(y)*cos(y) + sin(y) - acos(cos(x - 2*y)) - y^4", {"x", "y"}, {}},
+        {4});
+}
+
+TEST_CASE("two standalone headers can be included in one program" * doctest::test_suite("slow")) {
+    const test::TemporaryFolder folder;
+    EmitOptions options;
+    options.standalone_support = support_text();
+    SceneText other = pendulum;
+    other.name = "other";
+    for (const SceneText& scene : {pendulum, other})
+        test::write_text(folder / (scene.name + ".hpp"), emit(derivation_of(scene, 4), options).header);
+    test::write_text(folder / "program.cpp",
+                     "#include \"pendulum.hpp\"\n#include \"other.hpp\"\n"
+                     "template struct lobatto::Stepper<lobatto::kernels::pendulum>;\n"
+                     "template struct lobatto::Stepper<lobatto::kernels::other>;\nint main() {}\n");
+    CHECK(
+        test::run({"g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", folder / "program.cpp"}).err ==
+        "");
+}
+
+TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suite("slow")) {
+    check_compiles({"collide",
+                    "q1*t1'^2/2 + k1'^2/2 - V*sin(t1)*cos(t1)*z^2 - inverse_m*m*k1^3*t1^2 - p*k*S*h2_A22*exp(k1) - "
+                    "Phi_minus_I*W*delta*k1",
+                    {"t1", "k1"},
+                    {"q1", "V", "z", "inverse_m", "m", "p", "k", "S", "h2_A22", "Phi_minus_I", "W", "delta"}},
+                   {3, 4});
+    check_compiles(
+        {"functions",
+         "m*theta'^2/2 - energy*cos(theta) - node*theta^4 - prepare*residual*momentum*exp(theta)*name*order"
+         "*points*lobatto*std*parameter*entries*drift*velocity*digest*coordinates*Status*Parameters",
+         {"theta"},
+         {"m", "energy", "node", "prepare", "residual", "momentum", "name", "order", "points", "lobatto", "std",
+          "parameter", "entries", "drift", "velocity", "digest", "coordinates", "Status", "Parameters"}},
+        {4});
+    check_compiles({"coordinates",
+                    "m*(real'^2 + W'^2 + sin_x'^2 + x'^2)/2 - sin(x)*cos(x)*W^4 - real^3*sin(W)*cos(W) - sin_x^4",
+                    {"real", "W", "sin_x", "x"},
+                    {"m"}},
+                   {3});
+    check_compiles({"angles",
+                    "m*(angles'^2 + Angles'^2 + angle'^2)/2 - near*sin(angles)*cos(angles)*cos(Angles - angle)",
+                    {"angles", "Angles", "angle"},
+                    {"m", "near"}},
+                   {3});
+    check_compiles({"rest",
+                    "m*(R'^2 + remainder'^2)/2 - (R^2 + remainder^2)/2 - R^2*remainder*has_remainder",
+                    {"R", "remainder"},
+                    {"m", "has_remainder"}},
+                   {5});
+    // Costly as derived, not so after the passes.
+    check_compiles({"eighth", "x'^2/2 - x^2/2 - x^3/3 - x^4/4 - x^5/5 - x^6/6 - x^7/7 - x^8/8", {"x"}, {}}, {5});
+}
+
+TEST_CASE("a parameter named as a local of prepare does not take the local's place") {
+    // Defect once: with a parameter z the propagation used it instead of z = h^2 k/m.
+    const SceneText plain{"plain", "q'^2/2 - u*q^2/2", {"q"}, {"u"}}, clash{"plain", "q'^2/2 - z*q^2/2", {"q"}, {"z"}};
+    std::string expected = body(kernel(plain).header, "prepare");
+    expected = std::regex_replace(expected, std::regex(R"(\bz\b)"), "z_");
+    expected = std::regex_replace(expected, std::regex(R"(\bu\b)"), "z");
+    CHECK(body(kernel(clash).header, "prepare") == expected);
+    check_compiles({"locals",
+                    "m*q'^2/2 - delta*q^2/2*a*b*c*z*t1*pivot_1 - index*q",
+                    {"q"},
+                    {"m", "delta", "a", "b", "c", "z", "t1", "pivot_1", "index"}},
+                   {4, 5});
+}
+
+TEST_CASE("scenes at the edge of what there is to emit compile, with every number of points" *
+          doctest::test_suite("slow")) {
+    check_compiles({"no_parameters", "q'^2/2 - q^4/4", {"q"}, {}});
+    check_compiles({"free", "m*q'^2/2", {"q"}, {"m"}});
+    check_compiles({"constant_force", "m*q'^2/2 - m*g*q", {"q"}, {"m", "g"}});
+}
+
+TEST_CASE("two coordinates with a coupled mass matrix compile, linear and not" * doctest::test_suite("slow")) {
+    check_compiles(coupled);
+    check_compiles({"springs", "m*x'^2/2 + x'*y'/3 + y'^2/2 - k*x^2 - x*y", {"x", "y"}, {"m", "k"}}, {2, 4});
+    CHECK(body(kernel(coupled).header, "correction").find("lobatto::solve<4, 1>(J, delta)") != std::string::npos);
+}
+
+TEST_CASE("every function a scene may use compiles" * doctest::test_suite("slow")) {
+    check_compiles({"functions_all",
+                    "q'^2/2 - sqrt(1 + q^2)*tan(q/4) - exp(q)*log(2 + q^2) - sinh(q)*cosh(q)*tanh(q) - "
+                    "asin(q/9)*acos(q/9)*atan(q) - (2 + q)^(a/3)",
+                    {"q"},
+                    {"a"}},
+                   {4});
+}
+
+TEST_CASE("every double literal of a kernel reads back as itself, in the fewest digits") {
+    const std::string header = kernel(coupled, 5).header;
+    std::string code = std::regex_replace(header, std::regex("//[^\n]*"), "");
+    const std::regex literal(R"((^|[^\w.\[])(\d+\.\d+(e[+-]?\d+)?|\d+e[+-]?\d+))");
+    long literals = 0, inexact = 0;
+    for (auto match = std::sregex_iterator(code.begin(), code.end(), literal); match != std::sregex_iterator();
+         ++match) {
+        const std::string text = (*match)[2];
+        const double value = std::strtod(text.c_str(), nullptr);
+        std::string shortest = fmt::format("{}", value);
+        if (shortest.find_first_of(".e") == std::string::npos) shortest += ".0";
+        CHECK(std::strtod(shortest.c_str(), nullptr) == value);
+        CHECK(text == shortest);
+        ++literals;
+        inexact += text.size() > 15;
+    }
+    CHECK(literals > 50);
+    CHECK(inexact > 20);
+}
+
+TEST_CASE("the nodes and weights of s = 5 are emitted correctly rounded") {
+    const std::string header = kernel(pendulum, 5).header;
+    CHECK(header.find("c[5] = {0.0, 0.17267316464601143, 0.5, 0.8273268353539885, 1.0}") != std::string::npos);
+    CHECK(header.find("b[5] = {0.05, 0.2722222222222222, 0.35555555555555557, 0.2722222222222222, 0.05}") !=
+          std::string::npos);
+}
+
+TEST_CASE("the same scene gives the same bytes, and another formula another digest") {
+    CHECK(kernel(coupled).header == kernel(coupled).header);
+    CHECK(kernel(coupled).digest == kernel(coupled).digest);
+    CHECK(kernel(coupled).digest != kernel(coupled, 5).digest);
+    CHECK(std::regex_match(kernel(coupled).digest, std::regex("[0-9a-f]{16}")));
+    SceneText other = pendulum;
+    other.lagrangian = "m*q'^2/2 - m*omega^2*(1 - cos(2*q))";
+    CHECK(kernel(other).digest != kernel(pendulum).digest);
+}
+
+TEST_CASE("titles and units cannot break out of the comments they stand in") {
+    Derivation derivation = derivation_of(pendulum, 4);
+    derivation.scene.title = "one\nint broken = ; // two \\";
+    derivation.scene.coordinates[0].unit = "m*/\r\nint broken = ;";
+    derivation.scene.parameters[0].unit = "kg \\";
+    derivation.scene.lagrangian_text = "L \\";
+    const KernelSource source = emit(derivation);
+    CHECK(source.header.find("\nint broken") == std::string::npos);
+    CHECK(complaints(source) == "");
+}

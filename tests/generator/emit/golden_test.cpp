@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The kernels in generated/: byte for byte what `lobatto emit` writes, accepted by both compilers, and right.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "generated/harmonic_oscillator.hpp"
+#include "generated/pendulum.hpp"
+#include "tests/handwritten/pendulum.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const std::string tree = LOBATTO_SOURCE_DIR;
+const std::vector<std::string> scenes = {"pendulum", "harmonic_oscillator"};
+
+test::Finished emit_scene(const std::string& scene, const std::string& folder, std::vector<std::string> options) {
+    std::vector<std::string> arguments = {LOBATTO_PROGRAM, "emit", tree + "/scenes/" + scene + ".toml", "-o", folder};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return test::run(arguments);
+}
+
+std::string unit_of(const std::string& scene) {
+    return fmt::format("#include \"{0}.hpp\"\ntemplate struct lobatto::Stepper<lobatto::kernels::{0}>;\n", scene);
+}
+
+double relative(double x, double y) {
+    return std::fabs(x - y) / std::max({std::fabs(x), std::fabs(y), 1e-300});
+}
+
+}  // namespace
+
+TEST_CASE("three fresh processes emit the bytes of generated/") {
+    for (const std::string& scene : scenes) {
+        const std::string golden = test::read_file(tree + "/generated/" + scene + ".hpp");
+        for (int process = 0; process < 3; ++process) {
+            const test::TemporaryFolder folder;
+            const test::Finished emitted = emit_scene(scene, folder.string(), {"--no-support"});
+            INFO(emitted.err);
+            REQUIRE(emitted.exit_code == 0);
+            CHECK(test::read_file(folder / (scene + ".hpp")) == golden);
+            CHECK_FALSE(std::filesystem::exists(folder / "kernel.hpp"));
+        }
+    }
+}
+
+TEST_CASE("g++ and clang++ take the kernels of generated/ without a warning" * doctest::test_suite("slow")) {
+    for (const std::string compiler : {"g++", "clang++"}) {
+        // A missing clang++ fails here: `./lobatto test` installs it.
+        INFO(compiler);
+        REQUIRE(test::run({compiler, "--version"}).exit_code == 0);
+        for (const std::string& scene : scenes) {
+            const test::TemporaryFolder folder;
+            test::write_text(folder / "unit.cpp", unit_of(scene));
+            const test::Finished compiled = test::run({compiler, "-std=c++17", "-Wall", "-Wextra", "-Wpedantic",
+                                                       "-Werror", "-I", tree + "/generated", "-I", tree + "/runtime/kernel",
+                                                       "-c", folder / "unit.cpp", "-o", folder / "unit.o"});
+            INFO(compiled.err);
+            CHECK(compiled.exit_code == 0);
+        }
+    }
+}
+
+TEST_CASE("standalone kernels of every precision compile with nothing else, run, and agree" *
+          doctest::test_suite("slow")) {
+    // q after ten steps of 0.05 from q = 1, p = 0: what each precision may differ by, in its own epsilon, is below
+    // 2e-6.
+    struct Case {
+        const char *name, *standard;
+    };
+    for (const std::string& scene : scenes) {
+        std::vector<double> ends;
+        for (const Case& precision : {Case{"float", "c++17"}, Case{"double", "c++17"}, Case{"long-double", "c++17"},
+                                      Case{"quadruple", "gnu++17"}}) {
+            INFO(scene << " " << precision.name);
+            const test::TemporaryFolder folder;
+            const test::Finished emitted =
+                emit_scene(scene, folder.string(), {"--standalone", "--precision", precision.name});
+            INFO(emitted.err);
+            REQUIRE(emitted.exit_code == 0);
+            test::write_text(
+                folder / "program.cpp",
+                unit_of(scene) +
+                    fmt::format("#include <cstdio>\n"
+                                "int main() {{\n"
+                                "    using K = lobatto::kernels::{};\n"
+                                "    lobatto::Stepper<K> stepper;\n"
+                                "    const K::real q = 1, p = 0;\n"
+                                "    if (stepper.prepare({{}}, K::real(1) / 20) != lobatto::Status::ok) return 1;\n"
+                                "    if (stepper.start(0, &q, &p) != lobatto::Status::ok) return 2;\n"
+                                "    for (int i = 0; i < 10; ++i)\n"
+                                "        if (stepper.step() != lobatto::Status::ok) return 3;\n"
+                                "    std::printf(\"%.17g\\n\", double(stepper.q[0]));\n"
+                                "}}\n",
+                                scene));
+            const bool quadruple = std::string(precision.name) == "quadruple";
+            std::vector<std::string> command = {"g++",
+                                                std::string("-std=") + precision.standard,
+                                                "-Wall",
+                                                "-Wextra",
+                                                "-Werror",
+                                                "-o",
+                                                folder / "program",
+                                                folder / "program.cpp"};
+            // The literals of __float128 are an extension, which -Wpedantic exists to refuse.
+            command.push_back(quadruple ? "-lquadmath" : "-Wpedantic");
+            const test::Finished compiled = test::run(command);
+            INFO(compiled.err);
+            REQUIRE(compiled.exit_code == 0);
+            const test::Finished ran = test::run({folder / "program"});
+            REQUIRE(ran.exit_code == 0);
+            ends.push_back(std::stod(ran.out));
+        }
+        CHECK(std::fabs(ends[1]) > 0.5);
+        CHECK(std::fabs(ends[0] - ends[1]) < 2e-6);   // measured: 1.7e-7 and 1.8e-7
+        CHECK(ends[0] != ends[1]);                    // float is float
+        CHECK(std::fabs(ends[1] - ends[2]) < 1e-14);  // measured: 1.1e-16 and 0
+        CHECK(std::fabs(ends[2] - ends[3]) < 3e-16);  // both rounded to double
+    }
+}
+
+TEST_CASE("the emitted pendulum follows the hand-written one over 1000 steps to round-off") {
+    using Emitted = kernels::pendulum;
+    Stepper<Emitted> emitted;
+    Stepper<HandwrittenPendulum> written;
+    const double m = 1.3, omega = 2.1, h = 0.1, q = 2.0, p = 0.4;
+    Emitted::Parameters parameters;
+    parameters.m = m;
+    parameters.omega = omega;
+    REQUIRE(emitted.prepare(parameters, h) == Status::ok);
+    REQUIRE(written.prepare({m, omega}, h) == Status::ok);
+    REQUIRE(emitted.start(0, &q, &p) == Status::ok);
+    REQUIRE(written.start(0, &q, &p) == Status::ok);
+    double worst = 0, travelled = 0;
+    for (int step = 0; step < 1000; ++step) {
+        const double before = emitted.q[0];
+        REQUIRE(emitted.step() == Status::ok);
+        REQUIRE(written.step() == Status::ok);
+        worst = std::max({worst, std::fabs(emitted.q[0] - written.q[0]), std::fabs(emitted.u[0] - written.u[0])});
+        travelled += std::fabs(emitted.q[0] - before);
+    }
+    CHECK(travelled > 100);
+    CHECK(worst < 2e-12);  // measured 1.4e-13
+}
+
+TEST_CASE("residual, Jacobian and the other pieces of the emitted pendulum equal the hand-written ones") {
+    using K = kernels::pendulum;
+    using H = HandwrittenPendulum;
+    const double h = 0.17;
+    K::Parameters parameters;
+    parameters.m = 0.7;
+    parameters.omega = 1.9;
+    K::Coefficients k{};
+    H::Coefficients w{};
+    REQUIRE(K::prepare(parameters, h, k) == Status::ok);
+    REQUIRE(H::prepare({0.7, 1.9}, h, w) == Status::ok);
+    const double q[] = {0.8}, p[] = {-1.1}, u[] = {0.4}, W0[] = {1.7}, W1[] = {-0.6}, v[] = {0.9};
+    const double base[] = {0.9, 1.3, 1.6}, Q[] = {0.85, 1.21}, W[] = {2.3, -1.9}, S[] = {3.1, -2.2};
+    const double history[] = {0.3, -0.7, 1.1, 1.9};
+    std::vector<double> ours, theirs;
+    const auto collect = [](std::vector<double>& all, const auto& values) {
+        all.insert(all.end(), std::begin(values), std::end(values));
+    };
+    const auto evaluate = [&](auto kernel, const auto& c, std::vector<double>& all) {
+        using Kernel = decltype(kernel);
+        double one[1], two[2], three[3], four[4], s[1];
+        all.push_back(Kernel::energy(c, q, p));
+        Kernel::momentum(c, v, one), collect(all, one);
+        Kernel::velocity(c, p, one), collect(all, one);
+        Kernel::acceleration(c, q, one), collect(all, one);
+        Kernel::node(c, q, one, s), collect(all, one), collect(all, s);
+        Kernel::drift(c, q, u, W0, one, three), collect(all, one), collect(all, three);
+        Kernel::simple_start(c, base, W0, two), collect(all, two);
+        Kernel::extrapolated_start(c, base, history, two), collect(all, two);
+        Kernel::residual(c, base, Q, W, two), collect(all, two);
+        Kernel::jacobian(c, S, four), collect(all, four);
+        CHECK(Kernel::correction(c, base, Q, W, S, two));
+        collect(all, two);
+        two[0] = 0.1, two[1] = 0.2;
+        double carried[] = {W[0], W[1]};
+        Kernel::carry(c, S, two, carried), collect(all, carried);
+        Kernel::arrive(c, base, W, one), collect(all, one);
+        Kernel::finish(c, v, W, W1, one), collect(all, one);
+    };
+    evaluate(K{}, k, ours);
+    evaluate(H{}, w, theirs);
+    REQUIRE(ours.size() == theirs.size());
+    REQUIRE(ours.size() == 26);
+    for (std::size_t i = 0; i < ours.size(); ++i) {
+        INFO("value " << i << ": " << ours[i] << ", by hand " << theirs[i]);
+        CHECK(relative(ours[i], theirs[i]) < 1e-14);  // measured: at most 3.0e-15
+        CHECK(ours[i] != 0);
+    }
+}
+
+TEST_CASE("the emitted oscillator is the paper's Phi, with determinant 1") {
+    using K = kernels::harmonic_oscillator;
+    for (const double h : {0.0001, 0.01, 0.1, 0.3, 0.45}) {
+        INFO("h = " << h);
+        K::Parameters parameters;
+        parameters.m = 1.7;
+        K::Coefficients k{};
+        REQUIRE(K::prepare(parameters, h, k) == Status::ok);
+        // eq:symplecticCoeffs, rows and columns (p, q) there, (q, p) here.
+        const long double m = 1.7L, w = parameters.omega, x = h * h * w * w;
+        const long double delta = 1 + x / 30 + x * x / 1800;
+        const long double a = 1 - 7 * x / 15 + 23 * x * x / 900 - x * x * x / 3600;
+        const long double b = m * h * w * w / 43200 * (x - 60) * (x * x - 84 * x + 720);
+        const long double c = h / m * (1 - 2 * x / 15 + x * x / 300);
+        CHECK(static_cast<double>(std::fabs((a * a - b * c) / (delta * delta) - 1)) <
+              1e-16);  // measured 3.4e-17: no misprint in these four
+        const long double diagonal = (-x / 2 + x * x / 40 - x * x * x / 3600) / delta;  // (a - delta)/delta
+        const long double expected[] = {diagonal, c / delta, 0, b / delta, diagonal, 0};
+        CHECK(static_cast<double>(std::fabs(a - delta - diagonal * delta)) < 1e-17);
+        const double* const E = k.Phi_minus_I;
+        for (int i = 0; i < 6; ++i) {
+            INFO("entry " << i);
+            CHECK(std::fabs(static_cast<double>(E[i] - expected[i])) <=
+                  2e-15 * std::fabs(static_cast<double>(expected[i])));  // measured 6e-16
+        }
+        const auto defect = [](const auto* entry) {
+            const __float128 determinant = __float128(entry[0]) * entry[4] - __float128(entry[1]) * entry[3];
+            return std::fabs(static_cast<double>(__float128(entry[0]) + entry[4] + determinant));
+        };
+        double nearest[6];
+        for (int i = 0; i < 6; ++i) nearest[i] = static_cast<double>(expected[i]);
+        INFO("det - 1: " << defect(E) << ", with entries rounded one by one " << defect(nearest));
+        // Measured 4e-25 ... 7.8e-18; entries rounded one by one exceed the bound at h = 0.3 and 0.45.
+        CHECK(defect(E) < 1e-19 + 3e-18 * static_cast<double>(x));
+    }
+}
+
+TEST_CASE("the emitted discrete energy of the oscillator is the paper's form, and steps keep it") {
+    using K = lobatto::kernels::harmonic_oscillator;
+    lobatto::Stepper<K> stepper;
+    const double h = 0.05, omega = 6.283185307179586, z = h * h * omega * omega, q = 1.25, p = -3;
+    REQUIRE(stepper.prepare({}, h) == lobatto::Status::ok);
+    REQUIRE(stepper.start(0, &q, &p) == lobatto::Status::ok);
+    const auto H_d = [&](const double* position, const double* momentum) {
+        return K::discrete_energy(stepper.coefficients, position, momentum);
+    };
+    const double delta = 1 + z / 30 + z * z / 1800, b = -z + 2 * z * z / 15 - z * z * z / 300 + z * z * z * z / 43200,
+                 c = 1 - 2 * z / 15 + z * z / 300;
+    const double first = H_d(&q, &p);
+    CHECK(relative(first, (h * c * p * p - b / h * q * q) / (2 * delta)) < 1e-15);
+    double worst = 0;
+    for (int i = 0; i < 100000; ++i) {
+        REQUIRE(stepper.step() == lobatto::Status::ok);
+        worst = std::fmax(worst, relative(H_d(stepper.q, stepper.p), first));
+    }
+    CHECK(worst < 1e-12);
+    CHECK(worst > 0);
+}

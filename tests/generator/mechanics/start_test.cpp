@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Starts from which no motion can begin: each is refused, in words tested here.
+#include "generator/mechanics/start.hpp"
+
+#include <doctest/doctest.h>
+
+#include <chrono>
+
+#include "generator/pipeline.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+// The first line of the refusal; the Lagrangian stands at 2:15, the first coordinate in line 4.
+std::string refusal(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters = "",
+                    const std::string& forces = "") {
+    try {
+        derive(read_scene(Source(
+            "scene.toml", "title = \"test\"\nlagrangian = \"" + lagrangian + "\"\n[coordinates]\n" + coordinates +
+                              (parameters.empty() ? "" : "[parameters]\n" + parameters) +
+                              (forces.empty() ? "" : "[forces]\n" + forces) + "[run]\nstep = 0.1\nuntil = 1\n")));
+    } catch (const InputError& error) {
+        const std::string text = error.what();
+        return text.substr(0, text.find('\n'));
+    }
+    return "accepted";
+}
+
+const std::string at_origin = "x = { position = 0, velocity = 0 }\n";
+
+}  // namespace
+
+TEST_CASE("a start at a singularity is refused with the term, the place and the reason") {
+    CHECK(
+        refusal("(x'^2 + y'^2)/2 + k/sqrt(x^2 + y^2)", at_origin + "y = { position = 0, velocity = 1 }\n", "k = 1\n") ==
+        "scene.toml:2:15: the Lagrangian has no value because of its term k/sqrt(x^2 + y^2) at the start, x = 0, y = "
+        "0: division by zero; start elsewhere, or mend the formula");
+    CHECK(refusal("x'^2/2 - log(x)", at_origin) ==
+          "scene.toml:2:15: the Lagrangian has no value because of its term -log(x) at the start, x = 0: logarithm of "
+          "a number that is not positive; start elsewhere, or mend the formula");
+    CHECK(refusal("-sqrt(1 - x'^2)", "x = { position = 0, velocity = 1 }\n") ==
+          "scene.toml:2:15: the derivative dL/dx' = x'/sqrt(1 - x'^2) has no value at the start, x' = 1: division by "
+          "zero; start elsewhere, or mend the formula");
+    // Finite itself, but not its derivatives.
+    CHECK(refusal("x'^2/2 - sqrt(x)", at_origin) ==
+          "scene.toml:2:15: the derivative dL/dx = -1/(2*sqrt(x)) has no value at the start, x = 0: division by zero; "
+          "start elsewhere, or mend the formula");
+    CHECK(refusal("x'^2/2 - x*sqrt(x)", at_origin) ==
+          "scene.toml:2:15: the second derivative d2L/dxdx = -3/(4*sqrt(x)) has no value at the start, x = 0: division "
+          "by zero; start elsewhere, or mend the formula");
+    CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-x'/sqrt(x)\"\n") ==
+          "scene.toml:6:5: the force on x has no value at the start, x = 0, x' = 0: division by zero; start elsewhere, "
+          "or mend the formula");
+    CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-sqrt(x')\"\n") ==
+          "scene.toml:6:5: the force on x has no derivative in x' at the start, x' = 0: division by zero; start "
+          "elsewhere, or mend the formula");
+    CHECK(refusal("x'^2/2 - sqrt(x)", "x = { position = 1e-30, velocity = 0 }\n") == "accepted");
+}
+
+TEST_CASE("a start where the mass matrix is singular is refused with the direction") {
+    const std::string sphere = "(theta'^2 + sin(theta)^2*phi'^2)/2 - cos(theta)";
+    const auto angles = [](const std::string& theta) {
+        return "theta = { position = \"" + theta + "\", velocity = 1 }\nphi = { position = 0, velocity = 0 }\n";
+    };
+    const auto pole = [](const std::string& theta) {
+        return "scene.toml:2:15: the mass matrix is singular at the start, theta = " + theta +
+               ": no kinetic energy opposes the direction phi' = 1 there; start elsewhere, or choose coordinates that "
+               "are regular there (x and y instead of an angle at its pole)";
+    };
+    CHECK(refusal(sphere, angles("0")) == pole("0"));
+    CHECK(refusal(sphere, angles("pi")) == pole("3.14159"));
+    CHECK(refusal(sphere, angles("1/1000000")) == "accepted");
+    CHECK(refusal("m*x'^2/2 - x^2", at_origin, "m = 0\n") ==
+          "scene.toml:2:15: the mass matrix is singular at the start, m = 0: no kinetic energy opposes the direction "
+          "x' = 1; give it mass, or remove a coordinate");
+}
+
+TEST_CASE("a momentum that no velocity has is refused where it is given") {
+    const auto start = [](const std::string& momentum) {
+        return "x = { position = 0, momentum = " + momentum + " }\n";
+    };
+    CHECK(refusal("sqrt(1 + x'^2) - x^2", start("2")) ==
+          "scene.toml:4:32: no velocity has this momentum: p_x = dL/dx' = x'/sqrt(x'^2 + 1) comes no nearer to 2 than "
+          "1; give a momentum that a velocity has, or the velocity itself");
+    CHECK(refusal("sqrt(1 + x'^2) - x^2", start("0.999")) == "accepted");
+    // A relativistic particle takes any momentum, from velocities below that of light.
+    CHECK(refusal("-sqrt(1 - x'^2) - x^2", start("-1000")) == "accepted");
+    // Two coordinates: the one in the way is named.
+    CHECK(refusal("x'^2*(1 + x^2)/2 + sqrt(1 + y'^2)", start("5") + "y = { position = 0, momentum = -3 }\n")
+              .starts_with("scene.toml:5:32: no velocity has this momentum: p_y = dL/dy' = y'/sqrt(y'^2 + 1) comes no "
+                           "nearer to -3 than -"));
+}
