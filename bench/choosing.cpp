@@ -19,6 +19,7 @@
 #include "cli/print/drawing.hpp"
 #include "cli/print/tradeoff_pictures.hpp"
 #include "cli/print/tradeoff_report.hpp"
+#include "generator/pipeline.hpp"
 #include "runtime/run/partial_file.hpp"
 
 using namespace lobatto;

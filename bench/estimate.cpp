@@ -19,6 +19,7 @@
 #include "analysis/tradeoff/calibration.hpp"
 #include "analysis/tradeoff/laboratory.hpp"
 #include "cli/print/drawing.hpp"
+#include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 

@@ -21,6 +21,7 @@
 #include <sstream>
 
 #include "analysis/tradeoff/choice.hpp"
+#include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
 using namespace lobatto;

@@ -42,7 +42,7 @@ Kernel spoilt_pendulum() {
     KernelSource source;
     source.name = "handwritten_pendulum";
     source.digest = "0123456789abcdef";
-    source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
+    source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
                     "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
     const std::string entry = "(11 - 5 * root5) / 120";
     REQUIRE(source.header.find(entry) != std::string::npos);

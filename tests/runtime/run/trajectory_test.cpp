@@ -24,7 +24,7 @@ const Kernel& pendulum() {
         KernelSource source;
         source.name = "handwritten_pendulum";
         source.digest = "0123456789abcdef";
-        source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
+        source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
                         "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
         return kernel_of(source, Precision::double_);
     }();
@@ -38,7 +38,7 @@ const Kernel& eventful_pendulum() {
         source.name = "eventful_pendulum";
         source.digest = "0123456789abcdef";
         source.header =
-            test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten_pendulum.hpp") +
+            test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
             "namespace lobatto::kernels {\nstruct eventful_pendulum : HandwrittenPendulum {\n"
             "    static constexpr int events = 2;\n    static constexpr int event_direction[2] = {1, 0};\n"
             "    static void event(const Coefficients&, const real* q, const real* velocity, real* value) {\n"
