@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +15,7 @@ namespace lobatto {
 struct Overrides {
     std::vector<std::string> set;  // "name=expression": run-time parameters; the expression is a number such as 2*pi
     std::string step, until;       // expressions in the parameters; empty: as in the scene
-    std::optional<long> every;
+    std::optional<std::int64_t> every;
 };
 
 // The bytes of an argument from `begin` on, to before `end`, each with its column.

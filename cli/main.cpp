@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -16,7 +15,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <vector>
 
 #include "cli/commands/commands.hpp"
 #include "generator/formula/source.hpp"
@@ -44,45 +42,14 @@ int complain(Exit code, std::string_view message) {
     return code;
 }
 
-std::vector<std::string> command_names(const CLI::App& program) {
-    std::vector<std::string> names;
-    for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
-        names.push_back(command->get_name());
-    return names;
-}
-
-int complain_of_arguments(const CLI::App& program, const CLI::ParseError& error) {
-    const auto chosen = program.get_subcommands();
-    if (!chosen.empty())
-        return complain(wrong_input, fmt::format("{}\n`lobatto {} --help` shows what can be given.", error.what(),
-                                                 chosen.front()->get_name()));
-    const auto extras = program.remaining();
-    if (extras.empty() || extras.front().starts_with('-'))
-        return complain(wrong_input, fmt::format("{}\n`lobatto --help` shows what can be given.", error.what()));
-    const std::string& word = extras.front();
-    const std::string hint = word.ends_with(".toml") ? fmt::format(" Did you mean `lobatto run {}`?", word) : "";
-    return complain(wrong_input, fmt::format("unknown command '{}'; the commands are: {}.{}", word,
-                                             fmt::join(command_names(program), ", "), hint));
-}
-
 // What was printed must have arrived: a full disk behind `> file` is an error, although every write was only buffered.
 void flush_output() {
     if (!std::cout.flush() || std::fflush(stdout) != 0)
         throw MachineError(fmt::format("cannot write to standard output: {}. Is the disk full?", std::strerror(errno)));
 }
 
-void answer(CLI::App& program, int argc, char** argv) {
-    try {
-        program.parse(argc, argv);
-        if (program.get_subcommands().empty()) std::cout << program.help();
-    } catch (const CLI::Success& help_or_version) {
-        program.exit(help_or_version);  // prints it
-    }
-}
-
-void describe(CLI::App& program) {
-    program.set_version_flag("--version", "lobatto " LOBATTO_VERSION);
-    program.require_subcommand(0, 1);
+void describe(CommandLine& program) {
+    program.version("lobatto " LOBATTO_VERSION);
     add_check(program);
     add_derive(program);
     add_emit(program);
@@ -108,17 +75,17 @@ int main(int argc, char** argv) {
     // `lobatto derive scene | head -1` ends quietly, even when the parent process ignores closed pipes.
     std::signal(SIGPIPE, SIG_DFL);
     std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write(2)
-    CLI::App program("Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.",
-                     "lobatto");
+    CommandLine program(
+        "Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.", "lobatto");
     try {
         describe(program);
-        answer(program, argc, argv);
+        program.run(argc, argv);
         flush_output();
         return success;
-    } catch (const CLI::RuntimeError& end) {
-        return end.get_exit_code();
-    } catch (const CLI::ParseError& error) {
-        return complain_of_arguments(program, error);
+    } catch (const ExitCode& end) {
+        return end.code;
+    } catch (const WrongArguments& error) {
+        return complain(wrong_input, error.message);
     } catch (const InputError& error) {
         // Begins with file:line:column, as editors expect of a compiler.
         flush_before_error();

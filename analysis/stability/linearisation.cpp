@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "analysis/wide.hpp"
+#include "runtime/measure/linear_algebra.hpp"
 
 namespace lobatto {
 
@@ -37,7 +38,7 @@ Matrix<Real> dense(const LinearSystem::Entries& entries, const VectorXd& units) 
         if constexpr (std::is_same_v<Real, double>)
             value = cln::double_approx(entry.value);
         else
-            value = entry.value;
+            value = Wide(entry.value);
         value = value / units(place.first) / units(place.second);
     }
     return matrix;
@@ -88,7 +89,7 @@ VectorXd plain(const std::vector<cln::cl_R>& values) {
 
 bool is_definite(const LinearSystem& block) {
     const MatrixXd M = dense<double>(block.mass, units_of(block));
-    return M.llt().info() == Eigen::Success || (-M).llt().info() == Eigen::Success;
+    return is_positive_definite(M) || is_positive_definite(-M);
 }
 
 // Of a block without an obstacle. An eigenvalue is off by at most |M^-1| times what S is: below that it is 0.
@@ -99,14 +100,13 @@ std::optional<VectorXd> squared_frequencies_of(const LinearSystem& block) {
     const MatrixXd mass = dense<double>(block.mass, units);
     if (!mass.allFinite() || !dense<double>(block.stiffness, units).allFinite()) return std::nullopt;
     if (mass(0, 0) < 0) M = -M, S = -S;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix<Real>> solver(S, M, Eigen::EigenvaluesOnly);
-    if (solver.info() != Eigen::Success) return std::nullopt;
+    std::optional<VectorXd> values = generalised_eigenvalues(S, M);
+    if (!values) return std::nullopt;
     LinearSystem::Entries sizes = block.stiffness;
     for (auto& [place, entry] : sizes) entry.value = entry.size;
     const double rounding = std::is_same_v<Real, double> ? std::fmax(double_rounding, block.rounding) : block.rounding;
-    const double noise = rounding * mass.inverse().norm() * dense<double>(sizes, units).norm();
-    VectorXd values = solver.eigenvalues().template cast<double>();
-    for (double& value : values)
+    const double noise = rounding * inverse(mass).norm() * dense<double>(sizes, units).norm();
+    for (double& value : *values)
         if (std::fabs(value) <= noise) value = 0;
     return values;
 }
@@ -115,32 +115,28 @@ template <class Real>
 std::vector<std::complex<double>> exponents_of(const LinearSystem& block) {
     const Eigen::Index n = block.n;
     const VectorXd ones = VectorXd::Ones(n);
-    const Eigen::PartialPivLU<Matrix<Real>> mass(dense<Real>(block.mass, ones));
-    const Matrix<Real> pull = mass.solve(dense<Real>(block.stiffness, ones)),
-                       drag = mass.solve(dense<Real>(block.drag, ones));
+    Matrix<Real> both(n, 2 * n);
+    both << dense<Real>(block.stiffness, ones), dense<Real>(block.drag, ones);
+    const Matrix<Real> solved = solution(dense<Real>(block.mass, ones), both, 0).value(), pull = solved.leftCols(n),
+                       drag = solved.rightCols(n);
     // Time in a unit in which both blocks are alike.
     const Real unit = std::sqrt(std::fmax(static_cast<double>(pull.norm()), 1e-300));
     Matrix<Real> flow = Matrix<Real>::Zero(2 * n, 2 * n);
     flow.topRightCorner(n, n) = Matrix<Real>::Identity(n, n) * unit;
     flow.bottomLeftCorner(n, n) = -pull / unit;
     flow.bottomRightCorner(n, n) = -drag;
-    const Eigen::EigenSolver<Matrix<Real>> solver(flow, false);
-    std::vector<std::complex<double>> exponents;
-    for (const auto& value : solver.eigenvalues())
-        exponents.emplace_back(static_cast<double>(value.real()), static_cast<double>(value.imag()));
-    return exponents;
+    const Eigen::VectorXcd values = eigenvalues(flow).value();
+    return {values.begin(), values.end()};
 }
 
 // What tells equilibria apart; nothing where the mass matrix has no inverse: the coordinates are singular there, as
 // angles at a pole.
 std::optional<VectorXd> spectrum_of(const LinearSystem& system) {
     const VectorXd units = units_of(system);
-    Eigen::FullPivLU<MatrixXd> mass(dense<double>(system.mass, units));
-    mass.setThreshold(1e-10);
-    if (!mass.isInvertible()) return std::nullopt;
+    const auto pull = solution(dense<double>(system.mass, units), dense<double>(system.stiffness, units), 1e-10);
+    if (!pull) return std::nullopt;
     if (const auto squared = system.squared_frequencies()) return squared;
-    const MatrixXd pull = mass.solve(dense<double>(system.stiffness, units));
-    return Eigen::Vector2d(pull.trace(), (pull * pull).trace());
+    return Eigen::Vector2d(pull->trace(), (*pull * *pull).trace());
 }
 
 }  // namespace
@@ -313,7 +309,7 @@ VectorXd Linearisation::newton_step(const Position& q, const VectorXd& f) {
     const VectorXd largest = S.cwiseAbs().rowwise().maxCoeff().cwiseMax(S.cwiseAbs().colwise().maxCoeff().transpose()),
                    unit = largest.unaryExpr([](double s) { return s > 0 ? 1 / std::sqrt(s) : 1; });
     const MatrixXd scaled = unit.asDiagonal() * S * unit.asDiagonal();
-    return unit.asDiagonal() * scaled.completeOrthogonalDecomposition().solve(unit.asDiagonal() * f);
+    return unit.asDiagonal() * least_squares(scaled, unit.asDiagonal() * f);
 }
 
 // A double step along forces and stiffness of 60 digits is refined to as many.
@@ -416,9 +412,7 @@ int Linearisation::free_directions(const VectorXd& q) {
     if (looks < most_looks / 2) return 0;
     for (Eigen::Index row = 0; row < pulls.rows(); ++row)
         if (const Wide most = pulls.row(row).cwiseAbs().maxCoeff(); most > Wide(0)) pulls.row(row) /= most;
-    Eigen::FullPivLU<Matrix<Wide>> elimination(pulls);
-    elimination.setThreshold(Wide(1e-40));
-    return static_cast<int>(elimination.dimensionOfKernel());
+    return dimension_of_kernel(pulls, 1e-40);
 }
 
 }  // namespace lobatto

@@ -2,7 +2,7 @@
 // A scene's equations about a state: its linear system, the equilibria, their frequencies.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <map>
 #include <optional>
 #include <string>

@@ -2,7 +2,7 @@
 // What there is to know of the stability of a scene's steps: exactly, and measured on its kernel.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <optional>
 #include <vector>
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -184,17 +183,16 @@ nlohmann::ordered_json json_of(const Checked& checked) {
 
 }  // namespace
 
-void add_check(CLI::App& program) {
+void add_check(CommandLine& program) {
     const auto options = std::make_shared<CheckCommand>();
-    CLI::App* command =
-        program.add_subcommand("check", "Say in plain words what was found in a scene, and what its kernel leaves out");
-    command->add_option("scene", options->scene, "the scene file")->required();
-    options->method.add_to(*command);
-    command->add_flag("--general", options->general,
-                      "use nothing of what the scene's structure allows, for comparison");
-    command->add_flag("--json", options->json, "for machines");
-    command->footer("Example:\n  lobatto check scenes/two_pendulums.toml");
-    command->callback([options] {
+    Command command =
+        program.command("check", "Say in plain words what was found in a scene, and what its kernel leaves out");
+    command.option("scene", options->scene, "the scene file").required();
+    options->method.add_to(command);
+    command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+    command.flag("--json", options->json, "for machines");
+    command.footer("Example:\n  lobatto check scenes/two_pendulums.toml");
+    command.does([options] {
         const Checked checked = check(*options);
         if (options->json)
             std::cout << json_of(checked).dump(2) << '\n';

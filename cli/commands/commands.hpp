@@ -3,26 +3,26 @@
 //
 // add_NAME adds the subcommand NAME to the program: a description of one line, its arguments, a callback that does the
 // work, and a footer that is an example, indented by two blanks and preceded by the word "Example":
-//     command->footer("Example:\n  lobatto run scenes/pendulum.toml");
+//     command.footer("Example:\n  lobatto run scenes/pendulum.toml");
 // A callback returns for exit code 0 and throws for the others: InputError (2), ComputationError (3), MachineError (4),
-// or CLI::RuntimeError(code) when everything worth saying has been printed.
+// or ExitCode(code) when everything worth saying has been printed.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "cli/options/command_line.hpp"
 
 namespace lobatto {
 
-void add_check(CLI::App& program);
-void add_derive(CLI::App& program);
-void add_emit(CLI::App& program);
-void add_gallery(CLI::App& program);
-void add_run(CLI::App& program);
-void add_paper(CLI::App& program);
-void add_stability(CLI::App& program);
-void add_roundoff(CLI::App& program);
-void add_sweep(CLI::App& program);
-void add_tradeoff(CLI::App& program);
-void add_tune(CLI::App& program);
-void add_verify(CLI::App& program);
+void add_check(CommandLine& program);
+void add_derive(CommandLine& program);
+void add_emit(CommandLine& program);
+void add_gallery(CommandLine& program);
+void add_run(CommandLine& program);
+void add_paper(CommandLine& program);
+void add_stability(CommandLine& program);
+void add_roundoff(CommandLine& program);
+void add_sweep(CommandLine& program);
+void add_tradeoff(CommandLine& program);
+void add_tune(CommandLine& program);
+void add_verify(CommandLine& program);
 
 }  // namespace lobatto

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // lobatto derive: the whole derivation of a scene, for people, for LaTeX or for machines.
-#include <CLI/CLI.hpp>
 #include <iostream>
 
 #include "cli/commands/commands.hpp"
@@ -29,16 +28,15 @@ void derive_scene(const DeriveCommand& options) {
 
 }  // namespace
 
-void add_derive(CLI::App& program) {
+void add_derive(CommandLine& program) {
     const auto options = std::make_shared<DeriveCommand>();
-    CLI::App* command =
-        program.add_subcommand("derive", "Show how the integrator of a scene follows from its Lagrangian");
-    command->add_option("scene", options->scene, "the scene file")->required();
-    options->method.add_to(*command);
-    CLI::Option* latex = command->add_flag("--latex", options->latex, "a complete LaTeX document");
-    command->add_flag("--json", options->json, "for machines (described in docs/derivation.md)")->excludes(latex);
-    command->footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");
-    command->callback([options] { derive_scene(*options); });
+    Command command = program.command("derive", "Show how the integrator of a scene follows from its Lagrangian");
+    command.option("scene", options->scene, "the scene file").required();
+    options->method.add_to(command);
+    const Option latex = command.flag("--latex", options->latex, "a complete LaTeX document");
+    command.flag("--json", options->json, "for machines (described in docs/derivation.md)").excludes(latex);
+    command.footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");
+    command.does([options] { derive_scene(*options); });
 }
 
 }  // namespace lobatto

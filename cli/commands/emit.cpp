@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -139,29 +138,29 @@ void emit_scene(const EmitCommand& options) {
 
 }  // namespace
 
-void add_emit(CLI::App& program) {
+void add_emit(CommandLine& program) {
     const auto options = std::make_shared<EmitCommand>();
-    CLI::App* command = program.add_subcommand("emit", "Write the integrator of a scene as a C++ header");
-    command->add_option("scene", options->scene, "the scene file")->required();
-    command->add_option("-o,--output", options->folder, "folder for NAME.hpp and the kernel.hpp that it includes")
-        ->required()
-        ->type_name("FOLDER");
-    options->method.add_to(*command);
-    command->add_flag("--general", options->general,
-                      "use nothing of what the scene's structure allows, for comparison");
-    const std::map<std::string, Precision> precisions = {{"float", Precision::single},
-                                                         {"double", Precision::double_},
-                                                         {"long-double", Precision::extended},
-                                                         {"quadruple", Precision::quadruple}};
-    command->add_option("--precision", options->precision, "float, double (default), long-double or quadruple")
-        ->transform(CLI::CheckedTransformer(precisions).description(""))
-        ->type_name("TYPE");
-    CLI::Option* standalone =
-        command->add_flag("--standalone", options->standalone, "one file that carries kernel.hpp inside");
-    command->add_flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
-        ->excludes(standalone);
-    command->footer("Example:\n  lobatto emit scenes/pendulum.toml -o kernels");
-    command->callback([options] { emit_scene(*options); });
+    Command command = program.command("emit", "Write the integrator of a scene as a C++ header");
+    command.option("scene", options->scene, "the scene file").required();
+    command.option("-o,--output", options->folder, "folder for NAME.hpp and the kernel.hpp that it includes")
+        .required()
+        .shown_as("FOLDER");
+    options->method.add_to(command);
+    command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+    command
+        .choice("--precision", options->precision,
+                {{"float", Precision::single},
+                 {"double", Precision::double_},
+                 {"long-double", Precision::extended},
+                 {"quadruple", Precision::quadruple}},
+                "float, double (default), long-double or quadruple")
+        .shown_as("TYPE");
+    const Option standalone =
+        command.flag("--standalone", options->standalone, "one file that carries kernel.hpp inside");
+    command.flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
+        .excludes(standalone);
+    command.footer("Example:\n  lobatto emit scenes/pendulum.toml -o kernels");
+    command.does([options] { emit_scene(*options); });
 }
 
 }  // namespace lobatto

@@ -2,7 +2,6 @@
 // lobatto gallery: every scene run, one picture each, and a page that shows them all.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -121,19 +120,19 @@ void gallery(const GalleryCommand& options) {
     write_whole(options.folder + "/README.md", "the page", page);
     fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
                options.folder);
-    if (failed > 0) throw CLI::RuntimeError(some_failed);
+    if (failed > 0) throw ExitCode{some_failed};
 }
 
 }  // namespace
 
-void add_gallery(CLI::App& program) {
+void add_gallery(CommandLine& program) {
     const auto options = std::make_shared<GalleryCommand>();
-    CLI::App* command = program.add_subcommand("gallery", "Run scenes and draw one picture of each");
-    command->add_option("scenes", options->scenes, "scene files (default: all in the folder scenes)");
-    command->add_option("-o,--output", options->folder, "folder for the pictures (default: docs/gallery)")
-        ->type_name("FOLDER");
-    command->footer("Example:\n  lobatto gallery -o pictures scenes/kepler.toml scenes/pleiades.toml");
-    command->callback([options] { gallery(*options); });
+    Command command = program.command("gallery", "Run scenes and draw one picture of each");
+    command.option("scenes", options->scenes, "scene files (default: all in the folder scenes)");
+    command.option("-o,--output", options->folder, "folder for the pictures (default: docs/gallery)")
+        .shown_as("FOLDER");
+    command.footer("Example:\n  lobatto gallery -o pictures scenes/kepler.toml scenes/pleiades.toml");
+    command.does([options] { gallery(*options); });
 }
 
 }  // namespace lobatto

@@ -2,7 +2,6 @@
 // lobatto paper: the validation against Dubois and Rojas-Quintero (2025).
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
 
@@ -67,15 +66,14 @@ void validate(const PaperOptions& options) {
 
 }  // namespace
 
-void add_paper(CLI::App& program) {
-    CLI::App* command =
-        program.add_subcommand("paper", "Check every formula, table and figure of the paper behind the method");
+void add_paper(CommandLine& program) {
+    Command command = program.command("paper", "Check every formula, table and figure of the paper behind the method");
     const auto options = std::make_shared<PaperOptions>();
-    command->add_option("-o,--output", options->folder, "Folder for paper.md and paper/figure1.svg … (default: out)");
-    command->add_flag("--figures,!--no-figures", options->figures,
-                      "Draw the figures with gnuplot (default), or leave them out");
-    command->footer("Example:\n  lobatto paper -o docs");
-    command->callback([options] { validate(*options); });
+    command.option("-o,--output", options->folder, "Folder for paper.md and paper/figure1.svg … (default: out)");
+    command.flag("--figures,!--no-figures", options->figures,
+                 "Draw the figures with gnuplot (default), or leave them out");
+    command.footer("Example:\n  lobatto paper -o docs");
+    command.does([options] { validate(*options); });
 }
 
 }  // namespace lobatto

@@ -2,7 +2,6 @@
 // lobatto roundoff: what rounding does to a scene in long runs, in plain and in clean arithmetic.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 
 #include "analysis/accuracy/roundoff_growth.hpp"
@@ -127,7 +126,7 @@ void roundoff(const RoundoffCommand& options) {
                    result.plain.rows.empty() ? "before anything could be told"
                                              : fmt::format("after {} steps of {} trajectories; the table has these",
                                                            result.steps, result.trajectories));
-        throw CLI::RuntimeError(interrupted_exit);
+        throw ExitCode{interrupted_exit};
     }
     if (result.lost)
         throw ComputationError(fmt::format(
@@ -138,25 +137,22 @@ void roundoff(const RoundoffCommand& options) {
 
 }  // namespace
 
-void add_roundoff(CLI::App& program) {
+void add_roundoff(CommandLine& program) {
     const auto options = std::make_shared<RoundoffCommand>();
-    CLI::App* command = program.add_subcommand(
+    Command command = program.command(
         "roundoff", "Measure how errors of rounding grow in long runs, in plain and in clean arithmetic");
-    command->add_option("scene", options->scene, "Scene file")->required();
-    command->add_option("--steps", options->steps, "how many (default 100000)")
-        ->check(CLI::Range(std::int64_t{10}, std::int64_t{1000000000}));
-    command->add_option("--trajectories", options->trajectories, "whose mean is taken (default 16)")
-        ->check(CLI::Range(2, 1000));
-    options->method.add_members_to(*command);
-    add_step_option(*command, options->overrides);
-    add_set_option(*command, options->overrides);
-    command->add_option("-o,--output", options->output,
-                        "Folder of the table and the picture (default: out/NAME_roundoff)");
-    command->add_flag("--no-reference", options->no_reference,
-                      "without the steps in long double, which take most of the time: energies alone, against H(0)");
-    command->add_flag("--no-picture", options->no_picture, "the table alone, without gnuplot");
-    command->footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
-    command->callback([options] { roundoff(*options); });
+    command.option("scene", options->scene, "Scene file").required();
+    command.option("--steps", options->steps, "how many (default 100000)").between(10, 1000000000);
+    command.option("--trajectories", options->trajectories, "whose mean is taken (default 16)").between(2, 1000);
+    options->method.add_members_to(command);
+    add_step_option(command, options->overrides);
+    add_set_option(command, options->overrides);
+    command.option("-o,--output", options->output, "Folder of the table and the picture (default: out/NAME_roundoff)");
+    command.flag("--no-reference", options->no_reference,
+                 "without the steps in long double, which take most of the time: energies alone, against H(0)");
+    command.flag("--no-picture", options->no_picture, "the table alone, without gnuplot");
+    command.footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
+    command.does([options] { roundoff(*options); });
 }
 
 }  // namespace lobatto

@@ -2,7 +2,6 @@
 // lobatto run: a scene from text to trajectory, and what there is to say about it.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -276,31 +275,29 @@ void run(const RunOptions& options) {
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, path,
                    keeps_checkpoints ? " The same command with --resume goes on from there." : "");
-        throw CLI::RuntimeError(interrupted_exit);
+        throw ExitCode{interrupted_exit};
     }
 }
 
 }  // namespace
 
-void add_run(CLI::App& program) {
-    CLI::App* command =
-        program.add_subcommand("run", "Derive, compile and run a scene; write its trajectory and say how good it is");
+void add_run(CommandLine& program) {
+    Command command =
+        program.command("run", "Derive, compile and run a scene; write its trajectory and say how good it is");
     const auto options = std::make_shared<RunOptions>();
-    command->add_option("scene", options->scene, "Scene file")->required();
-    command->add_option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
-    options->method.add_to(*command);
-    command->add_flag("--general", options->general,
-                      "use nothing of what the scene's structure allows, for comparison");
-    add_step_option(*command, options->overrides);
-    add_until_option(*command, options->overrides);
-    command->add_option("--every", options->overrides.every, "Keep every EVERY-th state");
-    add_set_option(*command, options->overrides);
-    command->add_flag(
-        "--resume", options->resume,
-        "go on where the same run was interrupted or killed; its files get the bytes they would have had");
-    command->add_flag("--quiet", options->quiet, "Print nothing but warnings and errors");
-    command->footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
-    command->callback([options] { run(*options); });
+    command.option("scene", options->scene, "Scene file").required();
+    command.option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
+    options->method.add_to(command);
+    command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+    add_step_option(command, options->overrides);
+    add_until_option(command, options->overrides);
+    command.option("--every", options->overrides.every, "Keep every EVERY-th state");
+    add_set_option(command, options->overrides);
+    command.flag("--resume", options->resume,
+                 "go on where the same run was interrupted or killed; its files get the bytes they would have had");
+    command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
+    command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
+    command.does([options] { run(*options); });
 }
 
 }  // namespace lobatto

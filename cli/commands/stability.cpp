@@ -2,7 +2,6 @@
 // lobatto stability: which steps keep a motion bounded, exactly, and what a scene's step does.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -100,18 +99,18 @@ void show_scene(const StabilityCommand& options) {
 
 }  // namespace
 
-void add_stability(CLI::App& program) {
+void add_stability(CommandLine& program) {
     const auto options = std::make_shared<StabilityCommand>();
-    CLI::App* command = program.add_subcommand(
+    Command command = program.command(
         "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
-    command->add_option("scene", options->scene, "the scene file (default: none, every member of both families)");
-    options->method.add_to(*command);
-    add_step_option(*command, options->overrides);
-    add_set_option(*command, options->overrides);
-    command->add_option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
-    command->add_flag("--json", options->json, "for machines (described in docs/stability.md)");
-    command->footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
-    command->callback([options] { options->scene ? show_scene(*options) : show_members(*options); });
+    command.option("scene", options->scene, "the scene file (default: none, every member of both families)");
+    options->method.add_to(command);
+    add_step_option(command, options->overrides);
+    add_set_option(command, options->overrides);
+    command.option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
+    command.flag("--json", options->json, "for machines (described in docs/stability.md)");
+    command.footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
+    command.does([options] { options->scene ? show_scene(*options) : show_members(*options); });
 }
 
 }  // namespace lobatto

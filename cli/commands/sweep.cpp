@@ -2,7 +2,6 @@
 // lobatto sweep: one scene, many starts and parameters, one table of what becomes of them.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 
@@ -305,7 +304,7 @@ void sweep(const SweepOptions& options) {
         fmt::print(stderr, "lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n",
                    result.trajectories, request.count, path);
         if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, departures, failures));
-        throw CLI::RuntimeError(interrupted_exit);
+        throw ExitCode{interrupted_exit};
     }
     if (failed)
         throw ComputationError(failures_text(scene, grid, result, departures, failures) +
@@ -314,35 +313,35 @@ void sweep(const SweepOptions& options) {
 
 }  // namespace
 
-void add_sweep(CLI::App& program) {
-    CLI::App* command = program.add_subcommand(
+void add_sweep(CommandLine& program) {
+    Command command = program.command(
         "sweep", "Run a scene from many starts and with many parameters at once; write what becomes of them");
     const auto options = std::make_shared<SweepOptions>();
-    command->add_option("scene", options->scene, "Scene file")->required();
+    command.option("scene", options->scene, "Scene file").required();
     command
-        ->add_option("--vary", options->vary,
-                     "Values of an initial position, velocity or momentum or of a parameter: NAME=FROM:TO:COUNT, both "
-                     "ends included; NAME=FROM:TO:COUNT:log, in equal ratios; NAME=a,b,c. Repeated: all combinations")
-        ->required()
-        ->allow_extra_args(false);
-    command->add_option("-o,--output", options->output, "Table (default: out/NAME.sweep.csv)");
+        .option("--vary", options->vary,
+                "Values of an initial position, velocity or momentum or of a parameter: NAME=FROM:TO:COUNT, both "
+                "ends included; NAME=FROM:TO:COUNT:log, in equal ratios; NAME=a,b,c. Repeated: all combinations")
+        .required()
+        .one_value_each();
+    command.option("-o,--output", options->output, "Table (default: out/NAME.sweep.csv)");
     command
-        ->add_option("--format", options->format,
-                     "csv, or binary: an array of NumPy (default: binary when the table is named .npy)")
-        ->check(CLI::IsMember({"csv", "binary"}));
-    options->method.add_to(*command);
-    add_step_option(*command, options->overrides);
-    CLI::Option* until = add_until_option(*command, options->overrides);
-    command->add_option("--steps", options->steps, "Number of steps, instead of an end time")->excludes(until);
-    command->add_option("--every", options->overrides.every,
-                        "Keep the start, every EVERY-th state and the last one (default: the last one alone)");
-    add_set_option(*command, options->overrides);
-    command->add_option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
-        ->check(CLI::Range(1, 1024));
-    command->add_flag("--quiet", options->quiet, "Print nothing but errors");
-    command->footer(
+        .option("--format", options->format,
+                "csv, or binary: an array of NumPy (default: binary when the table is named .npy)")
+        .one_of(std::vector<std::string>{"csv", "binary"});
+    options->method.add_to(command);
+    add_step_option(command, options->overrides);
+    const Option until = add_until_option(command, options->overrides);
+    command.option("--steps", options->steps, "Number of steps, instead of an end time").excludes(until);
+    command.option("--every", options->overrides.every,
+                   "Keep the start, every EVERY-th state and the last one (default: the last one alone)");
+    add_set_option(command, options->overrides);
+    command.option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
+        .between(1, 1024);
+    command.flag("--quiet", options->quiet, "Print nothing but errors");
+    command.footer(
         "Example:\n  lobatto sweep scenes/pendulum.toml --vary q=0:3:1000 --vary omega=1,2,5 --until 10 -o table.npy");
-    command->callback([options] { sweep(*options); });
+    command.does([options] { sweep(*options); });
 }
 
 }  // namespace lobatto

@@ -2,7 +2,6 @@
 // lobatto tradeoff: what accuracy costs on a scene, measured over the family.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <optional>
 
 #include "analysis/tradeoff/exploration.hpp"
@@ -64,7 +63,7 @@ void tradeoff(const TradeoffOptions& options) {
     if (interrupted && (!begun || begun->notebook().all().empty())) {
         fmt::print(stderr,
                    "lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
-        throw CLI::RuntimeError(interrupted_exit);
+        throw ExitCode{interrupted_exit};
     }
     Laboratory& laboratory = *begun;
     if (laboratory.notebook().all().empty())
@@ -86,23 +85,23 @@ void tradeoff(const TradeoffOptions& options) {
     } else {
         fmt::print(stderr,
                    "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
-        throw CLI::RuntimeError(interrupted_exit);
+        throw ExitCode{interrupted_exit};
     }
 }
 
 }  // namespace
 
-void add_tradeoff(CLI::App& program) {
-    CLI::App* command = program.add_subcommand(
-        "tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
+void add_tradeoff(CommandLine& program) {
+    Command command =
+        program.command("tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
     const auto options = std::make_shared<TradeoffOptions>();
-    command->add_option("scene", options->scene, "Scene file")->required();
-    command->add_option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");
-    options->budget.add_to(*command);
-    add_until_option(*command, options->overrides);
-    add_set_option(*command, options->overrides);
-    command->footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
-    command->callback([options] { tradeoff(*options); });
+    command.option("scene", options->scene, "Scene file").required();
+    command.option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");
+    options->budget.add_to(command);
+    add_until_option(command, options->overrides);
+    add_set_option(command, options->overrides);
+    command.footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
+    command.does([options] { tradeoff(*options); });
 }
 
 }  // namespace lobatto

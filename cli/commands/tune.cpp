@@ -2,7 +2,6 @@
 // lobatto tune: the cheapest method and step that keep a promised accuracy.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 
 #include "analysis/tradeoff/choice.hpp"
@@ -80,7 +79,7 @@ void tune(const TuneOptions& options) {
     } catch (const Interrupted&) {
         say.clear();
         fmt::print(stderr, "lobatto: interrupted; nothing was chosen.\n");
-        throw CLI::RuntimeError(interrupted_exit);
+        throw ExitCode{interrupted_exit};
     } catch (const ComputationError& failure) {
         throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
     }
@@ -88,20 +87,18 @@ void tune(const TuneOptions& options) {
 
 }  // namespace
 
-void add_tune(CLI::App& program) {
-    CLI::App* command =
-        program.add_subcommand("tune", "Choose the cheapest method and step that keep a promised accuracy");
+void add_tune(CommandLine& program) {
+    Command command = program.command("tune", "Choose the cheapest method and step that keep a promised accuracy");
     const auto options = std::make_shared<TuneOptions>();
-    command->add_option("scene", options->scene, "Scene file")->required();
-    command
-        ->add_option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
-        ->required();
-    add_until_option(*command, options->overrides);
-    options->budget.add_to(*command);
-    add_set_option(*command, options->overrides);
-    command->add_flag("--write", options->write, "Write the method and the step into the scene file");
-    command->footer("Example:\n  lobatto tune scenes/pendulum.toml --error 1e-8 --until 1000");
-    command->callback([options] { tune(*options); });
+    command.option("scene", options->scene, "Scene file").required();
+    command.option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
+        .required();
+    add_until_option(command, options->overrides);
+    options->budget.add_to(command);
+    add_set_option(command, options->overrides);
+    command.flag("--write", options->write, "Write the method and the step into the scene file");
+    command.footer("Example:\n  lobatto tune scenes/pendulum.toml --error 1e-8 --until 1000");
+    command.does([options] { tune(*options); });
 }
 
 }  // namespace lobatto

@@ -2,7 +2,6 @@
 // lobatto verify: everything that can be checked of a scene without a paper, from the quadrature to the running kernel.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 
@@ -265,14 +264,14 @@ void verify(const VerifyOptions& options) {
 
 }  // namespace
 
-void add_verify(CLI::App& program) {
-    CLI::App* command = program.add_subcommand(
-        "verify", "Check a scene's equations, its emitted code and the promises of its integrator");
+void add_verify(CommandLine& program) {
+    Command command =
+        program.command("verify", "Check a scene's equations, its emitted code and the promises of its integrator");
     const auto options = std::make_shared<VerifyOptions>();
-    command->add_option("scene", options->scene, "Scene file")->required();
-    options->method.add_to(*command);
-    command->footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
-    command->callback([options] { verify(*options); });
+    command.option("scene", options->scene, "Scene file").required();
+    options->method.add_to(command);
+    command.footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
+    command.does([options] { verify(*options); });
 }
 
 }  // namespace lobatto

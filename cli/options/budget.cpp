@@ -16,8 +16,8 @@ constexpr double least = 1, most = 86400;
 
 }  // namespace
 
-void BudgetOption::add_to(CLI::App& command) {
-    command.add_option("--budget", text, "Time it may take, as in 30s or 5min")->capture_default_str();
+void BudgetOption::add_to(Command& command) {
+    command.option("--budget", text, "Time it may take, as in 30s or 5min").show_default();
 }
 
 double BudgetOption::seconds() const {

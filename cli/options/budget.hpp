@@ -2,14 +2,15 @@
 // --budget: how long measuring may take.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+#include "cli/options/command_line.hpp"
 
 namespace lobatto {
 
 struct BudgetOption {
     std::string text = "20s";
-    void add_to(CLI::App& command);
+    void add_to(Command& command);
     double seconds() const;  // InputError
 };
 

@@ -9,33 +9,32 @@
 
 namespace lobatto {
 
-void MethodOption::add_members_to(CLI::App& command) {
-    CLI::Option* lobatto = command.add_option("--points", points, "Lobatto with this many points: order 2 points - 2");
-    CLI::Option* gauss = command.add_option("--stages", stages, "Gauss with this many stages: order 2 stages");
-    lobatto->check(CLI::Range(2, 12));
-    gauss->check(CLI::Range(1, 10))->excludes(lobatto);
+std::pair<Option, Option> MethodOption::add_members_to(Command& command) {
+    Option lobatto = command.option("--points", points, "Lobatto with this many points: order 2 points - 2");
+    Option gauss = command.option("--stages", stages, "Gauss with this many stages: order 2 stages");
+    lobatto.between(2, 12);
+    gauss.between(1, 10).excludes(lobatto);
+    return {lobatto, gauss};
 }
 
-void MethodOption::add_to(CLI::App& command) {
-    add_members_to(command);
+void MethodOption::add_to(Command& command) {
+    const auto [lobatto, gauss] = add_members_to(command);
     command
-        .add_option("--splitting", splitting,
-                    "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
-        ->check(CLI::IsMember(splitting_stages()))
-        ->excludes(command.get_option("--points"))
-        ->excludes(command.get_option("--stages"));
-    command.add_option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
-        ->check([](const std::string& text) {
+        .option("--splitting", splitting,
+                "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
+        .one_of(splitting_stages())
+        .excludes(lobatto)
+        .excludes(gauss);
+    command.option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
+        .checked_by([](const std::string& text) {
             const double value = std::strtod(text.c_str(), nullptr);
             return value > 0 && value <= 1e-3 ? ""
                                               : "the tolerance is " + text +
                                                     "; it must be above 0 and at most 0.001; leave it out to iterate "
                                                     "to rounding";
         });
-    command
-        .add_option("--arithmetic", arithmetic,
-                    "plain, or clean: rounding errors grow like a random walk only (slower)")
-        ->check(CLI::IsMember({"plain", "clean"}));
+    command.option("--arithmetic", arithmetic, "plain, or clean: rounding errors grow like a random walk only (slower)")
+        .one_of(std::vector<std::string>{"plain", "clean"});
 }
 
 void MethodOption::apply(Scene& scene) const {

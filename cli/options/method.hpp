@@ -3,10 +3,10 @@
 // --arithmetic.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 
+#include "cli/options/command_line.hpp"
 #include "generator/scene/scene.hpp"
 
 namespace lobatto {
@@ -16,8 +16,8 @@ struct MethodOption {
     std::optional<double> tolerance;
     std::optional<std::string> arithmetic;
 
-    void add_to(CLI::App& command);
-    void add_members_to(CLI::App& command);  // --points and --stages alone
+    void add_to(Command& command);
+    std::pair<Option, Option> add_members_to(Command& command);  // --points and --stages alone
     void apply(Scene& scene) const;
     std::optional<Method> member() const;  // nothing where none is named
 };

@@ -3,16 +3,12 @@
 #pragma once
 
 #include "analysis/overrides.hpp"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
+#include "cli/options/command_line.hpp"
 
 namespace lobatto {
 
-void add_set_option(CLI::App& command, Overrides& overrides);
-CLI::Option* add_step_option(CLI::App& command, Overrides& overrides);
-CLI::Option* add_until_option(CLI::App& command, Overrides& overrides);
+void add_set_option(Command& command, Overrides& overrides);
+Option add_step_option(Command& command, Overrides& overrides);
+Option add_until_option(Command& command, Overrides& overrides);
 
 }  // namespace lobatto

@@ -2,10 +2,11 @@
 // The symplectic defect and the discrete energy, from the kernel's tangent map.
 #include "runtime/measure/diagnostics.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 
 #include "runtime/error.hpp"
+#include "runtime/measure/linear_algebra.hpp"
 
 namespace lobatto {
 
@@ -81,7 +82,7 @@ std::optional<DiscreteEnergy> discrete_energy(const LoadedStepper<double>& stepp
 
     // (1 - Phi) z* = shift, where it has a solution.
     const Matrix difference = Matrix::Identity(2 * n, 2 * n) - Phi;
-    const Eigen::VectorXd centre = difference.completeOrthogonalDecomposition().solve(shift);
+    const Eigen::VectorXd centre = least_squares(difference, shift);
     Eigen::VectorXd left = shift - difference * centre;
     if (left.norm() <= 1e-10 * shift.norm()) left.setZero();
 

@@ -2,10 +2,12 @@
 // How fast neighbouring motions part: the eigenvalues of one step, and the growth of a linear kernel's own motion.
 #include "runtime/measure/monodromy.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "runtime/measure/linear_algebra.hpp"
 
 namespace lobatto {
 
@@ -54,9 +56,9 @@ std::optional<std::vector<std::complex<double>>> step_eigenvalues(const LoadedSt
         product.topRightCorner(n, n) *= unit;
         product.bottomLeftCorner(n, n) /= unit;
     }
-    const Eigen::EigenSolver<MatrixXd> solver(product, false);
-    if (solver.info() != Eigen::Success) return std::nullopt;
-    std::vector<std::complex<double>> values(solver.eigenvalues().begin(), solver.eigenvalues().end());
+    const auto eigenvalues_of_product = eigenvalues(product);
+    if (!eigenvalues_of_product) return std::nullopt;
+    std::vector<std::complex<double>> values(eigenvalues_of_product->begin(), eigenvalues_of_product->end());
     std::sort(values.begin(), values.end(), [](const auto& x, const auto& y) {
         return std::abs(x) != std::abs(y) ? std::abs(x) > std::abs(y) : std::arg(x) > std::arg(y);
     });

@@ -8,11 +8,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 #include <random>
 
 #include "runtime/error.hpp"
+#include "runtime/measure/linear_algebra.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {
@@ -155,15 +156,14 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
     for (Eigen::Index sample = 0; sample < wanted; ++sample)
         if (const double size = sizes.row(sample).transpose().cwiseQuotient(units).maxCoeff(); size > 0)
             scaled.row(sample) /= size;
-    const Eigen::JacobiSVD<MatrixXd> decomposition(scaled, Eigen::ComputeFullV);
-    const VectorXd& values = decomposition.singularValues();
+    const auto [values, V] = singular_values(scaled);
     Eigen::Index rank = 0;
     while (rank < unknowns && values(rank) > 1e-10 * std::fmax(values(0), 1.0)) ++rank;
 
     std::vector<Symmetry> symmetries;
     if (rank == unknowns) return symmetries;
     // The entries of B lead, so that translations are reduced to directions of their own, and rotations by them.
-    MatrixXd space = reduced(decomposition.matrixV().rightCols(unknowns - rank).transpose());
+    MatrixXd space = reduced(V.rightCols(unknowns - rank).transpose());
     for (Eigen::Index s = 0; s < space.rows(); ++s) {
         space.row(s).array() /= units.transpose().array();
         Eigen::Index leading = 0;
