@@ -98,7 +98,7 @@ void measure_all(Laboratory& laboratory) {
     for (const auto& [member, goals] : wishes) {
         say(member);
         for (const double goal : goals) {
-            const Crossing crossing = cross(laboratory, member, goal);
+            const Attempt crossing = cross(laboratory, member, goal);
             const auto place = std::find(std::begin(targets), std::end(targets), goal);
             if (crossing.measurement && member.precision == Precision::double_)
                 reached[static_cast<std::size_t>(place - std::begin(targets))].push_back(*crossing.measurement);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <regex>
 #include <set>
 #include <string>
@@ -174,6 +175,27 @@ TEST_CASE("what emitted kernels include stands on the C and C++ standard librari
                    (fs::exists(part) && part.string().starts_with(kernel.string()))));
         }
     CHECK(includes(tree / "runtime/kernel/abi.h") == std::vector<std::string>{"stdint.h"});
+}
+
+TEST_CASE("no two headers define a type of the same name: the linker would mix them up without a word") {
+    static const std::regex definition(R"(^(?:struct|class|enum class) (\w+)(?: :[^:].*)? \{.*)"),
+        opening(R"(^namespace (lobatto\S*) \{$)");
+    std::map<std::string, std::string> home;  // by namespace and name
+    for (const char* half : {"generator", "runtime", "analysis", "cli"})
+        for (const fs::path& file : sources(half)) {
+            if (file.extension() == ".cpp") continue;
+            std::string space;
+            std::smatch match;
+            for (const std::string& line : lines(file)) {
+                if (std::regex_match(line, match, opening)) space = match[1];
+                if (!std::regex_match(line, match, definition)) continue;
+                const std::string name = space + "::" + match[1].str(), here = fs::relative(file, tree);
+                const auto [known, is_new] = home.emplace(name, here);
+                INFO(name << " is defined in " << known->second << " and in " << here);
+                CHECK(is_new);
+            }
+        }
+    CHECK(home.size() > 200);
 }
 
 TEST_CASE("every source file begins with its licence: MIT in what users ship, GPL elsewhere") {

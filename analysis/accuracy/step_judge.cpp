@@ -17,11 +17,11 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::size_t most_states = 64;
+constexpr std::size_t most_judged_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
 constexpr double far = 1000;                 // times the error wanted: estimates may be off by nearly as much
-constexpr double coarse = 0x1p-40;           // of what energies are computed from: their rounding does not matter
+constexpr double coarse_energy = 0x1p-40;    // of what energies are computed from: their rounding does not matter
 constexpr double still = 0x1p-40;            // of the place: what rounding moves it by
 constexpr double quickly = 30;               // times further apart than motions of different frequencies get
 
@@ -51,7 +51,7 @@ std::vector<double> energies_along(const Derivation& derivation, const LoadedSte
         const auto here = exact.at(q, v);
         if (!here) continue;
         if (!first) first = here->value;
-        if (i == 0 && largest > coarse * cln::double_approx(here->size)) return energies;
+        if (i == 0 && largest > coarse_energy * cln::double_approx(here->size)) return energies;
         energies[i] = cln::double_approx(here->value - *first);
     }
     return energies;
@@ -71,7 +71,7 @@ StepJudge::StepJudge(const Scene& scene) : groups_(unit_groups(scene)), rows_a_s
 
 void StepJudge::keep(std::int64_t number, std::vector<double> row) {
     const std::uint64_t place = scrambled(number);
-    if (some_.size() == most_states) {
+    if (some_.size() == most_judged_states) {
         if (place > std::prev(some_.end())->first) return;
         some_.erase(std::prev(some_.end()));
     }
@@ -90,7 +90,8 @@ void StepJudge::look(const Records& records) {
         const std::int64_t number = seen_++;
         if (number % rows_a_step_ != 0) continue;
         hardest_.look({row, row + columns}, records.energy != nullptr ? records.energy[i] : std::nan(""));
-        if (some_.size() < most_states || scrambled(number) < some_.rbegin()->first) keep(number, {row, row + columns});
+        if (some_.size() < most_judged_states || scrambled(number) < some_.rbegin()->first)
+            keep(number, {row, row + columns});
     }
 }
 

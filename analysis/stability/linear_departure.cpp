@@ -13,13 +13,13 @@ namespace lobatto {
 namespace {
 
 constexpr std::size_t most_coordinates = 64;
-constexpr long measured_steps = 4000;
+constexpr long steps_measured = 4000;
 constexpr double times_too_large = 1000;
 
 // What is measured, a step, of a bounded motion, and of one that grows like t^(2n - 1): between the halves of a
 // measurement by 2^(2n - 1).
 double floor_of(std::size_t n) {
-    return (10 + 2 * std::log(2.0) * static_cast<double>(2 * n - 1)) / measured_steps;
+    return (10 + 2 * std::log(2.0) * static_cast<double>(2 * n - 1)) / steps_measured;
 }
 
 }  // namespace
@@ -33,7 +33,7 @@ std::string linear_departure(const Derivation& derivation, const Scene& scene, c
         stepper.prepare(request.parameters, request.step) != LOBATTO_OK)
         return "";
     const double too_large = std::log(times_too_large) / static_cast<double>(result.steps_done);  // a step
-    const auto measured = measured_rate(stepper, request.step, measured_steps);
+    const auto measured = measured_rate(stepper, request.step, steps_measured);
     if (!measured || *measured - floor_of(n) < too_large) return "";
     Linearisation linearisation(scene, derivation.system);
     const Eigen::VectorXd origin = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What there is to know of the stability of a scene's steps: exactly, and measured on its kernel.
+// What there is to know of the stability of a scene's steps: exact_number, and measured on its kernel.
 #include "analysis/stability/report.hpp"
 
 #include <fmt/format.h>
@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 constexpr std::int64_t states_looked_at = 200;
 constexpr int most_starts = 24;                   // of the search for equilibria
 constexpr std::size_t most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
-constexpr std::size_t most_coordinates = 1024;
+constexpr std::size_t most_reported_coordinates = 1024;
 constexpr std::int64_t most_steps = 10'000'000;  // of a run to look at, times coordinates
 constexpr int fine = 8;                          // steps of h/8 stand for the motion itself
 
@@ -34,7 +34,7 @@ std::vector<double> plain(const VectorXd& values) {
     return {values.begin(), values.end()};
 }
 
-GiNaC::numeric exactly(double x) {
+GiNaC::numeric exact_number(double x) {
     return GiNaC::numeric(cln::rational(cln::cl_DF(x)));
 }
 
@@ -54,7 +54,7 @@ std::vector<Mode> modes_of(const Stability& member, const VectorXd& squared, dou
             throw ComputationError(fmt::format(
                 "the squared frequency {:.3g} times the squared step leaves the range of numbers; choose other units",
                 value));
-        modes.push_back({value, z, rate_of_step(member, exactly(z)), is_limit(member, z)});
+        modes.push_back({value, z, rate_of_step(member, exact_number(z)), is_limit(member, z)});
     }
     return modes;
 }
@@ -172,8 +172,8 @@ std::optional<EnergyReport> energy_report(const StabilityReport& report, const s
         formulas.set(parameter.symbol, float_of(scene.evaluate(parameter.value, "the parameter " + parameter.name)));
     const auto set = [&](const State& state) {
         for (std::size_t k = 0; k < modified->p.size(); ++k) {
-            formulas.set(system.q[k], float_of(exactly(state.q(static_cast<Eigen::Index>(k)))));
-            formulas.set(modified->p[k], float_of(exactly(state.p(static_cast<Eigen::Index>(k)))));
+            formulas.set(system.q[k], float_of(exact_number(state.q(static_cast<Eigen::Index>(k)))));
+            formulas.set(modified->p[k], float_of(exact_number(state.p(static_cast<Eigen::Index>(k)))));
         }
     };
     set(states.front());
@@ -213,9 +213,9 @@ Scene with_tangent(Scene scene) {
 }
 
 StabilityReport begin(Scene scene, const Overrides& overrides, TrajectoryRequest& request) {
-    if (scene.coordinates.size() > most_coordinates)
+    if (scene.coordinates.size() > most_reported_coordinates)
         throw InputError(fmt::format("{}: the frequencies of {} coordinates would take too long; at most {} are judged",
-                                     scene.path, scene.coordinates.size(), most_coordinates));
+                                     scene.path, scene.coordinates.size(), most_reported_coordinates));
     scene = with_tangent(std::move(scene));
     Derivation derivation = derive(scene);
     Kernel kernel = kernel_of(emit(derivation), Precision::double_);
@@ -252,7 +252,7 @@ double largest_rate(const StabilityReport& report, const std::vector<Mode>& mode
     double largest = 0;
     for (const Mode& mode : modes) {
         const double angle = factor * std::sqrt(std::fabs(mode.z));
-        largest = std::fmax(largest, rate_of_step(report.member, exactly(std::copysign(angle * angle, mode.z))));
+        largest = std::fmax(largest, rate_of_step(report.member, exact_number(std::copysign(angle * angle, mode.z))));
     }
     return largest;
 }

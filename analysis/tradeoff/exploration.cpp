@@ -26,9 +26,6 @@ std::vector<Measurement> pareto_front(const Laboratory& laboratory) {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double most_steps = 1e9;
-
 // Members in the order in which they are looked at: first those far apart, then between them.
 std::vector<Member> tour(bool is_separable) {
     std::vector<Member> members;

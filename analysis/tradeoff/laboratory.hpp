@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -12,6 +13,9 @@
 #include "analysis/tradeoff/workshop.hpp"
 
 namespace lobatto {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double most_steps = 1e9;  // of a candidate to the end
 
 struct LaboratoryRequest {
     double seconds = 20;        // of wall time

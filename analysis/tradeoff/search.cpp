@@ -13,10 +13,8 @@ namespace lobatto {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double fine_ratio = 1.06;  // of the steps in the end
 constexpr double hopeless = 1.6;     // times the best: a crossing that polishing will not save
-constexpr double most_steps = 1e9;
 constexpr std::size_t most_finalists = 4;
 constexpr double close = 1.08;  // two numbers of steps between which nothing is looked for
 
@@ -31,10 +29,10 @@ bool has_tolerance(Laboratory& laboratory, const Member& member) {
 
 }  // namespace
 
-Crossing cross(Laboratory& laboratory, const Member& member, double goal) {
+Attempt cross(Laboratory& laboratory, const Member& member, double goal) {
     const StepLadder ladder = laboratory.ladder(fine_ratio);
     const double order = member.order(), fewest = laboratory.fewest_steps();
-    Crossing result{{}, infinity, infinity};
+    Attempt result{{}, infinity, infinity};
     const auto run = [&](std::int64_t steps) {
         const Measurement m = laboratory.measure({member, steps, 0}, false);
         if (m.complete) result.least_error = std::min(result.least_error, m.error);
@@ -148,7 +146,7 @@ Measurement polish(Laboratory& laboratory, const Measurement& crossing, double g
 namespace {
 
 // What the members that came nearest to a goal below their rounding would be in clean arithmetic.
-std::vector<Member> cleaner(const std::map<Member, Crossing>& tried) {
+std::vector<Member> cleaner(const std::map<Member, Attempt>& tried) {
     std::vector<std::pair<double, Member>> nearest;
     for (const auto& [member, crossing] : tried)
         if (member.arithmetic == StepArithmetic::plain && member.family != Family::splitting)
@@ -184,7 +182,7 @@ std::vector<int> full_registers(Family family, bool is_separable) {
 }
 
 // Members next to the best of each family that were not tried; the nearest to the best first.
-std::vector<Member> neighbours(const std::map<Member, Crossing>& tried, double best_cost, bool is_separable) {
+std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double best_cost, bool is_separable) {
     std::vector<std::pair<double, Member>> wishes;
     for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {
         if (family == Family::splitting && !is_separable) continue;
@@ -240,7 +238,7 @@ Search search(Laboratory& laboratory, double goal) {
     const bool is_separable = laboratory.derivation().system.separable;
     Search result;
     result.least_error = infinity;
-    std::map<Member, Crossing> tried;
+    std::map<Member, Attempt> tried;
     std::vector<Member> queue = first_guess(goal, 4);
     if (is_separable) queue.push_back({Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35});
     const double reserve = 0.2 * laboratory.request().seconds;  // for polishing
@@ -291,13 +289,13 @@ Search search(Laboratory& laboratory, double goal) {
     workshop.cancel();
     result.members = static_cast<int>(tried.size());
 
-    std::vector<Crossing> crossings;
+    std::vector<Attempt> crossings;
     for (const auto& [member, crossing] : tried)
         if (crossing.measurement) crossings.push_back(crossing);
     std::sort(crossings.begin(), crossings.end(),
-              [](const Crossing& a, const Crossing& b) { return a.seconds < b.seconds; });
+              [](const Attempt& a, const Attempt& b) { return a.seconds < b.seconds; });
     std::vector<Measurement> finalists;
-    for (const Crossing& crossing : crossings) {
+    for (const Attempt& crossing : crossings) {
         if (crossing.seconds > hopeless * crossings.front().seconds || finalists.size() >= most_finalists) break;
         laboratory.request().say(fmt::format("refining {}", crossing.measurement->candidate.name()));
         finalists.push_back(polish(laboratory, *crossing.measurement, goal));

@@ -10,13 +10,13 @@
 namespace lobatto {
 
 // One member's coarsest steps that meet a goal.
-struct Crossing {
+struct Attempt {
     std::optional<Measurement> measurement;  // nothing: it does not reach the goal
     double least_error = 0;                  // what it does reach
     double seconds = 0;  // infinite without; else the less of its time and of the same steps' with a looser iteration
 };
 // Runs to stagnation, with a handful of steps: from the error of one the next is told by the order.
-Crossing cross(Laboratory& laboratory, const Member& member, double goal);
+Attempt cross(Laboratory& laboratory, const Member& member, double goal);
 
 // The fastest way to the goal with this member: with longer steps, where the error does not grow evenly with them; with
 // iterations that stop earlier; with steps that are shorter but need fewer sweeps.

@@ -72,7 +72,7 @@ std::string display(const std::string& body) {
     return "\\[\n\\fit{" + body + "}\n\\]\n";
 }
 
-std::string equation(const std::string& left, const std::string& right) {
+std::string latex_equation(const std::string& left, const std::string& right) {
     const std::vector<std::string> lines = cut_at_signs(right, line_width);
     if (lines.size() == 1) return display(left + " = " + right);
     std::string body = "\\begin{aligned}\n" + left + " ={}& " + lines.front();
@@ -80,7 +80,7 @@ std::string equation(const std::string& left, const std::string& right) {
     return display(body + "\n\\end{aligned}");
 }
 
-std::string matrix(const Formula& formula, const std::vector<std::string>& entries) {
+std::string latex_matrix(const Formula& formula, const std::vector<std::string>& entries) {
     std::string body = latex_name(formula.left[0]) + " = \\begin{bmatrix}\n";
     for (std::size_t i = 0; i < entries.size(); ++i) {
         const bool last = (i + 1) % formula.shape[1] == 0;
@@ -110,10 +110,10 @@ std::string latex_of(const Description& description) {
             std::vector<std::string> values;
             for (const GiNaC::ex& value : formula.values) values.push_back(canonical_text(value, Notation::latex));
             if (formula.shape.size() == 2)
-                text += matrix(formula, values);
+                text += latex_matrix(formula, values);
             else
                 for (std::size_t i = 0; i < values.size(); ++i)
-                    text += equation(latex_name(formula.left[i]), values[i]);
+                    text += latex_equation(latex_name(formula.left[i]), values[i]);
         }
     }
     text += "\n\\section*{Structure}\n\\begin{description}\n";

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t columns = 110;
 
-std::string equation(const std::string& left, const std::string& right) {
+std::string text_equation(const std::string& left, const std::string& right) {
     std::string text;
     const std::string indent(4 + left.size() + 3, ' ');
     for (const std::string& line : cut_at_signs(right, columns - indent.size()))
@@ -22,7 +22,7 @@ std::string equation(const std::string& left, const std::string& right) {
 }
 
 // Rows in brackets when they fit, else one line for each entry that is not zero.
-std::string matrix(const Formula& formula, const std::vector<std::string>& entries) {
+std::string text_matrix(const Formula& formula, const std::vector<std::string>& entries) {
     const std::size_t rows = formula.shape[0], width = formula.shape[1];
     std::vector<std::size_t> widest(width, 0);
     for (std::size_t i = 0; i < entries.size(); ++i) widest[i % width] = std::max(widest[i % width], entries[i].size());
@@ -45,7 +45,7 @@ std::string matrix(const Formula& formula, const std::vector<std::string>& entri
         if (entries[i] == "0")
             has_zeros = true;
         else
-            text += equation(fmt::format("{}[{},{}]", formula.left[0], i / width + 1, i % width + 1), entries[i]);
+            text += text_equation(fmt::format("{}[{},{}]", formula.left[0], i / width + 1, i % width + 1), entries[i]);
     }
     return text + (has_zeros ? "    all other entries are 0\n" : "");
 }
@@ -93,9 +93,9 @@ std::string text_of(const Description& description) {
             std::vector<std::string> values;
             for (const GiNaC::ex& value : formula.values) values.push_back(canonical_text(value));
             if (formula.shape.size() == 2)
-                text += matrix(formula, values);
+                text += text_matrix(formula, values);
             else
-                for (std::size_t i = 0; i < values.size(); ++i) text += equation(formula.left[i], values[i]);
+                for (std::size_t i = 0; i < values.size(); ++i) text += text_equation(formula.left[i], values[i]);
         }
     }
     text += heading("Structure") + "\n";

@@ -57,14 +57,14 @@ public:
         return whole;
     }
 
-    Crossing crossing() {
+    EventSyntax crossing() {
         refuse_emptiness();
         has_direction_ = true;
         Syntax left = read_sum();
         if (!token().is('=')) fail_rest("an event is written x = 0, x = 0 rising or x = y falling");
         const Token equals = tokens_[next_++];
         Syntax right = read_sum();
-        Crossing crossing;
+        EventSyntax crossing;
         if (at_direction()) crossing.direction = tokens_[next_++].text == "rising" ? 1 : -1;
         if (token().is('=')) fail(token(), "an event has one =");
         refuse_rest();
@@ -439,7 +439,7 @@ Syntax parse_formula(const Source& source, const Text& text, const Scope& scope)
     return parser_of(source, text, scope).formula();
 }
 
-Crossing parse_crossing(const Source& source, const Text& text, const Scope& scope) {
+EventSyntax parse_crossing(const Source& source, const Text& text, const Scope& scope) {
     return parser_of(source, text, scope).crossing();
 }
 

@@ -54,11 +54,11 @@ struct Scope {
 Syntax parse_formula(const Source& source, const Text& text, const Scope& scope);
 
 // "left = right", "left = right rising", "left = right falling".
-struct Crossing {
+struct EventSyntax {
     Syntax difference;  // left - right
     int direction = 0;  // rising 1, falling -1
 };
-Crossing parse_crossing(const Source& source, const Text& text, const Scope& scope);
+EventSyntax parse_crossing(const Source& source, const Text& text, const Scope& scope);
 
 // A name to declare or to give a force to: "r", "r[i,j]", "x[3]".
 struct Subject {

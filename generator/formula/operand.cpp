@@ -25,7 +25,7 @@ double size_of(const numeric& number) {
 }
 
 // The extent of a whole expression. `left` counts down; at 0 the expression is too large and the rest is not looked at.
-void visit(const ex& expression, int level, int function_level, double& left, Extent& extent) {
+void visit(const ex& expression, int level, int function_level, double& left, Bounds& extent) {
     if (--left < 0) return;
     ++extent.size;
     extent.levels = std::max(extent.levels, level);
@@ -44,7 +44,7 @@ void visit(const ex& expression, int level, int function_level, double& left, Ex
     for (const ex& operand : expression) visit(operand, level + 1, function_level + function, left, extent);
 }
 
-bool within_limits(const Extent& extent) {
+bool within_limits(const Bounds& extent) {
     return extent.number_bits <= ExpressionLimits::number_bits && extent.exponent <= ExpressionLimits::exponent &&
            extent.size <= ExpressionLimits::size && extent.levels <= ExpressionLimits::levels &&
            extent.function_depth <= ExpressionLimits::function_depth;
@@ -58,8 +58,8 @@ bool has_complex_coefficient(const ex& expression) {
 }
 
 // What two operands hold side by side, with an operation above them.
-Extent joined(const Extent& a, const Extent& b) {
-    Extent both;
+Bounds joined(const Bounds& a, const Bounds& b) {
+    Bounds both;
     both.number_bits = std::max(a.number_bits, b.number_bits);
     both.exponent = std::max(a.exponent, b.exponent);
     both.size = a.size + b.size + 1;
@@ -69,8 +69,8 @@ Extent joined(const Extent& a, const Extent& b) {
 }
 
 // A number times a sum, or a product to a power, becomes one of each term or factor.
-Extent distributed(const Extent& a, const ex& over) {
-    Extent result = a;
+Bounds distributed(const Bounds& a, const ex& over) {
+    Bounds result = a;
     result.size += 2 * static_cast<double>(over.nops());
     result.levels += 1;
     return result;
@@ -130,7 +130,7 @@ void Arithmetic::fail_size() const {
 
 // Replaces the upper bounds by what there is.
 void Arithmetic::measure(Operand& operand) const {
-    Extent extent;
+    Bounds extent;
     extent.size = 0;
     double left = ExpressionLimits::size + 1;
     visit(operand.expression, 1, 0, left, extent);
@@ -140,7 +140,7 @@ void Arithmetic::measure(Operand& operand) const {
 
 void Arithmetic::check(Operand& result) const {
     if (!within_limits(result.extent) || has_complex_coefficient(result.expression)) measure(result);
-    const Extent& extent = result.extent;
+    const Bounds& extent = result.extent;
     if (!extent.real) throw Refusal(fmt::format("{} is not a real number here", formula_));
     if (extent.number_bits > ExpressionLimits::number_bits) fail_number();
     if (extent.exponent > ExpressionLimits::exponent)
@@ -159,7 +159,7 @@ void Arithmetic::check(Operand& result) const {
 // throws, is refused.
 template <typename Compute, typename Value>
 Operand Arithmetic::compute(const std::string& operation, const std::vector<const Operand*>& operands,
-                            const Extent& bound, const Compute& expression, const Value& value) const {
+                            const Bounds& bound, const Compute& expression, const Value& value) const {
     const bool stays_rational = operation == "+" || operation == "-" || operation == "*";
     double parts = 1;
     Operand result;
@@ -217,7 +217,7 @@ Operand Arithmetic::number(const std::string& written) const {
 }
 
 Operand Arithmetic::add(const Operand& a, const Operand& b) const {
-    Extent bound = joined(a.extent, b.extent);
+    Bounds bound = joined(a.extent, b.extent);
     bound.number_bits = a.extent.number_bits + b.extent.number_bits + 1;
     return compute(
         "+", {&a, &b}, bound, [&] { return a.expression + b.expression; },
@@ -227,7 +227,7 @@ Operand Arithmetic::add(const Operand& a, const Operand& b) const {
 }
 
 Operand Arithmetic::multiply(const Operand& a, const Operand& b) const {
-    Extent bound = joined(distributed(a.extent, a.expression), distributed(b.extent, b.expression));
+    Bounds bound = joined(distributed(a.extent, a.expression), distributed(b.extent, b.expression));
     bound.number_bits = a.extent.number_bits + b.extent.number_bits;
     bound.exponent = a.extent.exponent + b.extent.exponent + 2;  // q*q is a square
     return compute(
@@ -249,7 +249,7 @@ Operand Arithmetic::invert(const Operand& a) const {
 }
 
 Operand Arithmetic::raise(const Operand& base, const Operand& exponent) const {
-    Extent bound = joined(distributed(base.extent, base.expression), exponent.extent);
+    Bounds bound = joined(distributed(base.extent, base.expression), exponent.extent);
     if (is_a<numeric>(exponent.expression)) {
         const numeric n = ex_to<numeric>(exponent.expression);
         const bool number = is_a<numeric>(base.expression);
@@ -283,7 +283,7 @@ Operand Arithmetic::raise(const Operand& base, const Operand& exponent) const {
 }
 
 Operand Arithmetic::call(const Function& function, const Operand& argument) const {
-    Extent bound = argument.extent;
+    Bounds bound = argument.extent;
     bound.size += 2;
     bound.levels += 1;
     bound.function_depth += 1;

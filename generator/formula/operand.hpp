@@ -28,7 +28,7 @@ struct ExpressionLimits {
 
 // Upper bounds of what an expression holds. They grow with every operation, without a look at the whole expression; the
 // whole is measured only when a bound passes its limit.
-struct Extent {
+struct Bounds {
     double number_bits = 0;  // of the largest exact number
     double exponent = 0;     // the largest whole exponent of anything but a number
     double size = 1;         // numbers, names and operations
@@ -40,7 +40,7 @@ struct Extent {
 struct Operand {
     GiNaC::ex expression;
     std::optional<GiNaC::numeric> value;  // present when the expression is constant: exact, or 60 digits
-    Extent extent;
+    Bounds extent;
     // What occurs in it.
     bool moves = false;  // positions or the time
     bool velocities = false;
@@ -85,7 +85,7 @@ public:
 
 private:
     template <typename Compute, typename Value>
-    Operand compute(const std::string& operation, const std::vector<const Operand*>& operands, const Extent& bound,
+    Operand compute(const std::string& operation, const std::vector<const Operand*>& operands, const Bounds& bound,
                     const Compute& expression, const Value& value) const;
     void check(Operand& result) const;
     void measure(Operand& operand) const;

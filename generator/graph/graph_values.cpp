@@ -32,7 +32,8 @@ std::optional<Op> function_op(const std::string& name) {
     return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
 }
 
-const cln::cl_F largest = cln::cl_float(cln::expt_pos(cln::cl_I(10), 5000), format);  // __float128 ends at 1e4932
+const cln::cl_F largest_number =
+    cln::cl_float(cln::expt_pos(cln::cl_I(10), 5000), format);  // __float128 ends at 1e4932
 
 // Powers of exact numbers stay exact up to this size.
 constexpr double most_bits = 100000;
@@ -51,7 +52,7 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         throw DomainError("a value beyond all numbers of the kernel");
     }
     const bool angle = op == Op::sin || op == Op::pair_sine || op == Op::cos || op == Op::pair_cosine || op == Op::tan;
-    if (angle && cln::abs(real(x[0])) > largest) throw DomainError("a value beyond all numbers of the kernel");
+    if (angle && cln::abs(real(x[0])) > largest_number) throw DomainError("a value beyond all numbers of the kernel");
     switch (op) {
         case Op::add: {
             cln::cl_R sum = 0;

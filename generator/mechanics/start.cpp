@@ -18,7 +18,7 @@ namespace {
 using GiNaC::ex;
 using Numbers = std::vector<cln::cl_R>;
 
-std::size_t at(int index) {
+std::size_t unsigned_index(int index) {
     return static_cast<std::size_t>(index);
 }
 
@@ -141,8 +141,9 @@ private:
                 require(
                     value,
                     [&, row = place.first, column = place.second, entry = value] {
-                        return fmt::format("the second derivative d2L/d{}d{} = {} has no value", of[at(row)].get_name(),
-                                           by[at(column)].get_name(), short_text(entry));
+                        return fmt::format("the second derivative d2L/d{}d{} = {} has no value",
+                                           of[unsigned_index(row)].get_name(), by[unsigned_index(column)].get_name(),
+                                           short_text(entry));
                     },
                     lagrangian);
         };

@@ -14,15 +14,6 @@ using GiNaC::pow;
 
 namespace {
 
-ex h() {
-    return symbol("h");
-}
-ex m() {
-    return symbol("m");
-}
-ex omega() {
-    return symbol("omega");
-}
 ex x() {
     return pow(h() * omega(), 2);
 }

@@ -24,6 +24,17 @@ struct Oscillator {
 
 const Oscillator& oscillator();
 
+// Its symbols in the paper's notation.
+inline GiNaC::ex h() {
+    return symbol("h");
+}
+inline GiNaC::ex m() {
+    return symbol("m");
+}
+inline GiNaC::ex omega() {
+    return symbol("omega");
+}
+
 // The polynomial in r with these roots and leading coefficient has `sign` on begin < r < end: no root inside, sign at
 // the middle.
 bool keeps_sign(const GiNaC::ex& polynomial, const GiNaC::ex& leading, const std::vector<GiNaC::ex>& roots,

@@ -14,16 +14,6 @@ using GiNaC::pow;
 
 namespace {
 
-ex h() {
-    return symbol("h");
-}
-ex m() {
-    return symbol("m");
-}
-ex omega() {
-    return symbol("omega");
-}
-
 std::vector<ex> root_pair() {
     return {42 - 6 * GiNaC::sqrt(ex(29)), 42 + 6 * GiNaC::sqrt(ex(29))};
 }

@@ -227,7 +227,7 @@ private:
             if (event.text.size() > longest_event)
                 fail(item.at, fmt::format("an event of {} bytes; at most {}", event.text.size(), longest_event));
             const Scope scope = system_.scope_of("the event", true);
-            const Crossing crossing = parse_crossing(source_, item.text, scope);
+            const EventSyntax crossing = parse_crossing(source_, item.text, scope);
             const Operand value = evaluate(source_, crossing.difference, scope);
             if (!value.moves && !value.velocities)
                 fail(item.at, "this event never happens: it holds neither a coordinate nor the time");

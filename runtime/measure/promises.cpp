@@ -16,7 +16,7 @@ namespace lobatto {
 namespace {
 
 template <class real>
-real size(real x) {
+real magnitude(real x) {
     return x < 0 ? -x : x;
 }
 
@@ -39,7 +39,7 @@ std::vector<real> inverse(std::vector<real> matrix, std::size_t rows) {
     for (std::size_t k = 0; k < rows; ++k) {
         std::size_t pivot = k;
         for (std::size_t i = k + 1; i < rows; ++i)
-            if (size(matrix[i * rows + k]) > size(matrix[pivot * rows + k])) pivot = i;
+            if (magnitude(matrix[i * rows + k]) > magnitude(matrix[pivot * rows + k])) pivot = i;
         for (std::size_t j = 0; j < rows; ++j) {
             std::swap(matrix[k * rows + j], matrix[pivot * rows + j]);
             std::swap(result[k * rows + j], result[pivot * rows + j]);
@@ -136,11 +136,11 @@ Return there_and_back(const Kernel& kernel, const std::vector<real>& parameters,
         real moved = 0, missed = 0, growth = 0;
         for (std::size_t i = block; i < block + n; ++i) {
             moved = std::max(moved, extent.range[i]);
-            missed = std::max(missed, size(end[i] - start[i]));
+            missed = std::max(missed, magnitude(end[i] - start[i]));
             growth = std::max(growth, extent.largest[i]);
             for (const std::vector<real>& back : returns)
                 for (std::size_t j = 0; j < rows; ++j)
-                    growth = std::max(growth, size(back[i * rows + j]) * extent.largest[j]);
+                    growth = std::max(growth, magnitude(back[i * rows + j]) * extent.largest[j]);
         }
         constexpr double roundings = 64;  // of a step, all the same way; measured: 0.8 on the linear oscillator, 53 on
                                           // 16 coordinates
@@ -175,16 +175,17 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
     const real h = step;
     std::vector<real> sizes(rows), shifts(rows);
     for (std::size_t i = 0; i < rows; ++i) {
-        const real moved = i < n ? std::max(size(h * velocity[i]), size(after[i] - before[i])) : size(h * force[i - n]);
-        sizes[i] = std::max(size(before[i]), size(after[i]));
-        shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * size(before[i]));
+        const real moved =
+            i < n ? std::max(magnitude(h * velocity[i]), magnitude(after[i] - before[i])) : magnitude(h * force[i - n]);
+        sizes[i] = std::max(magnitude(before[i]), magnitude(after[i]));
+        shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * magnitude(before[i]));
     }
     // A component that only rounding moves from 0, as the radial momentum of a circular orbit, has the size that a part
     // of another would give it.
     const std::vector<real> own = sizes;
     for (std::size_t i = 0; i < rows; ++i) {
         real given = 0;
-        for (std::size_t j = 0; j < rows; ++j) given = std::max(given, size(T[i * rows + j]) * own[j]);
+        for (std::size_t j = 0; j < rows; ++j) given = std::max(given, magnitude(T[i * rows + j]) * own[j]);
         if (own[i] < real(1e-12) * given) {
             sizes[i] = given;
             shifts[i] = std::max(shifts[i], real(1e-14) * given);
@@ -194,8 +195,8 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
     real to_q = 0, to_p = 0;
     for (std::size_t i = 0; i < n; ++i)
         for (std::size_t j = n; j < rows; ++j) {
-            to_q = std::max(to_q, size(T[i * rows + j]));
-            to_p = std::max(to_p, size(T[j * rows + i]));
+            to_q = std::max(to_q, magnitude(T[i * rows + j]));
+            to_p = std::max(to_p, magnitude(T[j * rows + i]));
         }
     const real unit = to_q > 0 && to_p > 0
                           ? static_cast<real>(std::sqrt(static_cast<double>(to_p) / static_cast<double>(to_q)))
@@ -243,8 +244,8 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             real largest = 0, difference = 0;
             for (std::size_t i = 0; i < rows; ++i) {
                 const real slope = (8 * (f1[i] - b1[i]) - (f2[i] - b2[i])) / (12 * e);
-                largest = std::max(largest, size(T[i * rows + j]) / sizes[i]);
-                difference = std::max(difference, size(T[i * rows + j] - slope) / sizes[i]);
+                largest = std::max(largest, magnitude(T[i * rows + j]) / sizes[i]);
+                difference = std::max(difference, magnitude(T[i * rows + j] - slope) / sizes[i]);
             }
             if (best < 0 || difference / largest < best) best = difference / largest;
         }
@@ -273,10 +274,10 @@ double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std
             throw ComputationError("the energy cannot be compared: a kernel refuses a state");
         real kinetic = 0;
         for (std::size_t k = 0; k < q.size(); ++k) kinetic += p[k] * velocity[k] / 2;
-        if (size(kinetic) + size(H - kinetic) > real(std::numeric_limits<double>::max()) / 4) continue;
+        if (magnitude(kinetic) + magnitude(H - kinetic) > real(std::numeric_limits<double>::max()) / 4) continue;
         is_compared = true;
-        difference = std::max(difference, size(real(H_double) - H));
-        largest = std::max(largest, size(kinetic) + size(H - kinetic));
+        difference = std::max(difference, magnitude(real(H_double) - H));
+        largest = std::max(largest, magnitude(kinetic) + magnitude(H - kinetic));
     }
     if (!is_compared) return std::nan("");
     return difference > 0 ? static_cast<double>(difference / largest) : 0.0;

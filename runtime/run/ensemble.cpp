@@ -20,22 +20,15 @@
 #include <thread>
 
 #include "runtime/error.hpp"
+#include "runtime/run/timing.hpp"
 
 namespace lobatto {
 
 namespace {
 
 constexpr double chunk_seconds = 0.02;      // of steps between two looks at the interruption
-constexpr double progress_seconds = 0.1;    // between two reports
 constexpr std::int64_t largest_group = 64;  // trajectories; handing one over takes about a microsecond
 constexpr std::int64_t rows_of_group = 4096;
-
-// Of this thread: other programs on the machine do not count.
-double processor_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 const double no_number = std::numeric_limits<double>::quiet_NaN();
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The host's side of a run: how many steps to ask the kernel for at a time, and what to say when it stops.
 #include "runtime/run/trajectory.hpp"
+#include "runtime/run/timing.hpp"
 
 #include <fmt/format.h>
 
@@ -19,16 +20,8 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Of this thread: other programs on the machine do not count.
-double processor_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-constexpr std::int64_t rows_at_once = 4096;  // the records in memory, however long the run
-constexpr double block_seconds = 0.02;       // of a block of steps: an interruption is noticed within about twice this
-constexpr double progress_seconds = 0.1;
+constexpr std::int64_t rows_at_once = 4096;   // the records in memory, however long the run
+constexpr double block_seconds = 0.02;        // of a block of steps: an interruption is noticed within about twice this
 constexpr double checkpoint_seconds = 0.1;    // between two checkpoints, unless
 constexpr double checkpoint_part = 1.0 / 50;  // of the time would go into them
 
