@@ -24,8 +24,9 @@ void append_part(std::string& whole, const std::string& text) {
 
 // What a library of this kernel is compiled from.
 std::string support_of(const KernelSource& source, bool is_ensemble) {
-    if (source.stepper.empty()) return support_text();
-    std::vector<std::string> names = {source.stepper, "base/angles.hpp", "steppers/events.hpp"};
+    if (source.support.empty()) return support_text();
+    std::vector<std::string> names = source.support;
+    names.push_back("steppers/events.hpp");
     if (is_ensemble) names.push_back("steppers/ensemble.hpp");
     if (is_ensemble && source.form == Form::separable) names.push_back("iteration/ensemble_fixed_point.hpp");
     return support_text(names);

@@ -2,6 +2,8 @@
 // The one place that calls the stages in order.
 #include "generator/pipeline.hpp"
 
+#include <fmt/format.h>
+
 #include "generator/formula/limits.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/programs/programs.hpp"
@@ -66,7 +68,37 @@ KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
     const Scene& scene = derivation.scene;
     const Limits limits(scene.path);
     try {
-        return emit_kernel(derivation, build_programs(derivation), options);
+        return emit_kernel(derivation, optimised_programs(derivation), options);
+    } catch (const DomainError& error) {
+        scene.source.fail(scene.lagrangian_at,
+                          std::string("no kernel can be written for the Lagrangian: ") + error.what());
+    }
+}
+
+PlainSource emit_plain(Scene scene, Precision precision) {
+    const auto refuse = [&](const std::string& why) { throw InputError(scene.path + ": " + why); };
+    if (precision == Precision::quadruple)
+        refuse(
+            "the plain text has the functions of the standard library, which knows no quadruple precision; choose "
+            "--precision long-double");
+    if (scene.method.arithmetic == StepArithmetic::clean)
+        refuse("the plain text has no clean arithmetic; add --arithmetic plain");
+    if (scene.coordinates.size() > static_cast<std::size_t>(plain_limit))
+        refuse(
+            fmt::format("the plain text writes every formula out, for at most {} coordinates, but the scene has {}; "
+                        "leave out --plain",
+                        plain_limit, scene.coordinates.size()));
+    scene.outputs.energy = true;
+    Derivation derivation = derive(scene);
+    const Limits limits(scene.path);
+    // No shortcuts: they are worth their lines only where speed is asked for.
+    if (derivation.structure.form == Form::general)
+        derivation = derive(scene, true);
+    else
+        derivation.structure.form = Form::separable;
+    derivation.structure.looped = false;
+    try {
+        return emit_plain(derivation, optimised_programs(derivation), precision);
     } catch (const DomainError& error) {
         scene.source.fail(scene.lagrangian_at,
                           std::string("no kernel can be written for the Lagrangian: ") + error.what());

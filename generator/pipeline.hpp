@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The one place that calls the stages in order: scene -> system -> quadrature -> structure -> (discretisation) -> graph
-// -> passes -> kernel source.
+// The one place that calls the stages in order: scene -> system -> quadrature -> structure -> programs -> passes ->
+// kernel source. The programs, optimised, are the same for all who ask: optimised_programs (generator/programs).
 #pragma once
 
 #include "generator/emit/kernel.hpp"
+#include "generator/emit/plain.hpp"
 #include "generator/mechanics/derivation.hpp"
 
 namespace lobatto {
@@ -13,5 +14,7 @@ Derivation derive(const Scene& scene, bool general = false);
 // The same system by another member of the family: only what depends on it is found anew.
 Derivation with_method(const Derivation& derivation, const Method& method);
 KernelSource emit(const Derivation& derivation, const EmitOptions& options = {});
+// The integrator as a textbook prints it. InputError where a scene or its method has no such text.
+PlainSource emit_plain(Scene scene, Precision precision);
 
 }  // namespace lobatto

@@ -183,7 +183,8 @@ TEST_CASE("no two headers define a type of the same name: the linker would mix t
     std::map<std::string, std::string> home;  // by namespace and name
     for (const char* half : {"generator", "runtime", "analysis", "cli"})
         for (const fs::path& file : sources(half)) {
-            if (file.extension() == ".cpp") continue;
+            // Kernel headers are compiled into kernels, not into the program.
+            if (file.extension() == ".cpp" || file.string().find("runtime/kernel/") != std::string::npos) continue;
             std::string space;
             std::smatch match;
             for (const std::string& line : lines(file)) {

@@ -138,11 +138,9 @@ void print(const Checked& checked) {
                                : output.operations == 0
                                    ? output.text
                                    : fmt::format("{}: {} operations", output.text, output.operations));
-    // A general kernel has one function for all points of a step, and loops over them.
-    const bool written_out = derivation.structure.form != Form::general && derivation.structure.unrolled;
-    print_row("operations", fmt::format("{} in all its formulas, each counted once{}{}", checked.operations,
-                                        compared(checked.operations, checked.operations_without),
-                                        written_out ? ", for one point of a step" : ""));
+    // One function serves all points of a step.
+    print_row("operations", fmt::format("{} in all its formulas, each counted once{}", checked.operations,
+                                        compared(checked.operations, checked.operations_without)));
     print_row("derived and written in", fmt::format("{:.2f} s", checked.seconds));
 }
 

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -34,6 +35,7 @@ struct EmitCommand {
     Precision precision = Precision::double_;
     bool standalone = false;
     bool no_support = false;
+    bool plain = false;
 };
 
 [[noreturn]] void fail_to_write(const fs::path& path, const std::string& reason) {
@@ -105,18 +107,43 @@ void check_digits(const Scene& scene, Precision precision) {
             scene.path, scene.method.name(), known));
 }
 
+// The folder, made where it is not there, and the file in it, which must not be the scene.
+fs::path path_for(const EmitCommand& options, const std::string& name) {
+    std::error_code error;
+    fs::create_directories(options.folder, error);
+    if (error) fail_to_write(options.folder, error.message());
+    const fs::path path = fs::path(options.folder) / (name + ".hpp");
+    keep_scene(options.scene, path);
+    return path;
+}
+
+void write_plain(const PlainSource& source, const EmitCommand& options) {
+    const fs::path path = path_for(options, source.name);
+    write_atomically(path, source.header);
+    fmt::print(std::cout,
+               "Wrote {0}, {1} lines\n\nUse it:\n"
+               "  #include \"{2}.hpp\"  // g++ -std=c++17 -O2 -I {3} program.cpp\n"
+               "  {2}::Parameters parameters;\n"
+               "  {2}::State x = {2}::start(parameters);\n"
+               "  {2}::step(parameters, h, x);  // state: x.t, x.q, x.p; false: the step was not solved\n",
+               path.string(), std::count(source.header.begin(), source.header.end(), '\n'), source.name,
+               shell_word(options.folder));
+}
+
 void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
     check_digits(scene, options.precision);
-    const KernelSource source =
-        emit(derive(scene, options.general), {options.precision, options.standalone ? support_text() : std::string()});
+    if (options.plain) {
+        write_plain(emit_plain(scene, options.precision), options);
+        return;
+    }
+    EmitOptions emit_options{options.precision, {}};
+    if (options.standalone)
+        emit_options.support_text = [](const std::vector<std::string>& parts) { return support_text(parts); };
+    const KernelSource source = emit(derive(scene, options.general), emit_options);
 
-    std::error_code error;
-    fs::create_directories(options.folder, error);
-    if (error) fail_to_write(options.folder, error.message());
-    const fs::path path = fs::path(options.folder) / (source.name + ".hpp");
-    keep_scene(options.scene, path);
+    const fs::path path = path_for(options, source.name);
     if (!options.standalone && !options.no_support) {
         if (source.name == "kernel")
             throw InputError(
@@ -146,7 +173,8 @@ void add_emit(CommandLine& program) {
         .required()
         .shown_as("FOLDER");
     options->method.add_to(command);
-    command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+    const Option general =
+        command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
     command
         .choice("--precision", options->precision,
                 {{"float", Precision::single},
@@ -157,9 +185,16 @@ void add_emit(CommandLine& program) {
         .shown_as("TYPE");
     const Option standalone =
         command.flag("--standalone", options->standalone, "one file that carries kernel.hpp inside");
-    command.flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
-        .excludes(standalone);
-    command.footer("Example:\n  lobatto emit scenes/pendulum.toml -o kernels");
+    const Option no_support =
+        command.flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
+            .excludes(standalone);
+    command
+        .flag("--plain", options->plain,
+              "the integrator as a textbook prints it: one short C++17 header, to read and to copy; slower")
+        .excludes(standalone)
+        .excludes(no_support)
+        .excludes(general);
+    command.footer("Example:\n  lobatto emit scenes/pendulum.toml --plain -o kernels");
     command.does([options] { emit_scene(*options); });
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/accuracy/taken_steps.hpp"
 #include "analysis/exact_start.hpp"
 #include "analysis/kernel_of.hpp"
 #include "cli/commands/commands.hpp"
@@ -127,6 +128,34 @@ Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& 
     return row;
 }
 
+// What the compiled steps leave in the equations that they were derived from, whatever iteration found them.
+void taken_steps(std::vector<Row>& rows, const Derivation& derivation, const Kernel& kernel, const Kernel& exact_kernel,
+                 const Start<double>& start, const Start<__float128>& exact) {
+    constexpr double bound = 16;  // roundings
+    const std::string claim = "steps solve the discrete Euler-Lagrange equations: ",
+                      meaning =
+                          "the steps that were taken do not solve their equations; the step is too long, or the "
+                          "kernel is wrong";
+    rows.push_back(at_most(claim + "one trajectory, double",
+                           trajectory_leaves(derivation, kernel, start.parameters, start.q, start.p, start.step), bound,
+                           meaning));
+    rows.push_back(at_most(claim + "one trajectory, quadruple",
+                           trajectory_leaves(derivation, exact_kernel, exact.parameters, exact.q, exact.p, exact.step),
+                           bound, meaning));
+    const Kernel ensemble = ensemble_kernel_of(emit(derivation), Precision::double_, 64);
+    if (ensemble->lanes == 0)
+        rows.push_back({claim + "ensembles", "no lanes", "as one trajectory", true, ""});
+    else
+        rows.push_back(at_most(
+            claim + "a lane of an ensemble",
+            lane_leaves(derivation, kernel, ensemble, start.parameters, start.q, start.p, start.step), bound, meaning));
+    if (kernel->unknowns > 0 && start.q.size() <= tangent_limit)
+        rows.push_back(
+            at_most("Jacobian of Newton's iteration against differences",
+                    jacobian_defect(derivation, exact_kernel, exact.parameters, exact.q, exact.p, exact.step), 1e-12,
+                    "the Jacobian is not the derivative of the step's equations"));
+}
+
 void momenta(std::vector<Row>& rows, const Kernel& kernel, const Start<double>& start, const Scene& scene) {
     std::vector<std::string> names;
     for (const Coordinate& coordinate : scene.coordinates) names.push_back(coordinate.name);
@@ -201,22 +230,21 @@ void verify(const VerifyOptions& options) {
     if (!step.is_positive())
         throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
     const Derivation derivation = derive(scene);
-    Programs programs = build_programs(derivation);
     EmitOptions emit_options;
     const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
     emit_options.precision = Precision::quadruple;
     const Kernel exact_kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
-    optimise(programs);
 
     fmt::print("{}: {} ({})\n", options.scene, scene.title, scene.method.name());
     std::vector<Row> rows;
-    for (const auto& checks :
-         {check_quadrature(derivation.quadrature), check_equations(derivation), check_programs(derivation, programs)})
+    for (const auto& checks : {check_quadrature(derivation.quadrature), check_equations(derivation),
+                               check_programs(derivation, optimised_programs(derivation).programs)})
         for (const Check& check : checks) rows.push_back(row_of(check));
 
     const auto start = start_with_step<double>(exact_start, step, kernel);
     const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
     const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
+    taken_steps(rows, derivation, kernel, exact_kernel, start, exact);
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
                                     [](const GiNaC::ex& force) { return !force.is_zero(); });

@@ -143,7 +143,7 @@ Kernel paper_kernel(PaperSystem system, int points, Precision precision, StepAri
                         scene_text(system, points));
     Scene scene = read_scene(source);
     scene.method.arithmetic = arithmetic;
-    return kernel_of(emit(derive(scene), {.precision = precision, .standalone_support = ""}), precision);
+    return kernel_of(emit(derive(scene), {.precision = precision, .support_text = {}}), precision);
 }
 
 std::function<long double(const PaperState&)> discrete_energy_of(const Kernel& kernel, double step) {

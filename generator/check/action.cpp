@@ -1,42 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // One step of any system in numbers of 60 digits: the node's formulas and the sums over the nodes against differences
 // of the action itself (D25 ... D30).
-//
-// The cost grows with the formulas of one node, not with the equations of all of them: large systems are checked too.
 #include <algorithm>
 
 #include "generator/check/check.hpp"
+#include "generator/check/discrete_action.hpp"
 #include "generator/check/point.hpp"
 
 namespace lobatto {
 
 namespace {
 
-using Symbols = std::vector<GiNaC::symbol>;
-using Path = std::vector<Numbers>;  // positions at the control points, controls x coordinates
-
-class Step {
+class Step : DiscreteAction {
 public:
-    Step(const Derivation& derivation, int attempt)
-        : derivation_(derivation),
-          system_(derivation.system),
-          start_(derivation.scene, attempt),
-          n_(static_cast<std::size_t>(system_.n)) {
+    Step(const Derivation& derivation, int attempt) : DiscreteAction(derivation), start_(derivation.scene, attempt) {
         start_.set_all(formulas_);
-        t0_ = formulas_.get(system_.t);
-        h_ = start_.near(float_of(derivation.scene.evaluate(derivation.scene.run.step, "the step")));
-        const Quadrature& quadrature = derivation.quadrature;
-        control_ = formulas_(quadrature.control);
-        nodes_ = formulas_(quadrature.nodes);
-        weights_ = formulas_(quadrature.weights);
-        legendre_ = formulas_(quadrature.legendre);
-        B_ = values_of(quadrature.B);
-        is_straight_ = quadrature.is_explicit();
-        if (!is_straight_) D_ = values_of(quadrature.D);
-        lagrangian_ = formulas_.convert({system_.lagrangian});
-        momentum_ = formulas_.convert(system_.momentum);
-        force_ = formulas_.convert(system_.force);
-        outer_force_ = formulas_.convert(system_.outer_force);
+        begin(formulas_.get(system_.t),
+              start_.near(float_of(derivation.scene.evaluate(derivation.scene.run.step, "the step"))));
         q_ = values_of(system_.q);
         v_ = values_of(system_.v);
     }
@@ -65,20 +45,6 @@ private:
             {{claim, false, false, 0, difference_bound, meaning}, difference_defect(derivatives, difference)});
     }
 
-    Numbers values_of(const GiNaC::matrix& matrix) {
-        std::vector<GiNaC::ex> entries;
-        for (unsigned i = 0; i < matrix.rows(); ++i)
-            for (unsigned j = 0; j < matrix.cols(); ++j) entries.push_back(matrix(i, j));
-        return formulas_(entries);
-    }
-    Numbers values_of(const Symbols& symbols) const {
-        Numbers values;
-        for (const auto& symbol : symbols) values.push_back(formulas_.get(symbol));
-        return values;
-    }
-    void set(const Symbols& symbols, const Numbers& values) {
-        for (std::size_t i = 0; i < symbols.size(); ++i) formulas_.set(symbols[i], values[i]);
-    }
     static Numbers joined(Numbers x, const Numbers& y) {
         x.insert(x.end(), y.begin(), y.end());
         return x;
@@ -162,69 +128,6 @@ private:
         }
         return X;
     }
-    const cln::cl_R& B(std::size_t i, std::size_t j) const { return B_[i * control_.size() + j]; }
-    const cln::cl_R& D(std::size_t i, std::size_t j) const { return D_[i * control_.size() + j]; }
-    // (D28); of straight paths positions alone.
-    void set_node(std::size_t i, const Path& X, const Symbols& q, const Symbols& v) {
-        formulas_.set(system_.t, t0_ + nodes_[i] * h_);
-        for (std::size_t k = 0; k < q.size(); ++k) {
-            cln::cl_R position = 0, rise = 0;
-            for (std::size_t j = 0; j < X.size(); ++j) {
-                position = position + B(i, j) * X[j][k];
-                if (!is_straight_) rise = rise + D(i, j) * X[j][k];
-            }
-            formulas_.set(q[k], position);
-            formulas_.set(v[k], rise / h_);
-        }
-    }
-
-    // Straight between control points j and j + 1 (D40); the position is that of the start.
-    void set_straight(std::size_t j, const Path& X) {
-        set(system_.q, X.front());
-        for (std::size_t k = 0; k < n_; ++k)
-            formulas_.set(system_.v[k], (X[j + 1][k] - X[j][k]) / ((control_[j + 1] - control_[j]) * h_));
-    }
-
-    // Of straight paths L(q, v) - L(q, 0) is the kinetic energy, L(q, 0) at the nodes -V.
-    cln::cl_R action(const Path& X) {
-        cln::cl_R sum = 0;
-        for (std::size_t i = 0; i < nodes_.size(); ++i) {
-            set_node(i, X, system_.q, system_.v);
-            sum = sum + h_ * weights_[i] * formulas_.evaluate(lagrangian_)[0];
-        }
-        for (std::size_t j = 0; j + 1 < X.size() && is_straight_; ++j) {
-            formulas_.set(system_.t, t0_);
-            set_straight(j, X);
-            const cln::cl_R moving = formulas_.evaluate(lagrangian_)[0];
-            set(system_.v, Numbers(n_, cln::cl_R(0)));
-            sum = sum + h_ * (control_[j + 1] - control_[j]) * (moving - formulas_.evaluate(lagrangian_)[0]);
-        }
-        return sum;
-    }
-    // (D30) of all coordinates, controls x n: sum_i h b_i (D_ij/h p + B_ij f); with `outer` F alone in place of f, and
-    // no p: the virtual work.
-    Path slopes(const Path& X, bool outer = false) {
-        Path sums(X.size(), Numbers(n_, cln::cl_R(0)));
-        for (std::size_t i = 0; i < nodes_.size(); ++i) {
-            set_node(i, X, system_.q, system_.v);
-            const Numbers p = formulas_.evaluate(momentum_), f = formulas_.evaluate(outer ? outer_force_ : force_);
-            for (std::size_t j = 0; j < X.size(); ++j)
-                for (std::size_t k = 0; k < n_; ++k) {
-                    if (!outer && !is_straight_) sums[j][k] = sums[j][k] + weights_[i] * D(i, j) * p[k];
-                    sums[j][k] = sums[j][k] + h_ * weights_[i] * B(i, j) * f[k];
-                }
-        }
-        for (std::size_t j = 0; j + 1 < X.size() && is_straight_ && !outer; ++j) {
-            set_straight(j, X);
-            const Numbers p = formulas_.evaluate(momentum_);
-            for (std::size_t k = 0; k < n_; ++k) {
-                sums[j][k] = sums[j][k] - p[k];
-                sums[j + 1][k] = sums[j + 1][k] + p[k];
-            }
-        }
-        return sums;
-    }
-
     void slopes_of_the_action() {
         const Path X = path(q_, v_);
         const Path with_work = slopes(X), work = slopes(X, true);
@@ -489,15 +392,8 @@ private:
                 "what the kernel solves does not follow from the discrete action", one, other);
     }
 
-    const Derivation& derivation_;
-    const System& system_;
-    Formulas formulas_;
     NearStart start_;
-    const std::size_t n_;
-    bool is_straight_ = false;  // the path, from node to node
-    cln::cl_R t0_, h_;
-    Numbers control_, nodes_, weights_, legendre_, B_, D_, q_, v_, P0_;
-    std::vector<Id> lagrangian_, momentum_, force_, outer_force_;
+    Numbers q_, v_, P0_;
     std::vector<std::pair<Check, double>>* measured_ = nullptr;
 };
 

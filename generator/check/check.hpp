@@ -2,6 +2,8 @@
 // Identities that must hold for every scene: the derivation checked by second routes, exactly or at 40 digits.
 #pragma once
 
+#include <cln/cln.h>
+
 #include <string>
 #include <vector>
 
@@ -33,5 +35,18 @@ std::vector<Check> check_equations(const Derivation& derivation);
 std::vector<Check> check_action(const Derivation& derivation);
 // The programs that are emitted against the formulas of the discretisation.
 std::vector<Check> check_programs(const Derivation& derivation, const Programs& optimised);
+
+// One step that a kernel took. All numbers are those of the kernel, exactly.
+struct TakenStep {
+    std::vector<cln::cl_R> parameters;
+    cln::cl_R time, step;
+    // At the control points, controls x n. Start and end alone where the method is explicit or the system linear.
+    std::vector<std::vector<cln::cl_R>> positions;
+    std::vector<cln::cl_R> p0, p1;
+    cln::cl_R epsilon;  // relative rounding of the kernel's numbers
+};
+// What the step leaves in the discrete Euler-Lagrange equations (D28), in units of what the rounding of its positions
+// and momenta leaves there.
+double equations_left(const Derivation& derivation, const TakenStep& step);
 
 }  // namespace lobatto

@@ -38,27 +38,27 @@ public:
                            [&](const Program& p) { return p.name == name; });
     }
     void run(const std::string& name) {
-        for (const auto& [target, value] : outputs_of(name)) set(target, value);
+        for (const auto& [output, value] : outputs_of(name))
+            set(output.effect == Effect::give_back ? "return" : output.target, value);
     }
-    // The targets of a program and their values.
-    std::vector<std::pair<std::string, cln::cl_R>> outputs_of(const std::string& name) const {
+    // The outputs of a program and their values.
+    std::vector<std::pair<Output, cln::cl_R>> outputs_of(const std::string& name) const {
         const auto program = std::find_if(programs_.programs.begin(), programs_.programs.end(),
                                           [&](const Program& p) { return p.name == name; });
         std::vector<Id> roots;
         for (const Output& output : program->outputs) roots.push_back(output.value);
         const Numbers values = programs_.graph.evaluate(inputs(), roots);
-        std::vector<std::pair<std::string, cln::cl_R>> outputs;
+        std::vector<std::pair<Output, cln::cl_R>> outputs;
         for (const Output& output : program->outputs)
-            outputs.emplace_back(output.target, values[static_cast<std::size_t>(output.value)]);
+            outputs.emplace_back(output, values[static_cast<std::size_t>(output.value)]);
         return outputs;
     }
     // A program whose outputs are locals that later outputs use.
     void run_in_order(const std::string& name) {
-        const std::string local = "const real ";
         for (const Program& program : programs_.programs)
             for (const Output& output : program.outputs)
                 if (program.name == name)
-                    set(output.target.starts_with(local) ? output.target.substr(local.size()) : output.target,
+                    set(output.target,
                         programs_.graph.evaluate(inputs(), {output.value})[static_cast<std::size_t>(output.value)]);
     }
 
@@ -87,7 +87,6 @@ public:
           system_(derivation.system),
           formulas_(formulas),
           machine_(programs),
-          solves_(programs.solves),
           n_(static_cast<std::size_t>(system_.n)),
           m_(static_cast<std::size_t>(derivation.quadrature.points) - 2) {
         for (std::size_t i = 0; i < system_.parameters.size(); ++i)
@@ -110,24 +109,15 @@ public:
         if (is_stepped(derivation_)) {
             const Discretisation& d = derivation_.discretisation();
             machine_.set("h", formulas_.get(d.h));
-            if (structure.form == Form::linear_map) {
-                if (n_ == 1) propagation(d);
-            } else {
-                begin_step(d);
-                if (m_ > 0) {
-                    start_values();
-                    stages(d);
-                }
-                arrival(d);
-            }
+            propagation(d);
         }
         return measured_;
     }
 
-    // Whether the equations of the step are programs too.
+    // Whether the step itself is a program.
     static bool is_stepped(const Derivation& derivation) {
-        return derivation.structure.form != Form::general && derivation.structure.unrolled &&
-               !derivation.structure.looped && is_written_out(derivation.system, derivation.quadrature);
+        return derivation.structure.form == Form::linear_map && derivation.system.n == 1 &&
+               !derivation.quadrature.is_explicit();
     }
 
 private:
@@ -164,17 +154,6 @@ private:
         for (const auto& symbol : symbols) values.push_back(formulas_.get(symbol));
         return values;
     }
-    // At node i of the step.
-    void set_node(const Discretisation& d, std::size_t i) {
-        machine_.set("time", formulas_({d.t0 + derivation_.quadrature.c[i] * d.h})[0]);
-        machine_.set("q", values_of(d.Y[i]));
-    }
-    Numbers acceleration_at_node(const Discretisation& d, std::size_t i) {
-        set_node(d, i);
-        machine_.run("acceleration");
-        return machine_.get("W", n_);
-    }
-
     // p = dL/dq' and dL/dq + F by differentiating L as a whole where that is cheap; check_action compares the system's
     // own with differences of L.
     void slopes_of_L() {
@@ -304,13 +283,13 @@ private:
         else
             for (const auto& place : derivation_.structure.entries) entry.emplace(place, entry.size());
         const auto element_target = [](const std::string& array, std::size_t i) {
-            return array + "[" + std::to_string(i) + "] +=";
+            return array + "[" + std::to_string(i) + "]";
         };
         const auto add_energy = [&](const std::string& program) {
             if (!machine_.has(program)) return;
-            for (const auto& [target, value] : machine_.outputs_of(program)) add(target, value);
+            for (const auto& [output, value] : machine_.outputs_of(program)) add(output.target, value);
         };
-        for (const auto& [target, value] : machine_.outputs_of("rest_node")) add(target, value);
+        for (const auto& [output, value] : machine_.outputs_of("rest_node")) add(output.target, value);
         add_energy("rest_energy");
         const std::vector<Element>& elements = derivation_.structure.elements.repeated;
         for (std::size_t number = 0; number < elements.size(); ++number) {
@@ -325,15 +304,14 @@ private:
                     const Numbers a = formulas_(element.coefficients[row]);
                     for (std::size_t j = 0; j < a.size(); ++j) machine_.set("a" + std::to_string(j), a[j]);
                 }
-                for (const auto& [target, value] : machine_.outputs_of(name + "_node"))
+                for (const auto& [output, value] : machine_.outputs_of(name + "_node"))
                     for (std::size_t j = 0; j < element.x.size(); ++j) {
-                        if (target == slope + "[i" + std::to_string(j) + "] +=")
-                            add(element_target(slope, static_cast<std::size_t>(variable(j))), value);
-                        else if (target == slope + "[i" + std::to_string(j) + "] -=")
-                            add(element_target(slope, static_cast<std::size_t>(variable(j))), -value);
+                        if (output.target == slope + "[i" + std::to_string(j) + "]")
+                            add(element_target(slope, static_cast<std::size_t>(variable(j))),
+                                output.effect == Effect::subtract ? -value : value);
                         for (std::size_t column = 0; column < pairs.size() && j == 0; ++column)
-                            if (target == second + "[" + name + "_entry[r * " + std::to_string(pairs.size()) + " + " +
-                                              std::to_string(column) + "]] +=")
+                            if (output.target == second + "[" + name + "_entry[r * " + std::to_string(pairs.size()) +
+                                                     " + " + std::to_string(column) + "]]")
                                 add(element_target(second, entry.at({variable(pairs[column].first),
                                                                      variable(pairs[column].second)})),
                                     value);
@@ -359,7 +337,7 @@ private:
         compare(claim, expected_slope, computed_slope);
         compare(claim, expected_second, computed_second);
         if (machine_.has("rest_energy"))
-            compare(claim, general ? energy_ : formulas_({system_.potential}), {sum("sum +=")});
+            compare(claim, general ? energy_ : formulas_({system_.potential}), {sum("sum")});
     }
 
     void events() {
@@ -370,133 +348,6 @@ private:
         machine_.set("velocity", values_of(system_.v));
         machine_.run("event");
         compare("emitted events", formulas_(values), machine_.get("value", values.size()));
-    }
-
-    void begin_step(const Discretisation& d) {
-        const Numbers W0 = acceleration_at_node(d, 0);
-        machine_.set("p", values_of(d.p0));
-        machine_.run("velocity");
-        machine_.set("u", machine_.get("velocity", n_));
-        machine_.set("W0", W0);
-        machine_.run("drift");
-        compare("emitted drift velocity", formulas_(d.drift_velocity), machine_.get("v", n_));
-    }
-
-    // Q_i = base_i - h^2 sum_j A_ij w_j, with w_j = W0, or the polynomial through the last step's s accelerations at 1
-    // + c_j.
-    void start_values() {
-        const Quadrature& quadrature = derivation_.quadrature;
-        const std::size_t s = m_ + 2;
-        const Numbers A = formulas_(entries(quadrature.A)), W0 = machine_.get("W0", n_),
-                      base = machine_.get("base", n_ * m_);
-        Numbers before;
-        Noise noise(11);
-        for (std::size_t i = 0; i < s * n_; ++i) before.push_back(noise.next());
-        machine_.set("W_before", before);
-        const Numbers c = formulas_(quadrature.c);
-        Numbers extrapolation;  // Lagrange's polynomials on the nodes at 1 + c_j
-        for (std::size_t j = 1; j <= m_; ++j)
-            for (std::size_t i = 0; i < s; ++i) {
-                cln::cl_R product = 1;
-                for (std::size_t k = 0; k < s; ++k)
-                    if (k != i) product = product * (1 + c[j] - c[k]) / (c[i] - c[k]);
-                extrapolation.push_back(product);
-            }
-        const cln::cl_R h = machine_.get("h");
-        Numbers simple = base, extrapolated = base;
-        for (std::size_t i = 0; i < m_; ++i)
-            for (std::size_t j = 0; j < m_; ++j)
-                for (std::size_t k = 0; k < n_; ++k) {
-                    cln::cl_R w = 0;
-                    for (std::size_t r = 0; r < s; ++r) w = w + extrapolation[j * s + r] * before[r * n_ + k];
-                    simple[i * n_ + k] = simple[i * n_ + k] - h * h * A[i * m_ + j] * W0[k];
-                    extrapolated[i * n_ + k] = extrapolated[i * n_ + k] - h * h * A[i * m_ + j] * w;
-                }
-        machine_.run("simple_start");
-        compare("emitted start values", simple, machine_.get("Q", n_ * m_));
-        machine_.run("extrapolated_start");
-        compare("emitted start values", extrapolated, machine_.get("Q", n_ * m_));
-    }
-
-    void stages(const Discretisation& d) {
-        const auto& places = derivation_.structure.entries;
-        const std::size_t N = n_ * m_, e = places.size();
-        Numbers Q, W, S;
-        const auto append = [](Numbers& list, const Numbers& more) {
-            list.insert(list.end(), more.begin(), more.end());
-        };
-        for (std::size_t j = 1; j <= m_; ++j) {
-            set_node(d, j);
-            machine_.run("node");
-            append(Q, values_of(d.Y[j]));
-            append(W, machine_.get("W", n_));
-            append(S, machine_.get("S", e));
-        }
-        machine_.set("Q", Q);
-        machine_.set("W", W);
-        machine_.set("S", S);
-        const Numbers F = formulas_(d.reduced_system), J = formulas_(entries(d.reduced_jacobian));
-        machine_.run("residual");
-        compare("emitted stage equations", F, machine_.get("F", N));
-        machine_.run("jacobian");
-        compare("emitted Jacobian", J, machine_.get("J", N * N));
-        const Numbers delta = correction(F, J);
-        machine_.run("carry");
-        Numbers carried = W;
-        for (std::size_t j = 0; j < m_; ++j)
-            for (std::size_t i = 0; i < e; ++i) {
-                cln::cl_R& value = carried[j * n_ + static_cast<std::size_t>(places[i].first)];
-                value = value + S[j * e + i] * delta[j * n_ + static_cast<std::size_t>(places[i].second)];
-            }
-        compare("emitted Newton correction", carried, machine_.get("W", N));
-        machine_.set("W", W);
-    }
-
-    // J delta = -F, where the program solves it; where it leaves that to the elimination, J and -F themselves. Groups
-    // do not act on one another.
-    Numbers correction(const Numbers& F, const Numbers& J) {
-        const std::size_t N = F.size();
-        machine_.run_in_order("correction");
-        Numbers delta(N, cln::cl_R(0));
-        std::vector<bool> is_left(N, false);
-        for (const Solve& solve : solves_) {
-            const std::vector<std::size_t>& left = solve.unknowns;
-            const Numbers right = machine_.get("delta" + solve.mark, left.size()),
-                          matrix = machine_.get("J" + solve.mark, left.size() * left.size());
-            Numbers minus_F, block;
-            for (std::size_t i = 0; i < left.size(); ++i) {
-                minus_F.push_back(-F[left[i]]);
-                for (const std::size_t j : left) block.push_back(J[left[i] * N + j]);
-                is_left[left[i]] = true;
-            }
-            compare("emitted Newton correction", minus_F, right);
-            compare("emitted Newton correction", block, matrix);
-        }
-        for (std::size_t i = 0; i < N; ++i)
-            if (!is_left[i]) delta[i] = machine_.get("delta[" + std::to_string(i) + "]");
-        const Numbers product = times(J, delta);
-        Numbers minus_F, solved;
-        for (std::size_t i = 0; i < N; ++i) {
-            if (is_left[i]) {
-                delta[i] = -F[i];  // any value tells whether it is carried on rightly
-            } else {
-                minus_F.push_back(-F[i]);
-                solved.push_back(product[i]);
-            }
-        }
-        compare("emitted Newton correction", minus_F, solved);
-        machine_.set("delta", delta);
-        return delta;
-    }
-
-    void arrival(const Discretisation& d) {
-        machine_.run("arrive");
-        compare("emitted arrival", formulas_(d.arrival_position), machine_.get("q1", n_));
-        const Numbers W = m_ > 0 ? machine_.get("W", n_ * m_) : Numbers{};
-        machine_.set("W1", acceleration_at_node(d, m_ + 1));
-        machine_.set("W", W);
-        machine_.run("finish");
-        compare("emitted arrival", formulas_(d.arrival_momentum), times(mass_, machine_.get("u1", n_)));
     }
 
     // The closed form against the stage equations solved by numbers.
@@ -517,7 +368,6 @@ private:
     const System& system_;
     Formulas& formulas_;
     Machine machine_;
-    const std::vector<Solve>& solves_;
     std::size_t n_, m_;
     Numbers mass_;                               // n x n, of separable systems
     Numbers p_, force_, energy_;                 // at the point: n, n, 1

@@ -125,10 +125,9 @@ std::vector<GroupSolve> solves_of(const Derivation& derivation) {
             multipliers > 0 ? solve.unknowns - 1 : std::min((group.bandwidth + 1) * points, solve.unknowns) - 1;
         const bool free = !general && std::none_of(structure.entries.begin(), structure.entries.end(),
                                                    [&](const auto& e) { return e.first == group.coordinates.front(); });
-        solve.method = free || solve.unknowns == 0                                 ? "nothing to solve"
-                       : structure.unrolled && solve.unknowns <= closed_form_limit ? "closed formula"
-                       : structure.unrolled || 3 * solve.band >= solve.unknowns    ? "full matrix"
-                                                                                   : "banded matrix";
+        solve.method = free || solve.unknowns == 0        ? "nothing to solve"
+                       : 3 * solve.band >= solve.unknowns ? "full matrix"
+                                                          : "banded matrix";
         if (solve.unknowns > 0) solves.push_back(solve);
     }
     return solves;

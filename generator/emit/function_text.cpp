@@ -85,13 +85,12 @@ Hoisted::Hoisted(const Programs& programs) {
     }
 }
 
-FunctionText::FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                           Precision precision, Stage given, bool any_number, bool fuses,
-                           const std::map<Id, int>& angles) {
+FunctionText::FunctionText(const Programs& programs, const std::vector<Output>& statements, const Naming& external,
+                           const FunctionStyle& style) {
     const Graph& graph = programs.graph;
-    const char* const type = any_number ? "auto" : "real";
+    const char* const type = style.any_number ? "auto" : "real";
     std::vector<Id> roots;
-    for (const Statement& statement : statements) roots.push_back(statement.value);
+    for (const Output& statement : statements) roots.push_back(statement.value);
     // What this function computes: everything below the roots that is not given.
     std::vector<Id> computed;
     std::set<Id> here;
@@ -102,7 +101,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
             ++uses[id];
             if (!seen.insert(id).second) return;
             if (graph.is_constant(id) || graph[id].op == Op::input ||
-                (graph[id].stage <= given && !external(id).empty()))
+                (graph[id].stage <= style.given && !external(id).empty()))
                 return;
             for (const Id operand : graph[id].operands) visit(operand);
             computed.push_back(id);
@@ -123,7 +122,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
           "W1",    "q1",   "p1",  "u1", "W_before", "base", "delta", "velocity", "z",          "g",     "R", "H",
           "value", "rows", "how", "Lv", "Lq",       "M",    "S0",    "time",     "not_finite", "Status"})
         taken.insert(name);
-    if (!angles.empty()) taken.insert("angle");
+    if (!style.angles.empty()) taken.insert("angle");
     const auto take = [&taken](const std::string& name) {  // false when it has another meaning
         return !is_member_name(name) && taken.insert(name).second;
     };
@@ -150,26 +149,21 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         if (const auto known = local.find(id); known != local.end()) return known->second;
         return graph.is_constant(id) ? "" : external(id);
     };
+    const auto print = [&](Id id) { return formula(graph, id, style.notation, naming, style.precision, style.fuses); };
     const auto text_of = [&](Id id) {
         const std::string name = naming(id);
-        return name.empty() ? formula(graph, id, Notation::cpp, naming, precision, fuses) : name;
+        return name.empty() ? print(id) : name;
     };
 
-    const auto assign = [&](const Statement& statement) {
-        if (statement.target == "return")
-            text_ += wrapped(fmt::format("        return {};", text_of(statement.value)), "            ");
-        else if (statement.target == "require reciprocal")
-            text_ +=
-                wrapped(fmt::format("        if (!lobatto::is_reciprocal({})) return false;", text_of(statement.value)),
-                        "            ");
-        else if (statement.target == "return reciprocal")
-            text_ += wrapped(fmt::format("        return lobatto::is_reciprocal({});", text_of(statement.value)),
-                             "            ");
-        else if (statement.target.ends_with("+=") || statement.target.ends_with("-="))
-            text_ += wrapped(fmt::format("        {} {};", statement.target, text_of(statement.value)), "            ");
-        else
-            text_ +=
-                wrapped(fmt::format("        {} = {};", statement.target, text_of(statement.value)), "            ");
+    const auto assign = [&](const Output& statement) {
+        static const std::map<Effect, const char*> forms = {{Effect::assign, "{} = {};"},
+                                                            {Effect::add, "{} += {};"},
+                                                            {Effect::subtract, "{} -= {};"},
+                                                            {Effect::declare, "const real {} = {};"},
+                                                            {Effect::give_back, "{}return {};"}};
+        text_ += wrapped("        " + fmt::format(fmt::runtime(forms.at(statement.effect)), statement.target,
+                                                  text_of(statement.value)),
+                         "            ");
         // A field of k or a local constant may serve as the value's name from here on.
         if (statement.target.rfind("k.", 0) == 0 && !local.contains(statement.value) &&
             graph[statement.value].op != Op::input)
@@ -196,11 +190,18 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
                 }
                 const Id sine = graph[both[0]].op == Op::pair_sine ? both[0] : both[1];
                 const Id cosine = graph[both[0]].op == Op::pair_sine ? both[1] : both[0];
-                text_ +=
-                    fmt::format("        {} {}, {};\n", any_number ? "number" : "real", local[sine], local[cosine]);
-                const auto angle = angles.find(node.operands[0]);
+                if (style.notation == Notation::plain) {
+                    for (const Id half : {sine, cosine})
+                        text_ += wrapped(fmt::format("        const real {} = std::{}({});", local[half],
+                                                     half == sine ? "sin" : "cos", text),
+                                         "            ");
+                    return;
+                }
+                text_ += fmt::format("        {} {}, {};\n", style.any_number ? "number" : "real", local[sine],
+                                     local[cosine]);
+                const auto angle = style.angles.find(node.operands[0]);
                 const std::string function =
-                    angle == angles.end() ? "lobatto::sincos(" : fmt::format("angle.sincos({}, ", angle->second);
+                    angle == style.angles.end() ? "lobatto::sincos(" : fmt::format("angle.sincos({}, ", angle->second);
                 text_ += wrapped(fmt::format("        {}{}, {}, {});", function, text, local[sine], local[cosine]),
                                  "            ");
                 return;
@@ -210,13 +211,11 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Statement
         if (uses[id] > 1) {
             const auto wish = suggested.find(id);
             const std::string name = fresh(wish == suggested.end() ? "" : wish->second);
-            text_ += wrapped(fmt::format("        const {} {} = {};", type, name,
-                                         formula(graph, id, Notation::cpp, naming, precision, fuses)),
-                             "            ");
+            text_ += wrapped(fmt::format("        const {} {} = {};", type, name, print(id)), "            ");
             local[id] = name;
         }
     };
-    for (const Statement& statement : statements) {
+    for (const Output& statement : statements) {
         // The root itself is printed in its assignment, unless others use it too.
         const bool is_field = statement.target.rfind("k.", 0) == 0;
         if (is_field && !local.contains(statement.value)) {

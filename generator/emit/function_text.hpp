@@ -19,23 +19,22 @@ struct Hoisted {
     std::map<Id, std::string> names;  // field names: the scene's, those of the derivation, else k1, k2, ...
 };
 
-// One assignment: `target = value;`. "require reciprocal" ends the function with false where the value is none, "return
-// reciprocal" in any case.
-struct Statement {
-    std::string target;
-    Id value = 0;
+// How a function is written.
+struct FunctionStyle {
+    Precision precision = Precision::double_;
+    Stage given = Stage::constant;      // values up to this stage that have a name are not computed
+    bool any_number = false;            // a template on the type of numbers: locals are `auto`
+    bool fuses = false;                 // products are added by fused_sum()
+    Notation notation = Notation::cpp;  // or Notation::plain
+    std::map<Id, int> angles;           // pairs of sine and cosine that the argument `angle` gives, numbered
 };
 
-// Assignments as C++ lines, indented by 8. `external` names what the function is given (inputs, fields of k); a value
-// of a stage up to `given` that has no such name is a mistake of ours. Values used more than once become locals t1, t2,
-// ... or bear the name the derivation gave them; in a template on the type of numbers (`any_number`) they are `auto`.
-// Products are added by fused_sum() where it `fuses`. Sine and cosine of the pairs numbered in `angles` are asked from
-// the argument `angle`.
+// Assignments as C++ lines, indented by 8. `external` names what the function is given (inputs, fields of k). Values
+// used more than once become locals t1, t2, ... or bear the name the derivation gave them.
 class FunctionText {
 public:
-    FunctionText(const Programs& programs, const std::vector<Statement>& statements, const Naming& external,
-                 Precision precision, Stage given, bool any_number = false, bool fuses = false,
-                 const std::map<Id, int>& angles = {});
+    FunctionText(const Programs& programs, const std::vector<Output>& statements, const Naming& external,
+                 const FunctionStyle& style);
     const std::string& lines() const { return text_; }
 
 private:

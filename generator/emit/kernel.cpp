@@ -13,7 +13,6 @@
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/looped.hpp"
 #include "generator/emit/tables.hpp"
-#include "generator/graph/optimise.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "generator/programs/identifier.hpp"
 #include "generator/programs/programs.hpp"
@@ -34,47 +33,6 @@ std::string comment_safe(const std::string& text) {
     for (const char c : text) safe += static_cast<unsigned char>(c) < 32 || c == 127 ? ' ' : c;
     while (!safe.empty() && (safe.back() == '\\' || safe.back() == ' ')) safe.pop_back();
     return safe;
-}
-
-// What `whole` costs, about, in additions: as one program, or as `part` of each repeated formula, row by row.
-double cost_of(const Programs& programs, const Structure& structure, const std::string& whole,
-               const std::string& part) {
-    double sum = 0;
-    for (const Program& program : programs.programs) {
-        if (program.name != whole && !program.name.ends_with(part)) continue;
-        std::vector<Id> values;
-        for (const Output& output : program.outputs) values.push_back(output.value);
-        const Operations operations = count(programs.graph, programs.graph.topological(values));
-        double rows = 1;
-        for (std::size_t e = 0; e < structure.elements.repeated.size(); ++e)
-            if (program.name == fmt::format("element_{}{}", e + 1, part))
-                rows = static_cast<double>(structure.elements.repeated[e].rows.size());
-        sum += rows * static_cast<double>(operations.additions + operations.multiplications + 8 * operations.divisions +
-                                          16 * operations.functions);
-    }
-    return sum;
-}
-
-// Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
-// and five products for each of them (measured).
-bool is_costly(const Programs& programs, const Structure& structure) {
-    const double evaluation = cost_of(programs, structure, "acceleration", "_slope"),
-                 with_slopes = cost_of(programs, structure, "node", "_node");
-    return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
-}
-
-// Whether sweeps are solved by accelerations alone, without what is taken into the stage map. Passes may change what is
-// costly: a program that was left out before them stays so.
-bool takes_remainder(const Programs& programs, const Structure& structure) {
-    const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
-                                      [](const Program& program) { return program.name == "remainder"; });
-    return is_there && !structure.looped && !structure.is_explicit && !structure.clean &&
-           !is_costly(programs, structure);
-}
-
-// What sweeps evaluate at the nodes of a step.
-const char* swept_function(Form form) {
-    return form == Form::general ? "stage" : "node";
 }
 
 // The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered. Not
@@ -110,24 +68,24 @@ std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
 
 class Emitter {
 public:
-    Emitter(const Derivation& derivation, const Programs& programs, const EmitOptions& options)
+    Emitter(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options)
         : d_(derivation),
-          p_(programs),
+          optimised_(optimised),
+          p_(optimised.programs),
           options_(options),
-          hoisted_(programs),
-          looped_(derivation, programs, options.precision, [this](Id id) { return name_of(id); }),
+          hoisted_(optimised.programs),
+          looped_(derivation, optimised.programs, options.precision, [this](Id id) { return name_of(id); }),
           n_(derivation.system.n) {
         for (const Program& program : p_.programs)
-            if (program.name == swept_function(d_.structure.form) && has_near_angles())
-                angles_ = angles_of(p_.graph, program);
+            if (program.name == "stage" && has_near_angles()) angles_ = angles_of(p_.graph, program);
     }
 
-    std::string header(const std::string& name, const std::string& digest,
-                       const std::vector<PassReport>& report) const {
+    std::string header(const std::string& name, const std::string& digest, const std::vector<PassReport>& report,
+                       const std::vector<std::string>& support) const {
         std::string text = preamble(name, report);
         text += "#pragma once\n\n";
         if (options_.precision == Precision::quadruple) text += "#define LOBATTO_USE_FLOAT128\n";
-        text += options_.standalone_support.empty() ? "#include \"kernel.hpp\"\n" : options_.standalone_support;
+        text += options_.support_text ? options_.support_text(support) : "#include \"kernel.hpp\"\n";
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
                 tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
@@ -188,13 +146,12 @@ private:
         const std::string name = declaration.program;
         if (name == "stage") return takes_angles(declaration);
         return d_.structure.form == Form::separable && !d_.structure.looped &&
-               (name == "node" || name == "acceleration" || name == "remainder") &&
-               cost_of(p_, d_.structure, "node", "_node") <= 200;
+               (name == "node" || name == "acceleration" || name == "remainder") && optimised_.cost_of_node <= 200;
     }
 
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
-        const bool costly = is_costly(p_, d_.structure), remainder = takes_remainder(p_, d_.structure);
+        const bool costly = optimised_.costly, remainder = optimised_.has_remainder;
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool has_remainder = {};", remainder),
                            remainder ? "forces without the part in the stage map are a function of their own"
                                      : "forces have no function without a part") +
@@ -203,24 +160,20 @@ private:
                                   : "second derivatives would cost more than the evaluations they save");
     }
 
-    // Whether sweeps evaluate a function that is written out, in packs of double: where angles may be near others.
+    // Whether `stage` is written out, in packs of double: where angles may be near others.
     bool has_near_angles() const {
-        const Structure& structure = d_.structure;
-        if (structure.looped || options_.precision != Precision::double_) return false;
-        const bool is_swept = structure.form == Form::separable && !structure.is_explicit && !structure.clean;
-        return structure.form == Form::general || (is_swept && is_costly(p_, d_.structure));
+        return d_.structure.form == Form::general && !d_.structure.looped && options_.precision == Precision::double_;
     }
     std::string near_angles() const {
-        if (is_map()) return "";
-        const std::string comment =
-            angles_.empty() ? "nothing that sweeps evaluate takes its sines and cosines from those of angles near"
-                            : fmt::format("whose sines and cosines {} is given, anew or from those of angles near",
-                                          swept_function(d_.structure.form));
+        if (d_.structure.form != Form::general) return "";
+        const std::string comment = angles_.empty()
+                                        ? "stage computes all its sines and cosines anew"
+                                        : "whose sines and cosines stage is given, anew or from those of angles near";
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr int angles = {};", angles_.size()),
                            comment);
     }
     bool takes_angles(const Declaration& declaration) const {
-        return !angles_.empty() && std::string(declaration.program) == swept_function(d_.structure.form);
+        return !angles_.empty() && std::string(declaration.program) == "stage";
     }
 
     std::string parameters() const {
@@ -286,7 +239,7 @@ private:
     }
 
     std::string prepare(const std::string& name) const {
-        std::vector<Statement> statements;
+        std::vector<Output> statements;
         std::string pivots, finite, determinant;
         for (const Id id : hoisted_.order) {
             statements.push_back({"k." + hoisted_.names.at(id), id});
@@ -297,26 +250,27 @@ private:
                 int index = 0;
                 for (const Output& output : program.outputs) {
                     const std::string pivot = fmt::format("pivot_{}", ++index);
-                    statements.push_back({"const real " + pivot, output.value});
+                    statements.push_back({pivot, output.value, Effect::declare});
                     pivots += (pivots.empty() ? "" : " || ") + pivot + " == real(0)";
                 }
             } else if (program.name == "prepare_map") {
                 for (const Output& output : program.outputs) {
-                    statements.push_back({output.target, output.value});
-                    if (output.target.rfind("const real delta", 0) == 0 && !p_.graph.is_constant(output.value))
-                        determinant = output.target.substr(std::string("const real ").size());
-                    if (output.target.rfind("k.", 0) == 0) finite += (finite.empty() ? "" : ", ") + output.target;
+                    statements.push_back(output);
+                    if (output.target.starts_with("delta") && !p_.graph.is_constant(output.value))
+                        determinant = output.target;
+                    if (output.effect == Effect::assign) finite += (finite.empty() ? "" : ", ") + output.target;
                 }
             }
         }
         if (d_.structure.looped)
-            for (const Statement& statement : looped_.prepared()) statements.push_back(statement);
+            for (const Output& statement : looped_.prepared()) statements.push_back(statement);
         const auto names = [&](Id id) -> std::string {
             const Node& node = p_.graph[id];
             if (node.op != Op::input) return "";
             return node.stage == Stage::parameter ? "p." + p_.graph.input_of(id).code : p_.graph.input_of(id).code;
         };
-        FunctionText body(p_, statements, names, options_.precision, Stage::constant);
+        FunctionText body(p_, statements, names,
+                          {options_.precision, Stage::constant, false, false, Notation::cpp, {}});
         std::string text = body.lines();
         if (d_.structure.looped) text += looped_.after_prepare();
         if (!pivots.empty())
@@ -361,18 +315,16 @@ private:
     std::string body(const Declaration& declaration) const {
         const std::string name = declaration.program;
         if (d_.structure.looped && name != "event") return looped_.body(name);
-        if (name == "remainder" && !takes_remainder(p_, d_.structure)) return "";
+        if (name == "remainder" && !optimised_.has_remainder) return "";
         const auto program =
             std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
         if (program == p_.programs.end()) return "";
-        std::vector<Statement> statements;
-        for (const Output& output : program->outputs) statements.push_back({output.target, output.value});
-        const auto names = [this](Id id) { return name_of(id); };
-        const std::string text =
-            FunctionText(p_, statements, names, options_.precision, Stage::step_size, declaration.any_number, false,
-                         takes_angles(declaration) ? angles_ : std::map<Id, int>())
-                .lines();
-        return name == "correction" ? with_solves(text) : text;
+        const FunctionStyle style{options_.precision,     Stage::step_size,
+                                  declaration.any_number, false,
+                                  Notation::cpp,          takes_angles(declaration) ? angles_ : std::map<Id, int>()};
+        return FunctionText(
+                   p_, program->outputs, [this](Id id) { return name_of(id); }, style)
+            .lines();
     }
 
     std::string function(const Declaration& declaration) const {
@@ -417,23 +369,6 @@ private:
                "    LOBATTO_INLINE\n" + signature("void", row.name, parameters, row.body) + row.body + "    }\n";
     }
 
-    // The eliminations that the closed forms leave, after the statements that fill them.
-    std::string with_solves(const std::string& statements) const {
-        std::string before, after;
-        for (const Solve& solve : p_.solves) {
-            const std::size_t N = solve.unknowns.size();
-            before += fmt::format("        real J{}[{}];\n", solve.mark, N * N);
-            if (solve.mark.empty())
-                return before + statements + fmt::format("        return lobatto::solve<{}, 1>(J, delta);\n", N);
-            before += fmt::format("        real delta{}[{}];\n", solve.mark, N);
-            after += fmt::format("        if (!lobatto::solve<{0}, 1>(J{1}, delta{1})) return false;\n", N, solve.mark);
-            for (std::size_t i = 0; i < N; ++i)
-                after += fmt::format("        delta[{}] = delta{}[{}];\n", solve.unknowns[i], solve.mark, i);
-        }
-        const std::size_t last = statements.rfind("        return ");
-        if (last == std::string::npos) return before + statements + after + "        return true;\n";
-        return before + statements.substr(0, last) + after + statements.substr(last);
-    }
     bool takes_how(const Declaration& declaration) const {
         return d_.structure.neighbours && has_lanes(options_.precision) &&
                std::string(declaration.program) == "acceleration";
@@ -445,6 +380,7 @@ private:
     bool is_map() const { return d_.structure.form == Form::linear_map; }
 
     const Derivation& d_;
+    const OptimisedPrograms& optimised_;
     const Programs& p_;
     const EmitOptions& options_;
     Hoisted hoisted_;
@@ -462,20 +398,48 @@ std::string stepper_of(const Structure& structure) {
                                    : "steppers/separable.hpp";
 }
 
+std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
+    std::set<std::string> parts = {stepper_of(derivation.structure)};
+    if (derivation.structure.neighbours) parts.insert("iteration/neighbours.hpp");
+    if (!derivation.scene.outputs.events.empty()) parts.insert("steppers/events.hpp");
+    for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
+            case Op::sin:
+            case Op::cos:
+            case Op::tan:
+            case Op::sincos_pair:
+                parts.insert("base/trigonometry.hpp");
+                break;
+            case Op::exp:
+            case Op::log:
+            case Op::sinh:
+            case Op::cosh:
+            case Op::tanh:
+            case Op::raise:
+                parts.insert("base/exponential.hpp");
+                break;
+            case Op::asin:
+            case Op::acos:
+            case Op::atan:
+                parts.insert("base/arc.hpp");
+                break;
+            default:
+                break;
+        }
+    return {parts.begin(), parts.end()};
+}
+
 }  // namespace
 
-KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options) {
+KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options) {
     KernelSource source;
     source.form = derivation.structure.form;
-    source.stepper = stepper_of(derivation.structure);
+    source.support = support_of(derivation, optimised.programs.graph);
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
-    if (!takes_remainder(programs, derivation.structure))
-        std::erase_if(programs.programs, [](const Program& program) { return program.name == "remainder"; });
-    source.report = optimise(programs);
-    const Emitter emitter(derivation, programs, options);
+    source.report = optimised.report;
+    const Emitter emitter(derivation, optimised, options);
     // The digest of the text with the digest left out, put in its place.
-    source.header = emitter.header(source.name, "", source.report);
+    source.header = emitter.header(source.name, "", source.report, source.support);
     source.digest = digest_of(source.header);
     const std::string empty = "digest = \"\"";
     source.header.replace(source.header.find(empty), empty.size(), "digest = \"" + source.digest + "\"");

@@ -2,6 +2,7 @@
 // Graph to C++ text: the only file that prints C++.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,24 +12,26 @@
 namespace lobatto {
 
 struct Derivation;
+struct OptimisedPrograms;
 enum class Form;
 
 struct EmitOptions {
     Precision precision = Precision::double_;
-    std::string standalone_support;  // text of runtime/kernel/kernel.hpp to carry inside; empty: the header includes
-                                     // "kernel.hpp"
+    // The text of parts of runtime/kernel/kernel.hpp, to carry inside; without it the header includes "kernel.hpp".
+    std::function<std::string(const std::vector<std::string>& parts)> support_text;
 };
 
 struct KernelSource {
-    Form form{};                     // of its steps (generator/mechanics/structure.hpp)
-    std::string name;                // struct lobatto::kernels::NAME, a C identifier
-    std::string header;              // the whole text of NAME.hpp
-    std::string stepper;             // the part of runtime/kernel/kernel.hpp that its Stepper is in; empty: any
+    Form form{};         // of its steps (generator/mechanics/structure.hpp)
+    std::string name;    // struct lobatto::kernels::NAME, a C identifier
+    std::string header;  // the whole text of NAME.hpp
+    // The parts of runtime/kernel/kernel.hpp that one trajectory stands on, beside those that they include.
+    std::vector<std::string> support;
     std::string digest;              // 16 hexadecimal digits of the header's formulas
     std::vector<PassReport> report;  // first row: as derived
 };
 
-// Optimises the programs and writes them out. Throws DomainError when the formulas are real nowhere.
-KernelSource emit_kernel(const Derivation& derivation, Programs programs, const EmitOptions& options);
+// Writes the programs out. Throws DomainError when a number is beyond the range of the kernel's number type.
+KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options);
 
 }  // namespace lobatto

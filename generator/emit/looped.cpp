@@ -34,6 +34,7 @@ LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, P
     : d_(derivation),
       p_(programs),
       precision_(precision),
+      style_{precision, Stage::step_size, true, false, Notation::cpp, {}},
       names_(std::move(names)),
       general_(derivation.structure.form == Form::general),
       neighbours_(derivation.structure.neighbours && has_lanes(precision)) {}
@@ -101,13 +102,16 @@ std::string LoopedText::fields() const {
     return text;
 }
 
-std::vector<Statement> LoopedText::prepared() const {
-    std::vector<Statement> result;
+std::vector<Output> LoopedText::prepared() const {
+    std::vector<Output> result;
     const auto append = [&](const std::string& name) {
         const std::vector<Output>& outputs = program(name).outputs;
         const bool one = outputs.size() == 1 && d_.system.n > 1;
         for (std::size_t i = 0; i < outputs.size(); ++i)
-            result.push_back({one ? "const real every_" + name : fmt::format("k.{}[{}]", name, i), outputs[i].value});
+            if (one)
+                result.push_back({"every_" + name, outputs[i].value, Effect::declare});
+            else
+                result.push_back({fmt::format("k.{}[{}]", name, i), outputs[i].value});
     };
     if (!general_) {
         append("mass");
@@ -130,9 +134,7 @@ std::string LoopedText::after_prepare() const {
 }
 
 std::string LoopedText::statements(const std::string& name, const std::string& indent) const {
-    std::vector<Statement> list;
-    for (const Output& output : program(name).outputs) list.push_back({output.target, output.value});
-    const std::string lines = FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+    const std::string lines = FunctionText(p_, program(name).outputs, names_, style_).lines();
     return indent.empty() ? lines : indented(lines);
 }
 
@@ -178,15 +180,16 @@ std::vector<RowFunction> LoopedText::row_functions() const {
         const Element& element = d_.structure.elements.repeated[number];
         if (element.x.empty()) continue;
         const std::string name = element_name(number);
-        std::vector<Statement> list;
+        std::vector<Output> list;
         std::string takes;
         for (const Output& output : program(name + "_slope").outputs) {
             list.push_back({fmt::format("rows.result[{}]", variable_of(output)), output.value});
-            if (output.target.ends_with("-="))
+            if (output.effect == Effect::subtract)
                 takes += fmt::format("        rows.takes[{}] = true;\n", variable_of(output));
         }
-        const std::string inside =
-            FunctionText(p_, list, names_, precision_, Stage::step_size, true, true).lines() + takes;
+        FunctionStyle fusing = style_;
+        fusing.fuses = true;
+        const std::string inside = FunctionText(p_, list, names_, fusing).lines() + takes;
         std::string begin;
         for (std::size_t j = 0; j < element.x.size(); ++j)
             if (const std::string value = fmt::format("x{}", j); mentions(inside, value))
@@ -223,11 +226,11 @@ std::string LoopedText::along_rows() const {
                                     sets ? "set_rows" : "add_rows", element.x.size(), name, name, hung, name, time),
                         "            ");
     }
-    std::vector<Statement> list;
+    std::vector<Output> list;
     for (const Output& output : program(walls.before || walls.behind ? "inside_slope" : "rest_slope").outputs)
-        list.push_back(
-            {"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W) +=", output.value});
-    text += FunctionText(p_, list, names_, precision_, Stage::step_size, true).lines();
+        list.push_back({"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W)",
+                        output.value, Effect::add});
+    text += FunctionText(p_, list, names_, style_).lines();
     return has_unit_masses(d_.system) ? text : text + "        how::template scale<coordinates>(W, k.inverse_mass);\n";
 }
 

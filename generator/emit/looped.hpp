@@ -25,8 +25,8 @@ public:
 
     std::string tables() const;
     std::string fields() const;
-    std::vector<Statement> prepared() const;  // values of those fields
-    std::string after_prepare() const;        // what follows them
+    std::vector<Output> prepared() const;  // values of those fields
+    std::string after_prepare() const;     // what follows them
     std::string body(const std::string& function) const;
     std::vector<RowFunction> row_functions() const;  // where neighbouring coordinates lie in lanes
 
@@ -38,6 +38,7 @@ private:
     const Derivation& d_;
     const Programs& p_;
     Precision precision_;
+    FunctionStyle style_;
     Naming names_;
     std::string along_rows() const;
     bool general_, neighbours_;

@@ -39,8 +39,6 @@ std::string separable_shapes(const Structure& structure, const System& system, i
     line(text, fmt::format("bool is_explicit = {}", structure.is_explicit),
          structure.is_explicit ? "kicks and drifts in turn" : "the inner nodes are solved for");
     if (structure.form == Form::separable) {
-        line(text, fmt::format("bool unrolled = {}", structure.unrolled),
-             structure.unrolled ? "every node and coordinate is written out" : "loops over nodes and coordinates");
         line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part),
              structure.diagonal_part ? "taken into the stage map: the constant part of M^-1 V''"
                                      : "nothing is taken into the stage map");
@@ -204,7 +202,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     text += integer_table("event_direction", directions);
     if (structure.form == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.system, d.quadrature.points, precision);
-    const bool solves = structure.form == Form::separable && !structure.unrolled && !structure.is_explicit;
+    const bool solves = structure.form == Form::separable && !structure.is_explicit;
     return solves ? text + order_of_unknowns(structure) : text;
 }
 

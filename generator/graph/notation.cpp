@@ -79,7 +79,7 @@ public:
                 return constant(id);
             case Op::input: {
                 const Input& input = graph_.input_of(id);
-                return {notation_ == Notation::cpp     ? input.code
+                return {is_cpp()                       ? input.code
                         : notation_ == Notation::latex ? latex_name(input.name)
                                                        : input.name,
                         atom};
@@ -90,11 +90,10 @@ public:
                 return fraction(node.operands);
             case Op::power:
                 if (node.index < 0) return fraction({id});
-                if (notation_ == Notation::cpp)
-                    throw std::logic_error("C++ has no power operator: expand powers first");
+                if (is_cpp()) throw std::logic_error("C++ has no power operator: expand powers first");
                 return raised(node.operands[0], std::to_string(node.index));
             case Op::raise:
-                if (notation_ == Notation::cpp) return {call("pow", node.operands), atom};
+                if (is_cpp()) return {call("pow", node.operands), atom};
                 return raised(node.operands[0], print(node.operands[1]).text);
             case Op::sqrt:
                 if (notation_ == Notation::latex) return {"\\sqrt{" + print(node.operands[0]).text + "}", atom};
@@ -110,6 +109,8 @@ public:
     }
 
 private:
+    bool is_cpp() const { return notation_ == Notation::cpp || notation_ == Notation::plain; }
+
     std::string call(std::string_view name, const std::vector<Id>& operands) const {
         if (notation_ == Notation::latex)
             return "\\" +
@@ -119,7 +120,7 @@ private:
                                                 : name) +
                    "\\left(" + print(operands[0]).text + "\\right)";
         std::string text(name);
-        if (notation_ == Notation::cpp) text.insert(0, "lobatto::");
+        if (is_cpp()) text.insert(0, notation_ == Notation::plain ? "std::" : "lobatto::");
         text += "(" + print(operands[0]).text;
         for (std::size_t i = 1; i < operands.size(); ++i) text += ", " + print(operands[i]).text;
         return text + ")";
@@ -159,7 +160,7 @@ private:
 
     Printed constant(Id id) const {
         const Constant& c = graph_.constant_of(id);
-        if (notation_ == Notation::cpp) return {literal(c.value), cln::minusp(c.value) ? sign : atom};
+        if (is_cpp()) return {literal(c.value), cln::minusp(c.value) ? sign : atom};
         if (is_plain(c)) return fraction({id});
         if (c.label == "pi") return {notation_ == Notation::latex ? "\\pi" : "pi", atom};
         return {c.label, c.label.find_first_of("+- ") == std::string::npos ? power : sum};
@@ -177,7 +178,7 @@ private:
 
     Printed addition(const Node& node) const {
         std::vector<Id> terms = node.operands;
-        if (notation_ != Notation::cpp) {  // for people: a positive term first
+        if (!is_cpp()) {  // for people: a positive term first
             const auto first =
                 std::find_if(terms.begin(), terms.end(), [this](Id term) { return !graph_.is_negative(term); });
             if (first != terms.end()) std::rotate(terms.begin(), first, first + 1);
@@ -217,14 +218,13 @@ private:
         for (const Id factor : factors) {
             const Node& node = graph_[factor];
             const bool named = naming_ && factors.size() > 1 && !naming_(factor).empty();
-            if (!named && node.op == Op::constant &&
-                (notation_ == Notation::cpp || is_plain(graph_.constant_of(factor)))) {
+            if (!named && node.op == Op::constant && (is_cpp() || is_plain(graph_.constant_of(factor)))) {
                 cln::cl_R value = graph_.constant_of(factor).value;
                 if (cln::minusp(value)) {
                     negative = !negative;
                     value = -value;
                 }
-                if (notation_ == Notation::cpp) {
+                if (is_cpp()) {
                     if (value != 1 || factors.size() == 1) above.push_back(literal(value));
                 } else if (!is_rational(value)) {
                     above.push_back(decimal(value, shown_digits));
@@ -235,7 +235,7 @@ private:
                     if (cln::denominator(rational) != 1) below.push_back(integer_text(cln::denominator(rational)));
                 }
             } else if (!named && node.op == Op::power && node.index < 0) {
-                if (notation_ == Notation::cpp)
+                if (is_cpp())
                     below.push_back(enclosed(print(node.operands[0]), atom));
                 else
                     below.push_back(node.index == -1 ? enclosed(print(node.operands[0]), power)
@@ -247,14 +247,14 @@ private:
         if (above.size() == 1 && above.front() == "1" && !below.empty()) above.clear();
         const std::string minus = negative ? "-" : "";
         if (below.empty())
-            return {minus + joined(above), negative           ? (above.size() > 1 ? product : sign)
-                                           : above.size() > 1 ? product
-                                           : notation_ == Notation::cpp || factors.size() == 1 ? atom
-                                                                                               : power};
-        const std::string one = notation_ == Notation::cpp ? literal(1) : "1";
+            return {minus + joined(above), negative                          ? (above.size() > 1 ? product : sign)
+                                           : above.size() > 1                ? product
+                                           : is_cpp() || factors.size() == 1 ? atom
+                                                                             : power};
+        const std::string one = is_cpp() ? literal(1) : "1";
         if (notation_ == Notation::latex)
             return {minus + "\\frac{" + (above.empty() ? one : joined(above)) + "}{" + joined(below) + "}", product};
-        return {minus + (above.empty() ? one : joined(above)) + (notation_ == Notation::cpp ? " / " : "/") +
+        return {minus + (above.empty() ? one : joined(above)) + (is_cpp() ? " / " : "/") +
                     (below.size() == 1 ? below.front() : "(" + joined(below) + ")"),
                 product};
     }
@@ -262,8 +262,7 @@ private:
     std::string joined(const std::vector<std::string>& factors) const {
         std::string text;
         for (const auto& factor : factors) {
-            if (!text.empty())
-                text += notation_ == Notation::cpp ? " * " : notation_ == Notation::latex ? " \\, " : "*";
+            if (!text.empty()) text += is_cpp() ? " * " : notation_ == Notation::latex ? " \\, " : "*";
             text += factor;
         }
         return text.empty() ? "1" : text;

@@ -9,7 +9,7 @@
 
 namespace lobatto {
 
-enum class Notation { text, latex, cpp };
+enum class Notation { text, latex, cpp, plain };  // cpp: with the functions of lobatto::; plain: with those of std::
 enum class Precision { single, double_, extended, quadruple };  // float, double, long double, __float128
 
 // How a node that has a name of its own reads (an input, a temporary); empty: print its operation.

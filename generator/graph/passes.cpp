@@ -49,7 +49,6 @@ Programs rewrite(const Programs& before, const Rule& rule) {
     for (const Input& input : before.graph.inputs()) after.graph.input(input);
     const std::vector<Id> image = images(after.graph, before.graph, roots_of(before), rule);
     after.programs = before.programs;
-    after.solves = before.solves;
     for (Program& program : after.programs)
         for (Output& output : program.outputs) output.value = image[static_cast<std::size_t>(output.value)];
     for (const auto& [id, name] : before.names) after.names.emplace_back(image[static_cast<std::size_t>(id)], name);
@@ -322,7 +321,6 @@ Programs share_pairs(const Programs& programs) {
         return image[id] = built;
     };
     result.programs = work.programs;
-    result.solves = work.solves;
     for (Program& program : result.programs)
         for (Output& output : program.outputs) output.value = build(output.value);
     for (const auto& [id, name] : work.names) result.names.emplace_back(build(id), name);

@@ -9,10 +9,15 @@
 
 namespace lobatto {
 
+// What becomes of a value: it is put into its target, or added to it, or taken away from it; it is a new constant of
+// that name; or the function gives it back.
+enum class Effect : std::uint8_t { assign, add, subtract, declare, give_back };
+
 // One value a program computes, and the place in C++ where it goes.
 struct Output {
-    std::string target;  // W[0]
+    std::string target;  // W[0]; nothing when it is given back
     Id value = 0;
+    Effect effect = Effect::assign;
 };
 
 // One function of the kernel: its outputs, computed together.
@@ -21,20 +26,12 @@ struct Program {
     std::vector<Output> outputs;
 };
 
-// A linear system that the program `correction` leaves to the elimination of the support header: J_mark delta_mark =
-// -F, and the unknowns that delta_mark are.
-struct Solve {
-    std::string mark;  // "" when it is the only one
-    std::vector<std::size_t> unknowns;
-};
-
 // All programs of a kernel over one graph, so that what they hoist is shared; and names for values that deserve one
 // when hoisted.
 struct Programs {
     Graph graph;
     std::vector<Program> programs;
     std::vector<std::pair<Id, std::string>> names;  // value -> identifier
-    std::vector<Solve> solves;
 };
 
 // The values that the programs and the names ask for.

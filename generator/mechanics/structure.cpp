@@ -152,7 +152,6 @@ private:
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         result_.diagonal_mass = system_.separable && diagonal;
-        result_.unrolled = interior_ <= unrolled_limit && !result_.clean && !result_.is_explicit;
         if (result_.clean) {
             find("round-off-clean arithmetic", true,
                  "asked for: every step is iterated until nothing changes and its increments are added without error, "
@@ -160,10 +159,11 @@ private:
             return;
         }
         const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
-        if (!system_.separable || (!result_.diagonal_mass && !result_.unrolled && !result_.is_explicit))
+        // The inverse of a full mass matrix is written out: few coordinates only, or nothing to solve.
+        const bool takes_mass = result_.diagonal_mass || interior_ <= full_mass_limit;
+        if (!system_.separable || (!takes_mass && !result_.is_explicit))
             result_.form = Form::general;
-        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted &&
-                 (result_.diagonal_mass || result_.unrolled))
+        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted && takes_mass)
             result_.form = Form::linear_map;
         if (!result_.is_explicit) return;
         result_.linear = result_.form == Form::linear_map;
@@ -219,16 +219,9 @@ private:
         repetition();
         absorption();
         neighbourhood();
-        if (result_.clean || result_.is_explicit) return;
-        find("small enough to write out", result_.unrolled,
-             result_.unrolled ? fmt::format("{} unknowns a step, at most {}: every formula is written out, no loops",
-                                            interior_, unrolled_limit)
-                              : fmt::format("{} unknowns a step, more than {}: loops over points and coordinates",
-                                            interior_, unrolled_limit));
     }
 
     void general() {
-        result_.unrolled = false;
         const std::vector<int> cyclic = result_.general ? std::vector<int>{} : find_cyclic(scene_, system_);
         result_.routhian = reduce(system_, cyclic);
         const int active = static_cast<int>(result_.routhian.active.size());
@@ -272,7 +265,7 @@ private:
     // Terms of V, or of L, that are one formula of many variables.
     void repetition() {
         const bool general = result_.form == Form::general;
-        if (result_.form == Form::linear_map || (!general && (result_.unrolled || !result_.diagonal_mass))) return;
+        if (result_.form == Form::linear_map || (!general && !result_.diagonal_mass)) return;
         std::vector<ex> terms;
         std::vector<std::pair<int, ex>> forces;
         for (const ex& term : general ? system_.terms : all_at(system_.terms, system_.v, 0))
@@ -327,7 +320,7 @@ private:
         } catch (const DomainError&) {  // then as if there were no quadratic part
         }
         result_.diagonal_part = diagonal && with < without;
-        result_.absorbed = !result_.unrolled && !result_.diagonal_part && with < 0.1;
+        result_.absorbed = !result_.diagonal_part && with < 0.1;
         std::string reason = fmt::format(
             "without its quadratic part V bends the forces as much at the start, so nothing is taken out of the "
             "iteration");

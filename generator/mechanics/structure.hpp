@@ -59,14 +59,13 @@ struct Structure {
     bool clean = false;          // separable: steps are round-off-clean (steppers/clean.hpp), in loops
     bool linear = false;         // constant second derivatives: one correction, its Jacobian factored once a step size
     bool diagonal_mass = false;  // of a separable system
-    bool unrolled = true;        // separable: every node and coordinate written out; else loops over both
     bool looped = false;         // terms of L that repeat are written once, in loops over tables
     Elements elements;           // looped: of V in q, or of L in z
     Walls walls;                 // of neighbours
     bool neighbours = false;     // looped, and its formulas go along neighbouring coordinates
     bool diagonal_part =
         false;              // separable: the constant part of M^-1 V'' is diagonal, and taken into the stage map (D31)
-    bool absorbed = false;  // separable, in loops: Newton's iteration has the Jacobian of V's quadratic part (D31)
+    bool absorbed = false;  // separable: Newton's iteration has the Jacobian of V's quadratic part (D31)
     SparseMatrix constant_hessian;             // the part of V'' that does not depend on q
     std::vector<std::pair<int, int>> entries;  // separable: where M^-1 V'' is not identically zero, row by row
     Routhian routhian;                         // general
@@ -75,8 +74,8 @@ struct Structure {
     std::vector<Finding> findings;  // all of the above and what was looked for in vain, in words
 };
 
-// Largest sizes of what is written out: coordinates of a linear map, unknowns of a separable step.
-constexpr int linear_map_limit = 16, unrolled_limit = 4;
+// Coordinates of a linear map; unknowns of a separable step whose constant mass matrix is full.
+constexpr int linear_map_limit = 16, full_mass_limit = 4;
 // Terms of L from which on loops are looked for.
 constexpr int looped_from = 32;
 // The additive part of a second derivative that does not depend on some variables.

@@ -69,7 +69,7 @@ private:
         }
         p_.programs.push_back(std::move(legendre));
         p_.programs.push_back(std::move(stage));
-        if (d_.scene.outputs.energy) p_.programs.push_back({"energy", {{"return", energy()}}});
+        if (d_.scene.outputs.energy) p_.programs.push_back({"energy", {{"", energy(), Effect::give_back}}});
     }
 
     // (D26) H = v . dL/dv - L, term by term: a term of degree d in the velocities gives d - 1 times itself, so that no

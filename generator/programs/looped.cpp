@@ -42,7 +42,6 @@ public:
 private:
     const char* slope() const { return general_ ? "g" : "W"; }
     const char* second() const { return general_ ? "H" : "S"; }
-    static std::string add_to(const std::string& place) { return place + " +="; }
 
     // One value when all masses are the same formula, else one a coordinate.
     void masses() {
@@ -90,7 +89,8 @@ private:
             for (const auto& [acted_on, force] : elements.other_forces)
                 gradient[static_cast<std::size_t>(acted_on)] += general_ ? force : -force;
             for (std::size_t i = 0; i < gradient.size(); ++i)
-                if (!gradient[i].is_zero()) program.outputs.push_back({add_to(at(slope(), i)), convert(gradient[i])});
+                if (!gradient[i].is_zero())
+                    program.outputs.push_back({at(slope(), i), convert(gradient[i]), Effect::add});
             return gradient;
         };
         const ConstantPart constant_part = free_of(variables);
@@ -100,10 +100,11 @@ private:
         for (const auto& [place, value] : second_derivatives.entries()) {
             const auto known = entry_.find(place);
             if (known == entry_.end()) continue;  // zero after all
-            node.outputs.push_back({add_to(at(second(), known->second)), convert(value)});
+            node.outputs.push_back({at(second(), known->second), convert(value), Effect::add});
             if (!d_.structure.absorbed && !d_.structure.diagonal_part) continue;
             const ex constant = constant_part.of(value);
-            if (!constant.is_zero()) quadratic.outputs.push_back({add_to(at("S0", known->second)), convert(constant)});
+            if (!constant.is_zero())
+                quadratic.outputs.push_back({at("S0", known->second), convert(constant), Effect::add});
         }
         if (d_.scene.outputs.energy) {
             Ids values;
@@ -111,7 +112,7 @@ private:
                                                         variables.begin() + (general_ ? static_cast<long>(n_) : 0));
             for (const ex& term : elements.others)
                 values.push_back(convert(general_ ? energy_of(term, velocities) : term));
-            p_.programs.push_back({"rest_energy", {{"sum +=", g().add(values)}}});
+            p_.programs.push_back({"rest_energy", {{"sum", g().add(values), Effect::add}}});
         }
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));
@@ -152,20 +153,21 @@ private:
             taken.push_back(i < j);
             slopes.push_back(i < j ? slopes[i] : convert(gradient[j]));
             if (!gradient[j].is_zero())
-                slope_only.outputs.push_back({fmt::format("{}[i{}] {}=", slope(), j, i < j ? '-' : '+'), slopes[j]});
+                slope_only.outputs.push_back(
+                    {fmt::format("{}[i{}]", slope(), j), slopes[j], i < j ? Effect::subtract : Effect::add});
         }
         node.outputs = slope_only.outputs;
         int column = 0;
         for (const auto& [i, j] : pairs_of(element)) {
             const ex value = gradient[i].diff(element.x[j]);
             node.outputs.push_back(
-                {add_to(fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column)),
-                 convert(value)});
+                {fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column),
+                 convert(value), Effect::add});
             const ex constant = constant_part.of(value);
             if ((d_.structure.absorbed || d_.structure.diagonal_part) && !constant.is_zero())
                 quadratic.outputs.push_back(
-                    {add_to(fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column)),
-                     convert(constant)});
+                    {fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column),
+                     convert(constant), Effect::add});
             ++column;
         }
         if (d_.scene.outputs.energy && !is_force) {
@@ -173,7 +175,7 @@ private:
             for (std::size_t j = 0; general_ && j < element.x.size(); ++j)
                 if (element.rows.front()[j] < static_cast<int>(n_)) velocities.push_back(element.x[j]);
             p_.programs.push_back(
-                {name + "_energy", {{"sum +=", convert(general_ ? energy_of(term, velocities) : term)}}});
+                {name + "_energy", {{"sum", convert(general_ ? energy_of(term, velocities) : term), Effect::add}}});
         }
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));

@@ -2,6 +2,10 @@
 // What a kernel computes, as programs over one graph (docs/derivation.md): what all forms share.
 #include "generator/programs/programs.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "generator/programs/builder.hpp"
 #include "generator/programs/identifier.hpp"
 #include "generator/programs/looped.hpp"
@@ -63,6 +67,59 @@ void ProgramBuilder::events() {
 Programs build_programs(const Derivation& derivation) {
     if (derivation.structure.looped) return looped_programs(derivation);
     return derivation.structure.form == Form::general ? general_programs(derivation) : separable_programs(derivation);
+}
+
+namespace {
+
+// What `whole` costs, about, in additions: as one program, or as `part` of each repeated formula, row by row.
+double cost_of(const Programs& programs, const Structure& structure, const std::string& whole,
+               const std::string& part) {
+    double sum = 0;
+    for (const Program& program : programs.programs) {
+        if (program.name != whole && !program.name.ends_with(part)) continue;
+        std::vector<Id> values;
+        for (const Output& output : program.outputs) values.push_back(output.value);
+        const Operations operations = count(programs.graph, programs.graph.topological(values));
+        double rows = 1;
+        for (std::size_t e = 0; e < structure.elements.repeated.size(); ++e)
+            if (program.name == fmt::format("element_{}{}", e + 1, part))
+                rows = static_cast<double>(structure.elements.repeated[e].rows.size());
+        sum += rows * static_cast<double>(operations.additions + operations.multiplications + 8 * operations.divisions +
+                                          16 * operations.functions);
+    }
+    return sum;
+}
+
+// Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
+// and five products for each of them (measured).
+bool is_costly(const Programs& programs, const Structure& structure) {
+    const double evaluation = cost_of(programs, structure, "acceleration", "_slope"),
+                 with_slopes = cost_of(programs, structure, "node", "_node");
+    return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
+}
+
+// Whether sweeps are solved by accelerations alone, without what is taken into the stage map. Passes may change what is
+// costly: a program that was left out before them stays so.
+bool takes_remainder(const Programs& programs, const Structure& structure) {
+    const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
+                                      [](const Program& program) { return program.name == "remainder"; });
+    return is_there && !structure.looped && !structure.is_explicit && !structure.clean &&
+           !is_costly(programs, structure);
+}
+
+}  // namespace
+
+OptimisedPrograms optimised_programs(const Derivation& derivation) {
+    const Structure& structure = derivation.structure;
+    OptimisedPrograms result;
+    result.programs = build_programs(derivation);
+    if (!takes_remainder(result.programs, structure))
+        std::erase_if(result.programs.programs, [](const Program& program) { return program.name == "remainder"; });
+    result.report = optimise(result.programs);
+    result.cost_of_node = cost_of(result.programs, structure, "node", "_node");
+    result.costly = is_costly(result.programs, structure);
+    result.has_remainder = takes_remainder(result.programs, structure);
+    return result;
 }
 
 }  // namespace lobatto

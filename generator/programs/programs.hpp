@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "generator/graph/passes.hpp"
+#include "generator/graph/optimise.hpp"
 
 namespace lobatto {
 
@@ -16,7 +16,14 @@ struct Derivation;
 // runtime/kernel/kernel.hpp.
 Programs build_programs(const Derivation& derivation);
 
-// Unknowns N of the stage equations up to which the Newton correction is written in closed form (Cramer's rule).
-constexpr int closed_form_limit = 3;
+// The same as every later stage takes them: optimised, with what their costs decide.
+struct OptimisedPrograms {
+    Programs programs;
+    std::vector<PassReport> report;  // first row: as derived
+    double cost_of_node = 0;         // in additions, about
+    bool costly = false;             // second derivatives save more evaluations than they cost
+    bool has_remainder = false;      // forces are evaluated without the part that the stage map takes
+};
+OptimisedPrograms optimised_programs(const Derivation& derivation);
 
 }  // namespace lobatto

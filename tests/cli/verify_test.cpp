@@ -130,7 +130,9 @@ TEST_CASE("a check that fails ends with exit code 3, the check's name and what i
                scene_text("q'^2/2 - 500*q^2 - q^4/4", "q = { position = 0.1, velocity = 0 }", "10"));
     const Finished result = verify({(folder / "stiff.toml").string()});
     CHECK(result.exit_code == 3);
-    CHECK(contains(result.err, "stiff.toml: the check '1 steps and back, double' fails: "));
+    CHECK(contains(result.err,
+                   "stiff.toml: the check 'steps solve the discrete Euler-Lagrange equations: one trajectory, double' "
+                   "fails: the steps that were taken do not solve their equations; the step is too long"));
 }
 
 TEST_CASE("a step that is not positive and a scene that is missing are mistakes of the input") {

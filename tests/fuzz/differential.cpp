@@ -453,8 +453,7 @@ Outcome compare_compiled(const Scene& scene, const Derivation& derivation, Autho
 }
 
 std::string compare_interpreted(const Derivation& derivation) {
-    Programs programs = build_programs(derivation);
-    optimise(programs);
+    const Programs programs = optimised_programs(derivation).programs;
     for (const Check& check : check_programs(derivation, programs))
         if (!check.holds) return fmt::format("'{}' fails: {:.3g} > {:.3g}", check.claim, check.measured, check.bound);
     return "";

@@ -36,7 +36,7 @@ struct HandwrittenChain : HandwrittenKernel, Tables {
     static constexpr int coordinates = n, parameter_count = 1;
     static constexpr Form form = Form::separable;
     static constexpr bool autonomous = true, linear = chain == Chain::linear, absorbed = chain == Chain::absorbed;
-    static constexpr bool unrolled = false, has_tangent = n <= 8;
+    static constexpr bool has_tangent = n <= 8;
     static constexpr int unknowns = n * (Tables::points - 2);
     static constexpr int entries = 3 * n - 2;
     static constexpr const int *entry_row = tridiagonal<n>.entry_row, *entry_column = tridiagonal<n>.entry_column,

@@ -71,7 +71,7 @@ struct HandwrittenDrivenSeparable : HandwrittenDriven<number, Tables> {
     using Coefficients = DrivenParameters<number>;
     static constexpr Form form = Form::separable;
     static constexpr int unknowns = 2;
-    static constexpr bool unrolled = false, absorbed = false;
+    static constexpr bool absorbed = false;
     static constexpr int entries = 1, entry_row[1] = {0}, entry_column[1] = {0};
 
     static void acceleration(const Coefficients& k, real time, const real* q, real* W) {

@@ -26,7 +26,7 @@ struct HandwrittenPendulum {
     static constexpr int parameter_count = 2;
     static constexpr int entries = 1;  // S = V''/m has one entry
     static constexpr Form form = Form::separable;
-    static constexpr bool autonomous = true, linear = false, has_energy = true, has_tangent = true, unrolled = true;
+    static constexpr bool autonomous = true, linear = false, has_energy = true, has_tangent = true, absorbed = false;
     static constexpr bool any_number = false, diagonal_part = false, clean = false, is_explicit = false, costly = true;
     static constexpr bool has_remainder = false;
     static constexpr int events = 0, angles = 0;
@@ -35,12 +35,17 @@ struct HandwrittenPendulum {
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};
+    static constexpr int position[1] = {0}, group_count = 1, group_first[2] = {0, 1}, group_bandwidth[1] = {0};
 
     static constexpr real root5 = 2.2360679774997896964;
     static constexpr real xi = 0.27639320225002103036;  // 1/2 - sqrt5/10
     static constexpr real c[4] = {0, xi, 1 - xi, 1};
     static constexpr real b[4] = {1.0 / 12, 5.0 / 12, 5.0 / 12, 1.0 / 12};
     static constexpr real A[4] = {1.0 / 60, (11 - 5 * root5) / 120, (11 + 5 * root5) / 120, 1.0 / 60};
+
+    // The cubic through the nodes of one step, at the inner nodes of the next.
+    static constexpr real E[8] = {root5 - 3,  5 * root5 - 9, 5 - 4 * root5,  8 - 2 * root5,
+                                  -root5 - 3, 4 * root5 + 5, -5 * root5 - 9, 2 * root5 + 8};
 
     struct Parameters {
         real m, omega;

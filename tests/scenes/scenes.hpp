@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "analysis/exact_start.hpp"
 #include "analysis/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 #include "tests/support.hpp"

@@ -4,16 +4,16 @@
 // By the addition theorems, with delta = x - x0,
 //     sin x = sin x0 + (cos x0 sin delta + sin x0 (cos delta - 1)),
 //     cos x = cos x0 + (cos x0 (cos delta - 1) - sin x0 sin delta),
-// where |delta| <= pi/4, which is as far as the polynomials of base/functions.hpp reach. The error is absolute: below
-// 2.1 units of 2^-53 (tests/runtime/kernel/vector_functions_test.cpp). A function of a kernel that holds `angles` of
-// them (node or stage, see base/contract.hpp) asks its last argument for each, by its number: AnglesAnew, AnglesKept or
-// AnglesNear.
+// where |delta| <= pi/4, which is as far as the polynomials of base/trigonometry.hpp reach. The error is absolute:
+// below 2.1 units of 2^-53 (tests/runtime/kernel/vector_functions_test.cpp). A function of a kernel that holds `angles`
+// of them (node or stage, see base/contract.hpp) asks its last argument for each, by its number: AnglesAnew, AnglesKept
+// or AnglesNear.
 #ifndef LOBATTO_KERNEL_ANGLES_HPP
 #define LOBATTO_KERNEL_ANGLES_HPP
 
-#include "functions.hpp"
 #include "numbers.hpp"
 #include "pack.hpp"
+#include "trigonometry.hpp"
 
 namespace lobatto {
 

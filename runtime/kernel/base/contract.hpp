@@ -13,17 +13,15 @@
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), acceleration(k, q, W),
 //   node(k, q, W, S), propagate(k, q, p, q1, p1).
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
-//   entry_column of S; unknowns, N = n (s - 2); `unrolled`: the nine stage functions of steppers/separable.hpp are the
-//   kernel's; otherwise they are loops, E[(s - 2) * s] extrapolates (D15), the tables of base/solve.hpp order the
-//   unknowns, `neighbours` that acceleration can go SideBySide (base/rows.hpp; with row_reach, how far its rows
-//   reach, in_passing, that it can go InPassing, and unit_masses), and `absorbed` says that quadratic_part(k, S0) gives
-//   a constant part of S to iterate with; `clean` (in loops) that steps are those of steppers/clean.hpp. Gauss's nodes
-//   stand between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal,
-//   D, and taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
+//   entry_column of S; unknowns, N = n (s - 2); E[(s - 2) * s] extrapolates (D15); the tables of base/solve.hpp order
+//   the unknowns; `neighbours` says that acceleration can go SideBySide (base/rows.hpp; with row_reach, how far its
+//   rows reach, in_passing, that it can go InPassing, and unit_masses), and `absorbed` says that quadratic_part(k, S0)
+//   gives a constant part of S to iterate with; `clean` that steps are those of steppers/clean.hpp. Gauss's nodes stand
+//   between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal, D, and
+//   taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
 // Form::general: see steppers/general.hpp.
-// Forms separable and general: angles, how many arguments of sine and cosine together the function that sweeps evaluate
-//   holds (node, of costly forces, and stage); where there are any it takes one more argument, AnglesAnew by default,
-//   which gives their sines and cosines (base/angles.hpp).
+// Form::general: angles, how many arguments of sine and cosine `stage` holds; where there are any it takes one more
+//   argument, AnglesAnew by default, which gives their sines and cosines (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 
@@ -51,87 +49,36 @@ enum class Status : std::int32_t {
 enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
 
 // K's functions with a time for all of them: it is passed on where the kernel depends on it.
+#define LOBATTO_WITH_TIME(name)                                                                 \
+    template <class Given, class Time, class... Rest>                                           \
+    LOBATTO_INLINE static auto name(const Given& k, [[maybe_unused]] Time time, Rest... rest) { \
+        if constexpr (K::autonomous)                                                            \
+            return K::name(k, rest...);                                                         \
+        else                                                                                    \
+            return K::name(k, time, rest...);                                                   \
+    }
 template <class K>
 struct Formulas {
-    template <class Given, class Time, class... Rest>
-    [[gnu::always_inline]] static inline void node(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::node(k, rest...);
-        else
-            K::node(k, time, rest...);
-    }
+    LOBATTO_WITH_TIME(node)
+    LOBATTO_WITH_TIME(acceleration)
+    LOBATTO_WITH_TIME(remainder)
+    LOBATTO_WITH_TIME(slope)
+    LOBATTO_WITH_TIME(slopes)
+    LOBATTO_WITH_TIME(stage)
+    LOBATTO_WITH_TIME(legendre)
+    LOBATTO_WITH_TIME(momentum)  // of Form::general
+    LOBATTO_WITH_TIME(event)
+    LOBATTO_WITH_TIME(energy)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>
-    [[gnu::always_inline]] static inline void along_rows(const Given& k, Time time, Position position, Slope slope) {
+    LOBATTO_INLINE static void along_rows(const Given& k, [[maybe_unused]] Time time, Position position, Slope slope) {
         if constexpr (K::autonomous)
             K::template acceleration<How>(k, position, slope);
         else
             K::template acceleration<How>(k, time, position, slope);
     }
-    template <class Given, class Time, class... Rest>
-    [[gnu::always_inline]] static inline void acceleration(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::acceleration(k, rest...);
-        else
-            K::acceleration(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    [[gnu::always_inline]] static inline void remainder(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::remainder(k, rest...);
-        else
-            K::remainder(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    static void slope(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::slope(k, rest...);
-        else
-            K::slope(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    static void slopes(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::slopes(k, rest...);
-        else
-            K::slopes(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    [[gnu::always_inline]] static inline void stage(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::stage(k, rest...);
-        else
-            K::stage(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    static void legendre(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::legendre(k, rest...);
-        else
-            K::legendre(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    static void momentum(const Given& k, Time time, Rest... rest) {  // of Form::general
-        if constexpr (K::autonomous)
-            K::momentum(k, rest...);
-        else
-            K::momentum(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    static void event(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            K::event(k, rest...);
-        else
-            K::event(k, time, rest...);
-    }
-    template <class Given, class Time, class... Rest>
-    static auto energy(const Given& k, Time time, Rest... rest) {
-        if constexpr (K::autonomous)
-            return K::energy(k, rest...);
-        else
-            return K::energy(k, time, rest...);
-    }
 };
+#undef LOBATTO_WITH_TIME
 
 // What an array of coordinates, a pointer or anything with [], holds.
 template <class Array>
@@ -202,6 +149,11 @@ using Alone = std::conditional_t<stepping_of<K>() == Stepping::in_turn, K, Unswe
 template <class K>
 using Single = Stepper<Alone<K>>;
 
+// The fixed-point iteration of one trajectory of a separable system: along its nodes (iteration/fixed_point.hpp), or
+// along its neighbouring coordinates (iteration/neighbours.hpp).
+template <class K, bool neighbours>
+struct FixedPointOf;
+
 // How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
 // going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
@@ -256,17 +208,13 @@ struct Pause {
 };
 
 // Room for a step's arrays: on the stack while they are few, else in the stepper. In line, so that they are registers
-// where there are enough, and what the step refers to need not lie in memory for a call; or apart, as a function.
+// where there are enough, and what the step refers to need not lie in memory for a call.
 template <class Arrays>
 struct Workspace {
     struct Nothing {};
     static constexpr bool is_large = sizeof(Arrays) > 16384;
     mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
 
-    template <class Use>
-    [[gnu::noinline]] auto apart(const Use& use) const {
-        return with(use);
-    }
     template <class Use>
     LOBATTO_INLINE auto with(const Use& use) const {
         if constexpr (is_large) {

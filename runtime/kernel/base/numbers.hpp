@@ -24,7 +24,7 @@ struct Limits {
 
 // The C library's functions by the names that the compiler knows them by: <cmath> would take longer to read than all of
 // this support. Templates of one type, so that the library's own functions come first where both are in sight. Sine and
-// cosine of double are in base/functions.hpp.
+// cosine of double are in base/trigonometry.hpp.
 template <class real, class type>
 using Only = std::enable_if_t<std::is_same_v<real, type>, real>;
 #define LOBATTO_FUNCTION(type, f, suffix) \
@@ -114,7 +114,7 @@ inline __float128 tanh(__float128 x) {
 }
 #endif
 
-// Sine and cosine of one argument together. Those of double are in base/functions.hpp.
+// Sine and cosine of one argument together. Those of double are in base/trigonometry.hpp.
 template <class real>
 inline void sincos(real x, real& sine, real& cosine) {
     sine = sin(x);

@@ -14,6 +14,7 @@
 #include "contract.hpp"
 #include "numbers.hpp"
 #include "pack.hpp"
+#include "shifts.hpp"
 
 namespace lobatto {
 
@@ -437,15 +438,6 @@ struct WrittenOut {
 // How many numbers an array of coordinates holds.
 template <class K>
 constexpr int room_of = (K::coordinates / native_lanes<typename K::real> + 3) * native_lanes<typename K::real>;
-
-// A Pack at a time.
-template <int count, class real>
-LOBATTO_INLINE void copy_lanes(const real* from, real* to) {
-    using V = Pack<real, native_lanes<real>>;
-    int i = 0;
-    for (; i + lanes_of<V> <= count; i += lanes_of<V>) V::load(from + i).store(to + i);
-    for (; i < count; ++i) to[i] = from[i];
-}
 
 }  // namespace lobatto
 

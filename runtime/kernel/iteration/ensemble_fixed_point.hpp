@@ -13,7 +13,6 @@
 #define LOBATTO_KERNEL_ENSEMBLE_SWEEPS_HPP
 
 #include "../base/contract.hpp"
-#include "../base/functions.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "stage_map.hpp"
@@ -31,9 +30,6 @@ struct EnsembleSweeps : StageMap<K, T> {
     using typename Tables::Going;
     static constexpr int values = inner_room * n;  // node by node
     static constexpr int evaluation_limit = 16;
-    // With 16 registers, one coordinate and two nodes inside take 6 (pendulum) to 13 % (Duffing) less time as a
-    // function of their own; fewer nodes 8 % more, two coordinates up to 11 %.
-    static constexpr bool is_apart = n == 1 && m == 2 && register_bytes < 64;
 
     struct Arrays {
         T P[values], X[values], W[values], S[inner_room * entries], d[values], delta[values], bend[values];
@@ -90,7 +86,7 @@ struct EnsembleSweeps : StageMap<K, T> {
     // One step of the lanes `going`, h from `time`. The lanes that the answer names have moved; the others stay.
     template <class Given>
     LOBATTO_INLINE Going step(const Given& k, real time, T* q, T* u, Going going) {
-        const auto step_in = [&](Arrays& a) LOBATTO_FORMULA {
+        return workspace.with([&](Arrays& a) LOBATTO_FORMULA {
             begin_step(q, u, a);
             going = going & usable;
             if constexpr (m == 0)
@@ -100,11 +96,7 @@ struct EnsembleSweeps : StageMap<K, T> {
             else
                 going = solve(k, time, going, a);
             return any(going) ? finish(k, time, q, u, going, a) : going;
-        };
-        if constexpr (is_apart)
-            return workspace.apart(step_in);
-        else
-            return workspace.with(step_in);
+        });
     }
 
 private:

@@ -5,15 +5,13 @@
 // Formula numbers (D..) refer to docs/derivation.md. A sweep, Q <- q + h c v - h^2 A W(Q), contracts like h^2 |A| |S|,
 // S = dW/dq; once the increment e is below sqrt(epsilon), W(Q) + S (Q' - Q) stands for W(Q'), which errs by e^2, and
 // the sweeps that are left evaluate nothing. Where the constant part of S is taken into the map, they contract like
-// what is left of S. The first evaluation of a step keeps its angles for those after it (base/angles.hpp).
+// what is left of S.
 #ifndef LOBATTO_KERNEL_SWEEPS_HPP
 #define LOBATTO_KERNEL_SWEEPS_HPP
 
 #include <type_traits>
 
-#include "../base/angles.hpp"
 #include "../base/contract.hpp"
-#include "../base/functions.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "stage_map.hpp"
@@ -34,7 +32,6 @@ struct Sweeps : StageMap<K, typename K::real> {
     struct Arrays {
         V base[parts * n], X[parts * n], W[parts * n], S[parts * entries], Y[parts * n], carried[parts * n];
         real flat[n * parts * width], rate[n], inverse_scale[n], inverse_linear[n];
-        AngleTable<V, parts, K::angles> near;
     };
 
     real tolerance{};       // of increments, relative; 0: to rounding
@@ -115,13 +112,9 @@ private:
             r[K::entry_row[e]] = fused(a.S[p * entries + e], moved[K::entry_column[e]], r[K::entry_row[e]]);
     }
 
-    template <template <class> class Angles>
     LOBATTO_INLINE void evaluate(const typename K::Coefficients& k, real time, Arrays& a) const {
         for (int p = 0; p < parts; ++p)
-            if constexpr (K::angles > 0)
-                Formulas<K>::node(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n,
-                                  a.S + p * entries, Angles<V>{a.near.of(p)});
-            else if constexpr (K::costly)
+            if constexpr (K::costly)
                 Formulas<K>::node(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n,
                                   a.S + p * entries);
             else if constexpr (K::has_remainder)
@@ -181,10 +174,7 @@ private:
         real e_before = K::costly ? Limits<real>::largest : real(0);
         [[maybe_unused]] real least = real(0);
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
-            if (K::angles > 0 && evaluation > 1)
-                evaluate<AnglesNear>(k, time, a);
-            else
-                evaluate<AnglesKept>(k, time, a);
+            evaluate(k, time, a);
             evaluations += real(1);
             real displaced;
             const real e = sweep<false>(a, displaced);
@@ -279,6 +269,11 @@ private:
             u[c] = u1[c];
         }
     }
+};
+
+template <class K>
+struct FixedPointOf<K, false> {
+    using type = Sweeps<K>;
 };
 
 }  // namespace lobatto

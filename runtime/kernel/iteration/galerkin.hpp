@@ -16,7 +16,6 @@
 
 #include "../base/angles.hpp"
 #include "../base/contract.hpp"
-#include "../base/functions.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "stage_map.hpp"

@@ -16,6 +16,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "../base/rows.hpp"
+#include "../base/shifts.hpp"
 
 namespace lobatto {
 
@@ -417,6 +418,11 @@ private:
         has_history = true;
         return true;
     }
+};
+
+template <class K>
+struct FixedPointOf<K, true> {
+    using type = NeighbourSweeps<K>;
 };
 
 }  // namespace lobatto

@@ -314,7 +314,7 @@ struct CleanSweeps {
     }
 };
 
-// The stepper of steppers/separable.hpp in loops, with clean steps in place of its own.
+// The stepper of steppers/separable.hpp with clean steps in place of its own.
 template <class K>
 struct Stepper<K, Form::separable, Stepping::clean> : Stepper<K, Form::separable, Stepping::solved> {
     using Plain = Stepper<K, Form::separable, Stepping::solved>;
@@ -359,7 +359,8 @@ private:
             iterations = static_cast<std::int32_t>(sweeps.evaluations);
         } else {
             if (pause.left == 0) pause.fail();
-            const Status status = this->workspace.with([&](typename Plain::Arrays& plain) { return newton(plain, a); });
+            const Status status =
+                this->workspace.with([&](typename Plain::Arrays& plain) { return correct(plain, a); });
             if (status != Status::ok) return status;
             if (!finish()) return Status::not_finite;
         }
@@ -375,7 +376,7 @@ private:
 
     // Where sweeps do not contract: Newton's iteration for the plain equations, then with its last Jacobian corrections
     // of the clean ones, X -= J^-1 (X - sweep(X)), while they change anything and do not grow.
-    Status newton(typename Plain::Arrays& plain, typename Sweeps::Arrays& a) {
+    Status correct(typename Plain::Arrays& plain, typename Sweeps::Arrays& a) {
         const Status status = this->solve_from_start(plain);
         if constexpr (m > 0) {
             if (status != Status::ok) return status;
@@ -384,25 +385,25 @@ private:
             for (int correction = 0; correction < Sweeps::correction_limit; ++correction) {
                 for (int i = 0; i < m; ++i)
                     Formulas<K>::acceleration(coefficients, this->node_time(i),
-                                              static_cast<const real*>(plain.nodes + i * n), plain.W_nodes + i * n);
+                                              static_cast<const real*>(plain.Q + i * n), plain.W + i * n);
                 for (int lane = 0; lane < Sweeps::parts * width; ++lane)
                     for (int c = 0; c < n; ++c) {
                         const int place = (lane / width) * n + c, i = lane < m ? lane : m - 1;
-                        set_lane(a.W[place], lane % width, plain.W_nodes[i * n + c]);
-                        set_lane(a.X[place], lane % width, plain.nodes[i * n + c]);
-                        set_lane(a.older[place], lane % width, plain.nodes[i * n + c]);
+                        set_lane(a.W[place], lane % width, plain.W[i * n + c]);
+                        set_lane(a.X[place], lane % width, plain.Q[i * n + c]);
+                        set_lane(a.older[place], lane % width, plain.Q[i * n + c]);
                     }
                 ++iterations;
                 sweeps.sweep(q, q_rest, a);
                 for (int i = 0; i < m; ++i)
                     for (int c = 0; c < n; ++c)
-                        plain.delta[i * n + c] = lane_of(a.X[(i / width) * n + c], i % width) - plain.nodes[i * n + c];
-                LoopedStages<K>::solve_for(plain.loop.matrix, plain.delta, plain.loop.sorted);
+                        plain.delta[i * n + c] = lane_of(a.X[(i / width) * n + c], i % width) - plain.Q[i * n + c];
+                StageEquations<K>::solve_for(plain.matrix, plain.delta, plain.sorted);
                 bool changes = false;
                 real worst = real(0);
                 for (int i = 0; i < m; ++i)
                     for (int c = 0; c < n; ++c) {
-                        const real delta = plain.delta[i * n + c], node = plain.nodes[i * n + c];
+                        const real delta = plain.delta[i * n + c], node = plain.Q[i * n + c];
                         if (!is_finite(delta)) return Status::not_finite;
                         changes = changes || node + delta != node;
                         worst = maximum(worst, fabs(delta) * a.inverse_scale[c]);
@@ -410,7 +411,7 @@ private:
                 sweeps.increment = worst;
                 if (!changes || (correction > 1 && !(worst < last))) break;
                 last = worst;
-                for (int i = 0; i < m * n; ++i) plain.nodes[i] += plain.delta[i];
+                for (int i = 0; i < m * n; ++i) plain.Q[i] += plain.delta[i];
             }
         }
         return status;

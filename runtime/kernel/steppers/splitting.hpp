@@ -14,7 +14,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "../base/rows.hpp"
-#include "linear.hpp"
+#include "../iteration/tangent.hpp"
 
 namespace lobatto {
 

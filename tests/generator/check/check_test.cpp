@@ -20,9 +20,7 @@ std::vector<std::string> failures(const std::vector<Check>& checks) {
 }
 
 Programs optimised(const Derivation& derivation) {
-    Programs programs = build_programs(derivation);
-    optimise(programs);
-    return programs;
+    return optimised_programs(derivation).programs;
 }
 
 using Claims = std::vector<std::string>;
@@ -38,7 +36,7 @@ TEST_CASE("every check holds for one and two coordinates and 2 to 5 points") {
             CHECK(failures(quadrature) == Claims{});
             CHECK(failures(check_equations(derivation)) == Claims{});
             const auto programs = check_programs(derivation, optimised(derivation));
-            CHECK(programs.size() >= (derivation.structure.unrolled ? 3 : 2));
+            CHECK(programs.size() >= 1);
             CHECK(failures(programs) == Claims{});
         }
 }
@@ -50,26 +48,6 @@ TEST_CASE("a linear system of one coordinate is checked in closed form, forces t
     REQUIRE(checks.size() == 2);
     CHECK(checks[1].claim == "emitted propagation in closed form");
     CHECK(failures(checks) == Claims{});
-}
-
-// Four unknowns, all together too many for closed formulas: in groups of two and two, one and three, four.
-TEST_CASE("the corrections of independent groups are checked, in closed form and left to elimination") {
-    const std::string a = "a = { position = 0.5, velocity = 0.25 }\n", b = "b = { position = 1, velocity = 0 }\n",
-                      c = "c = { position = 0.25, velocity = 0 }\n", d = "d = { position = 0.75, velocity = 0 }\n";
-    for (const Scene& scene :
-         {test::scene_of("a'^2/2 + b'^2 - a^4/4 - cos(b)", a + b, 4),
-          test::scene_of("a'^2/2 + b'^2/2 + c'^2/2 + d'^2/2 - a^4/4 - (b - c)^4 - (c - d)^4", a + b + c + d, 3),
-          test::scene_of("a'^2/2 + b'^2/2 + c'^2/2 + d'^2/2 - (a - b)^4 - (b - c)^4 - (c - d)^4", a + b + c + d, 3)}) {
-        const Derivation derivation = derive(scene);
-        CHECK(derivation.structure.unrolled);
-        Programs programs = optimised(derivation);
-        CHECK(failures(check_programs(derivation, programs)) == Claims{});
-        for (Program& program : programs.programs)
-            if (program.name == "correction")
-                for (Output& output : program.outputs)
-                    if (output.target == "delta[1]") output.value = programs.graph.negate(output.value);
-        CHECK(failures(check_programs(derivation, programs)) == Claims{"emitted Newton correction"});
-    }
 }
 
 TEST_CASE("what expansion cannot show is measured at 60 digits") {
@@ -246,12 +224,7 @@ TEST_CASE("a wrong program fails the check of what is emitted") {
         return failures(check_programs(derivation, programs));
     };
     CHECK(failed_after("energy") == Claims{"emitted energy, momentum, forces"});
-    CHECK(failed_after("residual") == Claims{"emitted stage equations"});
-    CHECK(failed_after("jacobian") == Claims{"emitted Jacobian"});
-    CHECK(failed_after("correction") == Claims{"emitted Newton correction"});
-    CHECK(failed_after("carry") == Claims{"emitted Newton correction"});
-    CHECK(failed_after("simple_start") == Claims{"emitted start values"});
-    CHECK(failed_after("extrapolated_start") == Claims{"emitted start values"});
-    CHECK(failed_after("arrive") == Claims{"emitted arrival"});
-    CHECK(failed_after("finish") == Claims{"emitted arrival"});
+    CHECK(failed_after("node") == Claims{"emitted energy, momentum, forces"});
+    CHECK(failed_after("acceleration") == Claims{"emitted energy, momentum, forces"});
+    CHECK(failed_after("momentum") == Claims{"emitted energy, momentum, forces"});
 }

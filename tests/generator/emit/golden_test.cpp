@@ -148,7 +148,7 @@ TEST_CASE("the emitted pendulum follows the hand-written one over 1000 steps to 
     CHECK(worst < 2e-12);  // measured 1.4e-13
 }
 
-TEST_CASE("residual, Jacobian and the other pieces of the emitted pendulum equal the hand-written ones") {
+TEST_CASE("the formulas of the emitted pendulum equal the hand-written ones") {
     using K = kernels::pendulum;
     using H = HandwrittenPendulum;
     const double h = 0.17;
@@ -159,38 +159,24 @@ TEST_CASE("residual, Jacobian and the other pieces of the emitted pendulum equal
     H::Coefficients w{};
     REQUIRE(K::prepare(parameters, h, k) == Status::ok);
     REQUIRE(H::prepare({0.7, 1.9}, h, w) == Status::ok);
-    const double q[] = {0.8}, p[] = {-1.1}, u[] = {0.4}, W0[] = {1.7}, W1[] = {-0.6}, v[] = {0.9};
-    const double base[] = {0.9, 1.3, 1.6}, Q[] = {0.85, 1.21}, W[] = {2.3, -1.9}, S[] = {3.1, -2.2};
-    const double history[] = {0.3, -0.7, 1.1, 1.9};
+    const double q[] = {0.8}, p[] = {-1.1}, v[] = {0.9};
     std::vector<double> ours, theirs;
     const auto collect = [](std::vector<double>& all, const auto& values) {
         all.insert(all.end(), std::begin(values), std::end(values));
     };
     const auto evaluate = [&](auto kernel, const auto& c, std::vector<double>& all) {
         using Kernel = decltype(kernel);
-        double one[1], two[2], three[3], four[4], s[1];
+        double one[1], s[1];
         all.push_back(Kernel::energy(c, q, p));
         Kernel::momentum(c, v, one), collect(all, one);
         Kernel::velocity(c, p, one), collect(all, one);
         Kernel::acceleration(c, q, one), collect(all, one);
         Kernel::node(c, q, one, s), collect(all, one), collect(all, s);
-        Kernel::drift(c, q, u, W0, one, three), collect(all, one), collect(all, three);
-        Kernel::simple_start(c, base, W0, two), collect(all, two);
-        Kernel::extrapolated_start(c, base, history, two), collect(all, two);
-        Kernel::residual(c, base, Q, W, two), collect(all, two);
-        Kernel::jacobian(c, S, four), collect(all, four);
-        CHECK(Kernel::correction(c, base, Q, W, S, two));
-        collect(all, two);
-        two[0] = 0.1, two[1] = 0.2;
-        double carried[] = {W[0], W[1]};
-        Kernel::carry(c, S, two, carried), collect(all, carried);
-        Kernel::arrive(c, base, W, one), collect(all, one);
-        Kernel::finish(c, v, W, W1, one), collect(all, one);
     };
     evaluate(K{}, k, ours);
     evaluate(H{}, w, theirs);
     REQUIRE(ours.size() == theirs.size());
-    REQUIRE(ours.size() == 26);
+    REQUIRE(ours.size() == 6);
     for (std::size_t i = 0; i < ours.size(); ++i) {
         INFO("value " << i << ": " << ours[i] << ", by hand " << theirs[i]);
         CHECK(relative(ours[i], theirs[i]) < 1e-14);  // measured: at most 3.0e-15

@@ -492,8 +492,9 @@ TEST_CASE("lanes give the same bits in any width, on every instruction set, from
     write_text(folder / "motion.hpp", source.header);
     write_text(folder / "widths.cpp", widths_program);
     const auto compiled = [&](const std::string& compiler, const std::string& target) {
-        const Finished built = run({compiler, "-std=c++17", "-O1", "-ffp-contract=off", "-march=" + target, "-I",
-                                    LOBATTO_SOURCE_DIR "/runtime/kernel", folder / "widths.cpp", "-o", folder / "widths"});
+        const Finished built =
+            run({compiler, "-std=c++17", "-O1", "-ffp-contract=off", "-march=" + target, "-I",
+                 LOBATTO_SOURCE_DIR "/runtime/kernel", folder / "widths.cpp", "-o", folder / "widths"});
         INFO(built.err);
         REQUIRE(built.exit_code == 0);
     };

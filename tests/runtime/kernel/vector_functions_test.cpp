@@ -277,8 +277,8 @@ std::string output_of(const std::string& compiler, const std::string& target, co
     std::vector<std::string> command = {compiler, "-std=c++17", "-march=" + target, "-fno-math-errno",
                                         "-ffp-contract=off"};
     command.insert(command.end(), flags.begin(), flags.end());
-    for (const std::string& word : {std::string("-I" LOBATTO_SOURCE_DIR "/runtime/kernel"), (folder / "check.cpp").string(),
-                                    std::string("-o"), (folder / "check").string()})
+    for (const std::string& word : {std::string("-I" LOBATTO_SOURCE_DIR "/runtime/kernel"),
+                                    (folder / "check.cpp").string(), std::string("-o"), (folder / "check").string()})
         command.push_back(word);
     const auto compiled = test::run(command);
     REQUIRE_MESSAGE(compiled.exit_code == 0, compiled.err);

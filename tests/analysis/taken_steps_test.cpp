@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The steps that kernels take solve the equations that they were derived from, and those of no other system.
+#include "analysis/accuracy/taken_steps.hpp"
+
+#include <doctest/doctest.h>
+
+#include "analysis/exact_start.hpp"
+#include "tests/scenes/scenes.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+// What the steps of `taken` leave in the equations of `derived`, as one trajectory and as a lane.
+std::pair<double, double> left(const Derivation& derived, const Derivation& taken) {
+    const Kernel kernel = test::kernel_in_own_cache(taken, Precision::double_);
+    const Kernel ensemble = ensemble_kernel_of(emit(taken), Precision::double_, 64);
+    REQUIRE(ensemble->lanes > 0);
+    const StartIn<double> start = start_in<double>(ExactStart(taken.scene), kernel, 0.1);
+    return {trajectory_leaves<double>(derived, kernel, start.parameters, start.q, start.p, 0.1),
+            lane_leaves(derived, kernel, ensemble, start.parameters, start.q, start.p, 0.1)};
+}
+
+Scene with_method(Scene scene, const Method& method) {
+    scene.method = method;
+    return scene;
+}
+
+}  // namespace
+
+TEST_CASE("steps of every form leave rounding in their equations") {
+    const Scene pendulum = test::pendulum_scene(4);
+    const Scene rod = test::scene_of("(1 + q^2)*q'^2/2 + cos(q)", "q = { position = 1, velocity = 0.3 }", 4);
+    const Scene linear = test::scene_of("x'^2/2 + y'^2/2 - x^2 - x*y - y^2",
+                                        "x = { position = 1, velocity = 0.3 }\ny = { position = 0, velocity = 1 }", 5);
+    for (const Scene& scene : {pendulum, with_method(pendulum, {Family::gauss, 3}),
+                               with_method(pendulum, {Family::splitting, 6}), rod, linear, test::coupled_scene(3)}) {
+        INFO(scene.lagrangian_text << ", " << scene.method.name());
+        const Derivation derivation = derive(scene);
+        const auto [trajectory, lane] = left(derivation, derivation);
+        CHECK(trajectory < 4);  // roundings; at most 1.2 measured
+        CHECK(lane < 4);
+        CHECK(trajectory > 0);
+    }
+}
+
+TEST_CASE("steps of another system, or of another method, leave more") {
+    const Derivation pendulum = derive(test::pendulum_scene(4));
+    const Derivation heavier =
+        derive(test::scene_of("m*q'^2/2 - m*omega^2*(1 - cos(q)) - q^4/1e8", "q = { position = 1.5, velocity = 0.25 }",
+                              4, "m = 2\nomega = 1.5"));
+    const auto [trajectory, lane] = left(pendulum, heavier);
+    CHECK(trajectory > 1e4);
+    CHECK(lane > 1e4);
+    const auto [other, other_lane] = left(derive(with_method(test::pendulum_scene(4), {Family::lobatto, 3})), pendulum);
+    CHECK(other > 1e4);
+    CHECK(other_lane > 1e4);
+}
