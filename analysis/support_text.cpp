@@ -39,8 +39,11 @@ std::string support_text(const std::vector<std::string>& names) {
     for (const SupportPart& part : support_parts) {
         if (!needed.contains(std::string(part.name))) continue;
         std::istringstream lines{std::string(part.text)};
-        for (std::string line; std::getline(lines, line);)
-            if (!line.starts_with(include)) whole += line + '\n';
+        for (std::string line; std::getline(lines, line);) {
+            const bool is_known = line.starts_with(include) || (line.starts_with("// SPDX") && !whole.empty()) ||
+                                  (line.empty() && whole.ends_with("\n\n"));
+            if (!is_known) whole += line + '\n';
+        }
     }
     return whole;
 }

@@ -41,17 +41,17 @@ constexpr Example examples[] = {{"pendulum", "one angle, cheap forces"},
 
 using Filter = std::function<bool(const Candidate&)>;
 
-const Measurement* fastest(const Laboratory& laboratory, double target, const Filter& filter) {
+const Measurement* fastest(const Experiment& experiment, double target, const Filter& filter) {
     const Measurement* best = nullptr;
-    for (const auto& [key, m] : laboratory.notebook().all())
+    for (const auto& [key, m] : experiment.store().all())
         if (m.complete && m.error <= target && filter(m.candidate) && (best == nullptr || m.seconds < best->seconds))
             best = &m;
     return best;
 }
 
-double least_error(const Laboratory& laboratory, const Filter& filter) {
+double least_error(const Experiment& experiment, const Filter& filter) {
     double least = std::numeric_limits<double>::infinity();
-    for (const auto& [key, m] : laboratory.notebook().all())
+    for (const auto& [key, m] : experiment.store().all())
         if (m.complete && filter(m.candidate)) least = std::min(least, m.error);
     return least;
 }
@@ -79,26 +79,26 @@ struct Tables {
 
 // What each member takes for each error, so that no table has a gap for want of a measurement: the coarsest steps that
 // reach it; then the fastest few with looser iterations. Runs of more than half a second are not begun.
-void measure_all(Laboratory& laboratory) {
-    Workshop& workshop = laboratory.workshop();
+void measure_all(Experiment& experiment) {
+    KernelBuilder& kernel_builder = experiment.kernel_builder();
     const auto say = [&](const Member& member) {
-        laboratory.request().say(
+        experiment.request().say(
             fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision)));
     };
     std::vector<std::pair<Member, std::vector<double>>> wishes;
     const std::vector<double> all(std::begin(targets), std::end(targets));
-    for (const Member& member : family_in(Precision::double_, laboratory.derivation().system.separable))
+    for (const Member& member : family_in(Precision::double_, experiment.derivation().system.separable))
         wishes.emplace_back(member, all);
     for (const int points : {4, 6, 8, 9})
         wishes.push_back({{Family::lobatto, points, Precision::single}, {1e-3, 1e-9}});
     for (const int points : {9, 12}) wishes.push_back({{Family::lobatto, points, Precision::extended}, {1e-12, 1e-17}});
     wishes.push_back({{Family::lobatto, 12, Precision::quadruple}, {1e-12, 1e-20}});
-    for (const auto& [member, goals] : wishes) workshop.order(member);
+    for (const auto& [member, goals] : wishes) kernel_builder.order(member);
     std::vector<std::vector<Measurement>> reached(std::size(targets));
     for (const auto& [member, goals] : wishes) {
         say(member);
         for (const double goal : goals) {
-            const Attempt crossing = cross(laboratory, member, goal);
+            const Attempt crossing = cross(experiment, member, goal);
             const auto place = std::find(std::begin(targets), std::end(targets), goal);
             if (crossing.measurement && member.precision == Precision::double_)
                 reached[static_cast<std::size_t>(place - std::begin(targets))].push_back(*crossing.measurement);
@@ -109,7 +109,7 @@ void measure_all(Laboratory& laboratory) {
                   [](const Measurement& a, const Measurement& b) { return a.seconds < b.seconds; });
         for (std::size_t k = 0; k < std::min<std::size_t>(4, reached[i].size()); ++k) {
             say(reached[i][k].candidate.member);
-            polish(laboratory, reached[i][k], targets[i]);
+            polish(experiment, reached[i][k], targets[i]);
         }
     }
 }
@@ -117,15 +117,15 @@ void measure_all(Laboratory& laboratory) {
 // Steps that pass over the fast oscillations of stiff springs: what energy is left.
 constexpr double long_steps[] = {0.5, 1, 2, 2.8, 4, 8, 16};
 
-std::string stiff_rows(Laboratory& laboratory) {
-    const double radians = laboratory.until() * laboratory.reference().frequency;
-    const StepLadder ladder(laboratory.reference().samples, 1.1);
+std::string stiff_rows(Experiment& experiment) {
+    const double radians = experiment.until() * experiment.reference().frequency;
+    const StepLadder ladder(experiment.reference().samples, 1.1);
     std::string rows;
     for (const Member& member : {Member{Family::lobatto, 2}, Member{Family::lobatto, 4}, Member{Family::lobatto, 8},
                                  Member{Family::gauss, 1}, Member{Family::gauss, 3}, Member{Family::gauss, 7}}) {
         rows += fmt::format("| {} |", Candidate{member, 0, 0}.name());
         for (const double step : long_steps) {
-            const Measurement m = laboratory.measure({member, ladder.at_least(radians / step), 0});
+            const Measurement m = experiment.measure({member, ladder.at_least(radians / step), 0});
             rows += m.complete && m.energy_error < 10 ? fmt::format(" {:.0e} |", m.energy_error) : " fails |";
         }
         rows += '\n';
@@ -135,16 +135,16 @@ std::string stiff_rows(Laboratory& laboratory) {
 
 void measure(const Example& example, const std::string& kept, bool draws, Tables& tables) {
     const Scene scene = read_scene(fmt::format("{}/scenes/{}.toml", LOBATTO_SOURCE_DIR, example.scene));
-    LaboratoryRequest request;
+    ExperimentRequest request;
     request.seconds = reference_seconds;
-    request.notebook = fmt::format("{}/{}.jsonl", kept, example.scene);
+    request.store = fmt::format("{}/{}.jsonl", kept, example.scene);
     const Derivation derivation = derive(scene);
     request.first = family_in(Precision::double_, derivation.system.separable);
     request.say = [&](const std::string& what) { fmt::print(stderr, "{}: {}\n", scene.name, what); };
-    Laboratory laboratory(derivation, scene, request);
-    measure_all(laboratory);
-    if (std::string(example.scene) == "stiff_fput") tables.stiff = stiff_rows(laboratory);
-    const double until = laboratory.until(), omega = laboratory.reference().frequency;
+    Experiment experiment(derivation, scene, request);
+    measure_all(experiment);
+    if (std::string(example.scene) == "stiff_fput") tables.stiff = stiff_rows(experiment);
+    const double until = experiment.until(), omega = experiment.reference().frequency;
 
     const auto any = [](const Member&) { return true; };
     const auto is_gauss = [](const Member& m) { return m.family == Family::gauss; };
@@ -152,36 +152,36 @@ void measure(const Example& example, const std::string& kept, bool draws, Tables
     std::string winners = fmt::format("| `{}`: {} |", example.scene, example.about),
                 gauss = fmt::format("| `{}` |", example.scene), high = gauss;
     for (const double target : targets) {
-        const Measurement* best = fastest(laboratory, target, doubles(any));
+        const Measurement* best = fastest(experiment, target, doubles(any));
         winners += best == nullptr ? " – |"
                                    : fmt::format(" {}, hω = {:.2g}: {:.3g} |", best->candidate.name(),
                                                  until / static_cast<double>(best->candidate.steps) * omega,
                                                  best->seconds / until * 1e9);
-        gauss += fmt::format(" {} |", ratio_text(fastest(laboratory, target, doubles(is_gauss)),
-                                                 fastest(laboratory, target, doubles(is_lobatto))));
+        gauss += fmt::format(" {} |", ratio_text(fastest(experiment, target, doubles(is_gauss)),
+                                                 fastest(experiment, target, doubles(is_lobatto))));
         high += fmt::format(
-            " {} |", ratio_text(fastest(laboratory, target, doubles([](const Member& m) { return m.order() <= 6; })),
-                                fastest(laboratory, target, doubles([](const Member& m) { return m.order() >= 18; }))));
+            " {} |", ratio_text(fastest(experiment, target, doubles([](const Member& m) { return m.order() <= 6; })),
+                                fastest(experiment, target, doubles([](const Member& m) { return m.order() >= 18; }))));
     }
     tables.winners += winners + '\n';
     tables.gauss += gauss + '\n';
     tables.high += high + '\n';
     tables.types += fmt::format(
         "| `{}` | {} | {} | {} | {} | {} | {} | {} |\n", example.scene,
-        ratio_text(fastest(laboratory, 1e-3, in(Precision::single)), fastest(laboratory, 1e-3, in(Precision::double_))),
-        error_text(least_error(laboratory, in(Precision::single))),
-        error_text(least_error(laboratory, in(Precision::double_))),
-        error_text(least_error(laboratory, in(Precision::extended))),
-        error_text(least_error(laboratory, in(Precision::quadruple))),
-        ratio_text(fastest(laboratory, 1e-12, in(Precision::extended)),
-                   fastest(laboratory, 1e-12, in(Precision::double_))),
-        ratio_text(fastest(laboratory, 1e-12, in(Precision::quadruple)),
-                   fastest(laboratory, 1e-12, in(Precision::double_))));
+        ratio_text(fastest(experiment, 1e-3, in(Precision::single)), fastest(experiment, 1e-3, in(Precision::double_))),
+        error_text(least_error(experiment, in(Precision::single))),
+        error_text(least_error(experiment, in(Precision::double_))),
+        error_text(least_error(experiment, in(Precision::extended))),
+        error_text(least_error(experiment, in(Precision::quadruple))),
+        ratio_text(fastest(experiment, 1e-12, in(Precision::extended)),
+                   fastest(experiment, 1e-12, in(Precision::double_))),
+        ratio_text(fastest(experiment, 1e-12, in(Precision::quadruple)),
+                   fastest(experiment, 1e-12, in(Precision::double_))));
 
     if (!draws) return;
     const std::string own = folder + "/" + example.scene;
     std::filesystem::create_directories(own);
-    draw_pictures(laboratory, own);
+    draw_pictures(experiment, own);
     std::filesystem::rename(own + "/work_precision.svg", own + ".svg");
     std::filesystem::remove_all(own);
     tables.pictures += fmt::format("![{0}](choosing/{0}.svg)\n", example.scene);

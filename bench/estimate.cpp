@@ -17,7 +17,7 @@
 #include <sstream>
 
 #include "analysis/tradeoff/calibration.hpp"
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 #include "cli/print/drawing.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -52,24 +52,24 @@ bool has(const std::string& file, const std::string& scene) {
 void measure(const std::string& path, const std::string& file) {
     const Scene scene = read_scene(path);
     if (has(file, scene.name)) return;
-    LaboratoryRequest wish;
+    ExperimentRequest wish;
     wish.seconds = seconds_a_scene;
     wish.wanted = 1e-12;
     const Derivation derivation = derive(scene);
     const std::vector<Member> list = members(derivation.system.separable);
     wish.first = list;
-    Laboratory laboratory(derivation, scene, wish);
-    const StepLadder ladder(laboratory.reference().samples, 1.35);
-    const double until = laboratory.until(), uncertainty = laboratory.reference().disagreement.back();
+    Experiment experiment(derivation, scene, wish);
+    const StepLadder ladder(experiment.reference().samples, 1.35);
+    const double until = experiment.until(), uncertainty = experiment.reference().disagreement.back();
     std::string rows;
     int count = 0;
     for (const Member& member : list) {
         double best = std::numeric_limits<double>::infinity();
         int no_better = 0;
-        const double coarsest = until * laboratory.reference().frequency / fewest_radians;
+        const double coarsest = until * experiment.reference().frequency / fewest_radians;
         for (std::int64_t steps = ladder.at_least(std::max(1.0, coarsest)); steps < 1000000;
              steps = ladder.next(steps)) {
-            const Measurement m = laboratory.measure({member, steps, 0});
+            const Measurement m = experiment.measure({member, steps, 0});
             no_better = m.complete && m.error < 0.7 * best ? 0 : no_better + 1;
             if (m.complete) best = std::min(best, m.error);
             if (m.complete && m.error > 100 * uncertainty && m.error < 0.1) {
@@ -82,7 +82,7 @@ void measure(const std::string& path, const std::string& file) {
     }
     if (count == 0) rows = scene.name + ",,,,,,,\n";  // nobody knows this motion to its end
     std::ofstream(file, std::ios::app) << rows << std::flush;
-    fmt::print(stderr, "{}: {} runs in {:.0f} s\n", scene.name, count, laboratory.elapsed());
+    fmt::print(stderr, "{}: {} runs in {:.0f} s\n", scene.name, count, experiment.elapsed());
 }
 
 std::map<std::string, std::vector<Measurement>> read(const std::string& path) {
@@ -170,7 +170,7 @@ It looks at 64 of its states, and at two or three steps from each; and at the fe
 - **Halves.** With forces or explicit time there is no such energy, and Gauss conserves its quadratic part whatever the error. There the end of a step is compared with that of two steps of half its length,
   and the differences are added.
 - **Polynomials.** The polynomial of a step, carried on into the next, misses that one's by J. One harmonic oscillation has the same J, and its phase error is known exactly (D20). If that is larger,
-  it is taken. Alone it will not do: on motions with harmonics it is too small, the more so the higher the order, up to 10⁹ times with 12 points, because the error is made by harmonics that the polynomial does not resolve.
+  it is taken. FallbackKernel it will not do: on motions with harmonics it is too small, the more so the higher the order, up to 10⁹ times with 12 points, because the error is made by harmonics that the polynomial does not resolve.
 - **Single steps.** Of all kept states it also keeps those after which a position, a momentum or the energy changes most. From each it takes one step and two of half its length: their difference, relative to
   the amplitude, is an error that has been made once, and the estimate is at least that. On ordinary motions it is far below the rest; in a close encounter it decides. Where the difference is more than a tenth of
   what the step moves, or on the straight way from one state to the next a velocity or a force is 100 times as large as at both ends (the step jumps over a singularity), `run` warns that the step does not

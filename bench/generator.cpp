@@ -103,7 +103,8 @@ int main() {
         "compile, s |\n|---|---|---|---|---|---|---|---|\n";
     fmt::print(
         "# How fast the generator is\n\nWritten by `cmake --build build/release --target bench_generator && "
-        "build/release/bench_generator > docs/generator_speed.md` on {}, {} cores; best of five derivations, best "
+        "build/release/bench_generator > docs/measurements/generator_speed.md` on {}, {} cores; best of five "
+        "derivations, best "
         "of three cold compilations. A kernel is compiled once; then it comes from the cache.\n\n{}",
         processor(), sysconf(_SC_NPROCESSORS_ONLN), head);
     const std::vector<std::pair<std::string, std::string>> scenes = {

@@ -55,7 +55,7 @@ template <class Integrator>
 using Compiled = std::map<double, std::unique_ptr<Integrator>>;
 
 Contestant taylor(const Problem& problem, bool fast_math) {
-    using Single = heyoka::taylor_adaptive<double>;
+    using ScalarFallback = heyoka::taylor_adaptive<double>;
     using Batch = heyoka::taylor_adaptive_batch<double>;
     namespace kw = heyoka::kw;
     const auto single = std::make_shared<Compiled<Single>>();

@@ -33,11 +33,11 @@ constexpr double surely_dearer = 1.5;  // by count than the fastest by the clock
 constexpr std::int64_t looks = 1500;   // steps of a choice whose error is checked, evenly spread
 
 // The largest error of a choice over its own steps, against Gauss 10 in long double with shorter and shorter ones.
-double checked_error(Laboratory& laboratory, const Candidate& candidate) {
-    const Reference& reference = laboratory.reference();
+double checked_error(Experiment& experiment, const Candidate& candidate) {
+    const Reference& reference = experiment.reference();
     const std::size_t n = reference.n, columns = 1 + 2 * n;
-    const ExactStart exact(laboratory.scene());
-    const Kernel kernel = laboratory.workshop().kernel(candidate.member);
+    const ExactStart exact(experiment.scene());
+    const Kernel kernel = experiment.kernel_builder().kernel(candidate.member);
     const double h = reference.until / static_cast<double>(candidate.steps);
     LoadedStepper<double> stepper(kernel);
     const StartIn<double> start = start_in<double>(exact, kernel, h);
@@ -53,7 +53,7 @@ double checked_error(Laboratory& laboratory, const Candidate& candidate) {
         stepper.advance(call) != LOBATTO_OK)
         return infinity;
     using real = long double;
-    const Kernel wide_kernel = laboratory.workshop().kernel({Family::gauss, 10, Precision::extended});
+    const Kernel wide_kernel = experiment.kernel_builder().kernel({Family::gauss, 10, Precision::extended});
     const double radians = h * reference.frequency;
     std::int64_t parts = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(radians / 0.4)));
     double worst = infinity;
@@ -88,7 +88,7 @@ double checked_error(Laboratory& laboratory, const Candidate& candidate) {
 // each member and tolerance. Steps that Newton's iteration takes cost more.
 class Cost {
 public:
-    explicit Cost(Laboratory& laboratory) : laboratory_(laboratory) {}
+    explicit Cost(Experiment& experiment) : laboratory_(experiment) {}
 
     // Of the whole motion, in seconds; infinite for one that does not reach the end.
     double of(const Measurement& m) {
@@ -111,7 +111,7 @@ private:
         const std::pair key(like.member, like.tolerance);
         const auto known = prices_.find(key);
         if (known != prices_.end()) return known->second;
-        const Kernel kernel = laboratory_.workshop().kernel(like.member);
+        const Kernel kernel = laboratory_.kernel_builder().kernel(like.member);
         const double radians = laboratory_.until() * laboratory_.reference().frequency;
         const StepLadder ladder(laboratory_.reference().samples, 1.1);
         std::vector<Run> runs;
@@ -141,31 +141,31 @@ private:
         return prices_[key] = price;
     }
 
-    Laboratory& laboratory_;
+    Experiment& laboratory_;
     std::map<std::pair<Member, double>, Price> prices_;
 };
 
 // Everything: all members, steps in ratios of 1.1, tolerances in ratios of 100; a ladder ends when it has reached the
 // finest target or is four times as dear as another way to the same error.
-std::vector<Measurement> brute_force(Laboratory& laboratory, Cost& cost, double finest) {
+std::vector<Measurement> brute_force(Experiment& experiment, Cost& cost, double finest) {
     std::vector<Measurement> all;
     std::map<double, double> front;  // error, the least cost of one as small: both fall along it
     const auto cheapest_within = [&](double error) {
         const auto next = front.upper_bound(error);
         return next == front.begin() ? infinity : std::prev(next)->second;
     };
-    const std::vector<Member> members = family_in(Precision::double_, laboratory.derivation().system.separable);
-    for (const Member& member : members) laboratory.workshop().order(member);
-    const StepLadder ladder(laboratory.reference().samples, 1.1);
+    const std::vector<Member> members = family_in(Precision::double_, experiment.derivation().system.separable);
+    for (const Member& member : members) experiment.kernel_builder().order(member);
+    const StepLadder ladder(experiment.reference().samples, 1.1);
     for (const Member& member : members) {
-        const Kernel kernel = laboratory.workshop().kernel(member);
+        const Kernel kernel = experiment.kernel_builder().kernel(member);
         for (const double tolerance : {0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4}) {
             if (tolerance > 0 && !member.iterates()) break;
             int dear = 0, no_better = 0;
             double least = infinity;
-            const double fewest = laboratory.until() * laboratory.reference().frequency / 4;
+            const double fewest = experiment.until() * experiment.reference().frequency / 4;
             for (std::int64_t steps = ladder.at_least(std::max(1.0, fewest));; steps = ladder.next(steps)) {
-                const Measurement m = laboratory.measurer().measure(kernel, {member, steps, tolerance}, false);
+                const Measurement m = experiment.measurer().measure(kernel, {member, steps, tolerance}, false);
                 all.push_back(m);
                 const double price = cost.of(m);
                 if (m.seconds > 3) break;
@@ -195,15 +195,17 @@ struct Duel {
 
 // The choice against the fastest of the brute force that keeps the target at its steps too, not only at the samples.
 // Those that may be it are timed, in the order of what they cost by count, then it and the choice in turn.
-Duel duel(Laboratory& laboratory, Cost& cost, const Candidate& choice, const std::vector<Measurement>& all,
+Duel duel(Experiment& experiment, Cost& cost, const Candidate& choice, const std::vector<Measurement>& all,
           double target) {
     std::vector<std::pair<double, const Measurement*>> reaching;
     for (const Measurement& m : all)
         if (m.complete && m.error <= target) reaching.emplace_back(cost.of(m), &m);
     std::sort(reaching.begin(), reaching.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    const auto kernel_for = [&](const Candidate& candidate) { return laboratory.workshop().kernel(candidate.member); };
+    const auto kernel_for = [&](const Candidate& candidate) {
+        return experiment.kernel_builder().kernel(candidate.member);
+    };
     const auto shorten = [&](const Candidate& candidate, double& seconds) {
-        seconds = std::min(seconds, laboratory.measurer().time_once(kernel_for(candidate), candidate).seconds);
+        seconds = std::min(seconds, experiment.measurer().time_once(kernel_for(candidate), candidate).seconds);
     };
     Duel result;
     for (const auto& [price, m] : reaching) {
@@ -211,7 +213,7 @@ Duel duel(Laboratory& laboratory, Cost& cost, const Candidate& choice, const std
         double seconds = infinity;
         for (int round = 0; round < 3; ++round) shorten(m->candidate, seconds);
         if (seconds < result.best &&
-            laboratory.measurer().error_on_steps(kernel_for(m->candidate), m->candidate) <= target) {
+            experiment.measurer().error_on_steps(kernel_for(m->candidate), m->candidate) <= target) {
             result.best = seconds;
             result.winner = m->candidate;
         }
@@ -287,15 +289,15 @@ void examine(const std::string& path, const std::vector<double>& targets, double
         if (!has_row(file, fmt::format("{},{:.0e},", scene.name, target)))
             if (const auto promise = promise_for(scene, target, budget, file)) promises.push_back(*promise);
     if (promises.empty()) return;
-    LaboratoryRequest wish;
+    ExperimentRequest wish;
     wish.seconds = 120;
     wish.wanted = 1e-14;
-    Laboratory laboratory(derive(scene), scene, wish);
-    Cost cost(laboratory);
-    const std::vector<Measurement> all = brute_force(laboratory, cost, promises.back().target);
+    Experiment experiment(derive(scene), scene, wish);
+    Cost cost(experiment);
+    const std::vector<Measurement> all = brute_force(experiment, cost, promises.back().target);
     for (const Promise& promise : promises) {
-        const double error = checked_error(laboratory, promise.candidate);
-        const Duel result = duel(laboratory, cost, promise.candidate, all, promise.target);
+        const double error = checked_error(experiment, promise.candidate);
+        const Duel result = duel(experiment, cost, promise.candidate, all, promise.target);
         append(file, fmt::format("{},{:.0e},{:.3g},{:.3g},{:.3g},{:.3g},{:.3g},{:.1f},{} against {}", scene.name,
                                  promise.target, promise.predicted, error, result.ours, result.best,
                                  result.ours / result.best, promise.seconds, candidate_text(promise.candidate),

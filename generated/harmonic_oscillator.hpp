@@ -21,13 +21,13 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "67a793d8bf7e76ac";
+    static constexpr const char* digest = "848b818dfbf9d8ed";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 0;          // of the equations of a step; 0: none to solve
-    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers: sweeps first
+    static constexpr bool any_number = true;    // formulas are templates on the type of numbers: fixed-point iteration first
     static constexpr bool linear = true;        // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene
@@ -129,7 +129,7 @@ struct harmonic_oscillator {
 
     // (D1) W = M^-1 grad V(q) alone; n.
     template <class given, class number>
-    static void acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
+    static void minus_acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
         W[0] = k.omega_squared * q[0];
     }
 

@@ -20,13 +20,13 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "b95097b277b07615";
+    static constexpr const char* digest = "8f5322287b7e8e24";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 2;          // of the equations of a step; 0: none to solve
-    static constexpr bool any_number = true;    // formulas of a state are templates on the type of its numbers: sweeps first
+    static constexpr bool any_number = true;    // formulas are templates on the type of numbers: fixed-point iteration first
     static constexpr bool linear = false;       // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene
@@ -49,7 +49,7 @@ struct pendulum {
     static constexpr int group_first[2] = {0, 1};
     static constexpr int group_bandwidth[1] = {0};
     static constexpr bool has_remainder = false;  // forces have no function without a part
-    static constexpr bool costly = true;        // forces are evaluated less often for having second derivatives
+    static constexpr bool uses_hessian = true;  // forces are evaluated less often for having second derivatives
 
     // nodes on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1
     static constexpr real c[4] = {0.0, 0.276393202250021, 0.7236067977499789, 1.0};
@@ -130,7 +130,7 @@ struct pendulum {
     // (D1) W = M^-1 grad V(q) alone; n.
     template <class given, class number>
     LOBATTO_INLINE
-    static void acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
+    static void minus_acceleration(const CoefficientsOf<given>& k, const number* q, number* W) {
         W[0] = k.omega_squared * lobatto::sin(q[0]);
     }
 };

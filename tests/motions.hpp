@@ -128,7 +128,7 @@ inline Derivation derivation_of(const Motion& motion, const std::string& method,
                   general);
 }
 
-// Without sweeps: each step by Newton's iteration alone.
+// Without fixed-point iterations: each step by Newton's iteration alone.
 inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
     EmitOptions options;
     options.precision = precision;

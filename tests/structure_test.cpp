@@ -191,9 +191,9 @@ TEST_CASE("no two headers define a type of the same name: the linker would mix t
                 if (std::regex_match(line, match, opening)) space = match[1];
                 if (!std::regex_match(line, match, definition)) continue;
                 const std::string name = space + "::" + match[1].str(), here = fs::relative(file, tree);
-                const auto [known, is_new] = home.emplace(name, here);
-                INFO(name << " is defined in " << known->second << " and in " << here);
-                CHECK(is_new);
+                const std::string& first = home.emplace(name, here).first->second;
+                INFO(name << " is defined in " << first << " and in " << here);
+                CHECK(first == here);
             }
         }
     CHECK(home.size() > 200);

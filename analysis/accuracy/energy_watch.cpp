@@ -93,7 +93,7 @@ EnergyWatch::EnergyWatch(const Derivation& derivation, const Kernel& kernel)
       columns_(1 + 2 * derivation.system.q.size()),
       rows_a_step_(1 + derivation.scene.outputs.dense) {}
 
-void EnergyWatch::look(const Records& records) {
+void EnergyWatch::observe(const Records& records) {
     if (!watches_) return;
     for (std::int64_t i = 0; i < records.count; ++i) {
         if (seen_++ % rows_a_step_ != 0) continue;
@@ -117,7 +117,7 @@ void EnergyWatch::look(const Records& records) {
     }
 }
 
-std::vector<double> EnergyWatch::seen() const {
+std::vector<double> EnergyWatch::save() const {
     std::vector<double> all{
         static_cast<double>(seen_), static_cast<double>(stride_),        energy_start_, energy_error_,
         static_cast<double>(lost_), static_cast<double>(leaving_.size())};
@@ -126,7 +126,7 @@ std::vector<double> EnergyWatch::seen() const {
     return all;
 }
 
-void EnergyWatch::go_on_after(const std::vector<double>& seen) {
+void EnergyWatch::restore(const std::vector<double>& seen) {
     auto at = seen.begin();
     seen_ = std::llround(*at++);
     stride_ = std::llround(*at++);

@@ -19,11 +19,11 @@ public:
     static bool can_watch(const Derivation& derivation);
     EnergyWatch(const Derivation& derivation, const Kernel& kernel);
     // Looks at the kept states go by: some of all times, and those where the energy error has doubled.
-    void look(const Records& records);
+    void observe(const Records& records);
 
     // What it has seen so far, for a later run that goes on.
-    std::vector<double> seen() const;
-    void go_on_after(const std::vector<double>& seen);
+    std::vector<double> save() const;
+    void restore(const std::vector<double>& seen);
 
     // The first such state, where the energy is off by half of the mean kinetic energy, and by more than rounding of
     // the positions explains, or not real: no path of this Lagrangian goes there. What to tell of it, as of any stop;

@@ -88,7 +88,7 @@ template <class real>
 HardestSteps<real>::HardestSteps() : places_(2 * shared + 1) {}
 
 template <class real>
-void HardestSteps<real>::look(const std::vector<real>& state, real energy) {
+void HardestSteps<real>::observe(const std::vector<real>& state, real energy) {
     const std::size_t n = state.size() / 2;
     const auto consider = [&](std::size_t place, real change) {
         if (change < real(0)) change = -change;
@@ -116,7 +116,7 @@ States<real> HardestSteps<real>::states() const {
 }
 
 template <class real>
-std::vector<real> HardestSteps<real>::seen() const {
+std::vector<real> HardestSteps<real>::save() const {
     if (before_.empty()) return {};
     std::vector<real> all = before_;
     all.push_back(energy_before_);
@@ -130,7 +130,7 @@ std::vector<real> HardestSteps<real>::seen() const {
 }
 
 template <class real>
-void HardestSteps<real>::go_on_after(const std::vector<real>& seen, std::size_t columns) {
+void HardestSteps<real>::restore(const std::vector<real>& seen, std::size_t columns) {
     if (seen.empty()) return;
     const auto width = static_cast<std::ptrdiff_t>(columns);
     auto at = seen.begin();

@@ -16,12 +16,12 @@ template <class real>
 class HardestSteps {
 public:
     HardestSteps();
-    void look(const std::vector<real>& state, real energy);  // not a number: it is not known
-    States<real> states() const;                             // in the order of time, each once
+    void observe(const std::vector<real>& state, real energy);  // not a number: it is not known
+    States<real> states() const;                                // in the order of time, each once
 
     // What it has seen so far, for a later run that goes on: `columns` a state.
-    std::vector<real> seen() const;
-    void go_on_after(const std::vector<real>& seen, std::size_t columns);
+    std::vector<real> save() const;
+    void restore(const std::vector<real>& seen, std::size_t columns);
 
 private:
     struct Place {

@@ -78,7 +78,7 @@ void StepJudge::keep(std::int64_t number, std::vector<double> row) {
     some_.emplace(place, State{number, std::move(row)});
 }
 
-void StepJudge::look(const Records& records) {
+void StepJudge::observe(const Records& records) {
     const std::size_t columns = static_cast<std::size_t>(records.columns);
     for (std::int64_t i = 0; i < records.count; ++i) {
         const double* const row = records.rows + static_cast<std::size_t>(i) * columns;
@@ -89,17 +89,17 @@ void StepJudge::look(const Records& records) {
         }
         const std::int64_t number = seen_++;
         if (number % rows_a_step_ != 0) continue;
-        hardest_.look({row, row + columns}, records.energy != nullptr ? records.energy[i] : std::nan(""));
+        hardest_.observe({row, row + columns}, records.energy != nullptr ? records.energy[i] : std::nan(""));
         if (some_.size() < most_judged_states || scrambled(number) < some_.rbegin()->first)
             keep(number, {row, row + columns});
     }
 }
 
-std::vector<double> StepJudge::seen() const {
+std::vector<double> StepJudge::save() const {
     std::vector<double> all{static_cast<double>(seen_)};
     all.insert(all.end(), least_.begin(), least_.end());
     all.insert(all.end(), most_.begin(), most_.end());
-    const std::vector<double> by_hardest = hardest_.seen();
+    const std::vector<double> by_hardest = hardest_.save();
     all.push_back(static_cast<double>(by_hardest.size()));
     all.insert(all.end(), by_hardest.begin(), by_hardest.end());
     for (const auto& [place, state] : some_) {
@@ -109,7 +109,7 @@ std::vector<double> StepJudge::seen() const {
     return all;
 }
 
-void StepJudge::go_on_after(const std::vector<double>& seen) {
+void StepJudge::restore(const std::vector<double>& seen) {
     const std::ptrdiff_t width = 2 * std::ssize(groups_);
     auto at = seen.begin();
     const auto take = [&](std::ptrdiff_t count) {
@@ -122,7 +122,7 @@ void StepJudge::go_on_after(const std::vector<double>& seen) {
     least_ = take(width);
     most_ = take(width);
     const std::ptrdiff_t by_hardest = std::llround(*at++);
-    hardest_.go_on_after(take(by_hardest), static_cast<std::size_t>(1 + width));
+    hardest_.restore(take(by_hardest), static_cast<std::size_t>(1 + width));
     while (seen.end() - at > 1 + width) {
         const std::int64_t number = std::llround(*at++);
         keep(number, take(1 + width));

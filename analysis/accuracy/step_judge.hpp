@@ -19,11 +19,11 @@ public:
     // Looks at the kept states go by: how far the motion goes, where it changes most, and a few states of all its
     // times, chosen as if at random: equal distances could go along with the motion's own rhythm.
     explicit StepJudge(const Scene& scene);
-    void look(const Records& records);
+    void observe(const Records& records);
 
     // What it has seen so far, for a later run that goes on.
-    std::vector<double> seen() const;
-    void go_on_after(const std::vector<double>& seen);
+    std::vector<double> save() const;
+    void restore(const std::vector<double>& seen);
 
     enum class Neighbours { unknown, stay, part_quickly };  // motions that begin beside this one
     struct Judgement {

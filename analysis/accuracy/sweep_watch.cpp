@@ -59,7 +59,7 @@ bool SweepWatch::prepare(const EnsembleTrajectory& trajectory) {
     return true;
 }
 
-void SweepWatch::look(const EnsembleTrajectory& trajectory) {
+void SweepWatch::observe(const EnsembleTrajectory& trajectory) {
     const std::size_t n = derivation_.system.q.size();
     if (n > most_coordinates || looks_ == most_looks || !prepare(trajectory)) return;
     ++looks_;
@@ -108,7 +108,7 @@ bool SweepWatch::run_again() {
     again.steps = request_.steps;
     again.interrupted = request_.interrupted;
     EnergyWatch watch(derivation_, *alone_);
-    again.sink = [&](const Records& records) { watch.look(records); };
+    again.sink = [&](const Records& records) { watch.observe(records); };
     return integrate(*alone_, again).status == LOBATTO_OK && !watch.departure(derivation_, *alone_, again).empty();
 }
 

@@ -25,7 +25,7 @@ public:
 
     // Looks for the largest frequency at the start and at the last kept state; of the first 1000 trajectories, of up to
     // 64 coordinates.
-    void look(const EnsembleTrajectory& trajectory);
+    void observe(const EnsembleTrajectory& trajectory);
     // Of the steps looked at, as a sentence; empty where none is beyond the limit.
     std::string warning() const;
 

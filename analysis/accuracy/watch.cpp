@@ -28,7 +28,7 @@ Watch::Watch(const Scene& scene, const Structure& structure, const LoadedStepper
                                                 : static_cast<long double>(velocity[0]);
 }
 
-void Watch::look(const Records& records) {
+void Watch::observe(const Records& records) {
     const int n = (records.columns - 1) / 2;
     for (std::int64_t i = 0; i < records.count; ++i, ++seen_) {
         if (seen_ % (between_ + 1) != 0) continue;  // between two steps
@@ -46,7 +46,7 @@ void Watch::look_at_end(const TrajectoryResult& result) {
     if (closed_) compare(result.time, result.q[0]);
 }
 
-std::vector<double> Watch::seen() const {
+std::vector<double> Watch::save() const {
     return {position_error_,
             static_cast<double>(seen_),
             static_cast<double>(compared_),
@@ -55,7 +55,7 @@ std::vector<double> Watch::seen() const {
             discrete_error_};
 }
 
-void Watch::go_on_after(const std::vector<double>& seen) {
+void Watch::restore(const std::vector<double>& seen) {
     position_error_ = seen.at(0);
     seen_ = std::llround(seen.at(1));
     compared_ = std::llround(seen.at(2));

@@ -18,14 +18,14 @@ public:
     Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
           const std::vector<double>& velocity);
 
-    void look(const Records& records);
+    void observe(const Records& records);
     void look_at_end(const TrajectoryResult& result);  // whatever was skipped: the last state is compared
 
     std::optional<double> discrete_error() const;  // largest |H_d - H_d(0)| / |H_d(0)|, of linear systems
     std::optional<double> position_error() const;  // largest |q - exact q|, where the solution is known in closed form
     // What it has seen so far, for a later run that goes on.
-    std::vector<double> seen() const;
-    void go_on_after(const std::vector<double>& seen);
+    std::vector<double> save() const;
+    void restore(const std::vector<double>& seen);
 
     bool is_elliptic() const { return closed_ && closed_->kind == ClosedSolution::Kind::pendulum; }
 

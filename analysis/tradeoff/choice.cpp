@@ -21,14 +21,14 @@ constexpr double least_part = 0.1;       // and how well it must be
 
 Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& request) {
     double goal = safety * request.error;
-    LaboratoryRequest wish;
+    ExperimentRequest wish;
     wish.seconds = request.seconds;
     wish.wanted = reference_part * request.error;
     wish.first = first_guess(goal, 4);
     wish.interrupted = request.interrupted;
     wish.say = request.say;
-    Laboratory laboratory(std::move(derivation), scene, wish);
-    const Reference& reference = laboratory.reference();
+    Experiment experiment(std::move(derivation), scene, wish);
+    const Reference& reference = experiment.reference();
     const double uncertainty = reference.disagreement.back();
     if (!(uncertainty <= least_part * request.error)) {
         const double known = reference.trusted_until(least_part * request.error);
@@ -44,10 +44,10 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     Search found;
     double error = 0;
     for (int attempt = 0; attempt < attempts; ++attempt) {
-        found = search(laboratory, goal);
+        found = search(experiment, goal);
         if (!found.best) break;
         request.say("checking all steps");
-        error = laboratory.measurer().error_on_steps(laboratory.workshop().kernel(found.best->candidate.member),
+        error = experiment.measurer().error_on_steps(experiment.kernel_builder().kernel(found.best->candidate.member),
                                                      found.best->candidate);
         if (error <= request.error * (1 - uncertainty / request.error)) break;
         goal *= 0.8 * request.error / error;
@@ -67,7 +67,7 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
             found.complete ? "" : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
     }
     Choice choice;
-    choice.measurement = laboratory.measurer().measure(laboratory.workshop().kernel(found.best->candidate.member),
+    choice.measurement = experiment.measurer().measure(experiment.kernel_builder().kernel(found.best->candidate.member),
                                                        found.best->candidate, true);
     choice.measurement.seconds = std::fmin(choice.measurement.seconds, found.best->seconds);
     choice.measurement.error = std::fmax(choice.measurement.error, error);
@@ -78,7 +78,7 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     choice.stability_limit = stability_limit(quadrature_of(found.best->candidate.member.method()));
     choice.members = found.members;
     choice.complete = found.complete;
-    choice.seconds = laboratory.elapsed();
+    choice.seconds = experiment.elapsed();
     return choice;
 }
 

@@ -11,16 +11,16 @@
 
 namespace lobatto {
 
-std::vector<Measurement> pareto_front(const Laboratory& laboratory) {
+std::vector<Measurement> pareto_front(const Experiment& experiment) {
     std::vector<Measurement> complete, front;
-    for (const auto& [key, m] : laboratory.notebook().all())
+    for (const auto& [key, m] : experiment.store().all())
         if (m.complete) complete.push_back(m);
     std::sort(complete.begin(), complete.end(), [&](const Measurement& a, const Measurement& b) {
-        return std::tuple(a.seconds, laboratory.figure(a), a.candidate.key()) <
-               std::tuple(b.seconds, laboratory.figure(b), b.candidate.key());
+        return std::tuple(a.seconds, experiment.figure(a), a.candidate.key()) <
+               std::tuple(b.seconds, experiment.figure(b), b.candidate.key());
     });
     for (const Measurement& m : complete)
-        if (front.empty() || laboratory.figure(m) < laboratory.figure(front.back())) front.push_back(m);
+        if (front.empty() || experiment.figure(m) < experiment.figure(front.back())) front.push_back(m);
     return front;
 }
 
@@ -55,10 +55,10 @@ std::vector<Member> tour(bool is_separable) {
 }
 
 // The least time of what is as accurate or better.
-double fastest_within(const Laboratory& laboratory, double figure) {
+double fastest_within(const Experiment& experiment, double figure) {
     double seconds = infinity;
-    for (const auto& [key, m] : laboratory.notebook().all())
-        if (m.complete && laboratory.figure(m) <= figure) seconds = std::min(seconds, m.seconds);
+    for (const auto& [key, m] : experiment.store().all())
+        if (m.complete && experiment.figure(m) <= figure) seconds = std::min(seconds, m.seconds);
     return seconds;
 }
 
@@ -71,18 +71,18 @@ struct Scan {
 };
 
 // From coarse to fine until it has lost, or rounding is reached.
-void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
-    const StepLadder ladder = laboratory.ladder(scan.ratio);
-    const double longest_run = laboratory.request().seconds / 40;
+void work_on(Experiment& experiment, const Scan& scan, double reserve) {
+    const StepLadder ladder = experiment.ladder(scan.ratio);
+    const double longest_run = experiment.request().seconds / 40;
     double least = infinity;
     int no_better = 0, dominated = 0;
-    for (std::int64_t steps = ladder.at_least(laboratory.fewest_steps());
-         static_cast<double>(steps) < most_steps && (laboratory.left() > reserve || !std::isfinite(least));
+    for (std::int64_t steps = ladder.at_least(experiment.fewest_steps());
+         static_cast<double>(steps) < most_steps && (experiment.left() > reserve || !std::isfinite(least));
          steps = ladder.next(steps)) {
-        const Measurement m = laboratory.measure({scan.member, steps, scan.tolerance});
+        const Measurement m = experiment.measure({scan.member, steps, scan.tolerance});
         if (m.seconds > longest_run) return;
         if (!m.complete) continue;
-        const double figure = laboratory.figure(m);
+        const double figure = experiment.figure(m);
         no_better = figure > 0.7 * least ? no_better + 1 : 0;
         least = std::min(least, figure);
         const double rounding =
@@ -91,15 +91,15 @@ void work_on(Laboratory& laboratory, const Scan& scan, double reserve) {
         // Another is as accurate in a fraction of the time; four times in a row, because the coarsest steps may be
         // slow.
         const double lead = scan.ratio < 1.5 ? 2 : 4;
-        dominated = figure < 0.1 && m.seconds > lead * fastest_within(laboratory, figure) ? dominated + 1 : 0;
+        dominated = figure < 0.1 && m.seconds > lead * fastest_within(experiment, figure) ? dominated + 1 : 0;
         if (dominated >= 4) return;
     }
 }
 
 // What would tell more about the members that are best at present; none is done twice.
-std::optional<Scan> refinement(const Laboratory& laboratory, const std::set<Scan>& done) {
+std::optional<Scan> refinement(const Experiment& experiment, const std::set<Scan>& done) {
     std::vector<Member> winners;
-    for (const Measurement& m : pareto_front(laboratory))
+    for (const Measurement& m : pareto_front(experiment))
         if (m.error < 0.1 && std::find(winners.begin(), winners.end(), m.candidate.member) == winners.end())
             winners.push_back(m.candidate.member);
     for (const double ratio : {1.2, 1.08})
@@ -119,45 +119,45 @@ std::vector<Member> first_of_tour() {
     return {members.begin(), members.begin() + 4};
 }
 
-void explore(Laboratory& laboratory) {
-    Workshop& workshop = laboratory.workshop();
-    const double all = laboratory.request().seconds, reserve = 0.12 * all;
+void explore(Experiment& experiment) {
+    KernelBuilder& kernel_builder = experiment.kernel_builder();
+    const double all = experiment.request().seconds, reserve = 0.12 * all;
     double last_order = 0.25 * all;  // what is ordered later would not be used
-    std::vector<Member> waiting = tour(laboratory.derivation().system.separable);
+    std::vector<Member> waiting = tour(experiment.derivation().system.separable);
     std::set<Scan> done;
     const auto name = [](const Member& member) {
         return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));
     };
     // However long the reference took: something is measured.
-    const auto has_time = [&] { return laboratory.left() > reserve || laboratory.notebook().all().empty(); };
+    const auto has_time = [&] { return experiment.left() > reserve || experiment.store().all().empty(); };
     while (has_time()) {
-        laboratory.check_interruption();
+        experiment.check_interruption();
         std::size_t at_work = 0;
         for (const Member& member : waiting)
-            at_work += workshop.is_ordered(member) && !workshop.is_ready(member) ? 1 : 0;
-        const auto next =
-            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return !workshop.is_ordered(m); });
-        if (at_work <= workshop.threads() && next != waiting.end() && laboratory.left() > last_order)
-            workshop.order(*next);
+            at_work += kernel_builder.is_ordered(member) && !kernel_builder.is_ready(member) ? 1 : 0;
+        const auto next = std::find_if(waiting.begin(), waiting.end(),
+                                       [&](const Member& m) { return !kernel_builder.is_ordered(m); });
+        if (at_work <= kernel_builder.threads() && next != waiting.end() && experiment.left() > last_order)
+            kernel_builder.order(*next);
         const auto ready =
-            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return workshop.is_ready(m); });
+            std::find_if(waiting.begin(), waiting.end(), [&](const Member& m) { return kernel_builder.is_ready(m); });
         if (ready != waiting.end()) {
             const Member member = *ready;
             waiting.erase(ready);
-            last_order = std::max(last_order, reserve + 1.5 * workshop.compile_seconds(member));
-            laboratory.request().say("measuring " + name(member));
-            work_on(laboratory, {member, member.precision == Precision::quadruple ? 2.0 : 1.5, 0}, reserve);
-        } else if (const auto scan = refinement(laboratory, done)) {
-            laboratory.request().say(fmt::format("finer steps of {}", name(scan->member)));
+            last_order = std::max(last_order, reserve + 1.5 * kernel_builder.compile_seconds(member));
+            experiment.request().say("measuring " + name(member));
+            work_on(experiment, {member, member.precision == Precision::quadruple ? 2.0 : 1.5, 0}, reserve);
+        } else if (const auto scan = refinement(experiment, done)) {
+            experiment.request().say(fmt::format("finer steps of {}", name(scan->member)));
             done.insert(*scan);
-            work_on(laboratory, *scan, reserve);
+            work_on(experiment, *scan, reserve);
         } else if (at_work == 0 && next == waiting.end()) {
             break;
         } else {
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
     }
-    workshop.cancel();
+    kernel_builder.cancel();
 }
 
 }  // namespace lobatto

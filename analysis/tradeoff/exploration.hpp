@@ -4,15 +4,15 @@
 
 #include <vector>
 
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 
 namespace lobatto {
 
-// Returns when time is up or all has been seen; what it measured is in the laboratory's notebook.
-void explore(Laboratory& laboratory);
+// Returns when time is up or all has been seen; what it measured is in the experiment's store.
+void explore(Experiment& experiment);
 std::vector<Member> first_of_tour();  // the kernels it begins with
 
-// Of all in the notebook those than which no other is both faster and more accurate; from coarse to fine.
-std::vector<Measurement> pareto_front(const Laboratory& laboratory);
+// Of all in the store those than which no other is both faster and more accurate; from coarse to fine.
+std::vector<Measurement> pareto_front(const Experiment& experiment);
 
 }  // namespace lobatto

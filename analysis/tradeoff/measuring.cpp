@@ -249,7 +249,7 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
         run.stepper, states, run.start.parameters, run.h, reference_.scale, error_power(candidate.member.method()),
         conserves_ ? energies_of(run.stepper, states) : std::vector<double>(), energy_tells);
     HardestSteps<real> hardest;
-    for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) hardest.look(row_at(meeting), std::nanf(""));
+    for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) hardest.observe(row_at(meeting), std::nanf(""));
     evidence.certain = std::fmax(
         evidence.certain, single_steps(run.stepper, hardest.states(), run.every, static_cast<real>(reference_.until),
                                        run.start.parameters, run.h, reference_.scale)

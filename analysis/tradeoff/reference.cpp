@@ -46,7 +46,7 @@ public:
     }
 
     Reference compute() {
-        look();
+        observe();
         const double tolerance = reference_.precision == Precision::quadruple ? 1e-22 : 3e-17;
         const auto states = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
         if (!states) throw ComputationError("the reference fails: its steps become too short");
@@ -77,7 +77,7 @@ private:
     }
 
     // With a rough tolerance: how far the motion goes, how fast it changes, how long a reference takes.
-    void look() {
+    void observe() {
         std::vector<real> v, Lv, Lq;
         if (stepper_.velocity(0, start_.q, start_.p, v) != LOBATTO_OK)
             throw ComputationError("the formulas have no value at the start");

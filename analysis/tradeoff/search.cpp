@@ -23,18 +23,18 @@ double fitting_tolerance(double goal, double digits) {
     return std::pow(10.0, std::clamp(std::floor(std::log10(goal)) - digits, -14.0, -3.0));
 }
 
-bool has_tolerance(Laboratory& laboratory, const Member& member) {
-    return member.iterates() && laboratory.workshop().kernel(member)->linear == 0;
+bool has_tolerance(Experiment& experiment, const Member& member) {
+    return member.iterates() && experiment.kernel_builder().kernel(member)->linear == 0;
 }
 
 }  // namespace
 
-Attempt cross(Laboratory& laboratory, const Member& member, double goal) {
-    const StepLadder ladder = laboratory.ladder(fine_ratio);
-    const double order = member.order(), fewest = laboratory.fewest_steps();
+Attempt cross(Experiment& experiment, const Member& member, double goal) {
+    const StepLadder ladder = experiment.ladder(fine_ratio);
+    const double order = member.order(), fewest = experiment.fewest_steps();
     Attempt result{{}, infinity, infinity};
     const auto run = [&](std::int64_t steps) {
-        const Measurement m = laboratory.measure({member, steps, 0}, false);
+        const Measurement m = experiment.measure({member, steps, 0}, false);
         if (m.complete) result.least_error = std::min(result.least_error, m.error);
         return m;
     };
@@ -83,51 +83,51 @@ Attempt cross(Laboratory& laboratory, const Member& member, double goal) {
             const double more = static_cast<double>(steps) * factor;
             if (more > most_steps) break;
             // A run that would take more than is left.
-            if (m.complete && m.seconds * factor > std::max(0.5, laboratory.left())) break;
+            if (m.complete && m.seconds * factor > std::max(0.5, experiment.left())) break;
             steps = ladder.at_least(std::max(more, static_cast<double>(steps) + 1));
         }
     }
     if (good) {
-        result.measurement = laboratory.time_again(*good, 1);
+        result.measurement = experiment.time_again(*good, 1);
         result.seconds = result.measurement->seconds;
-        if (has_tolerance(laboratory, member)) {
+        if (has_tolerance(experiment, member)) {
             const Measurement looser =
-                laboratory.measure({member, good->candidate.steps, fitting_tolerance(goal, 2)}, false);
+                experiment.measure({member, good->candidate.steps, fitting_tolerance(goal, 2)}, false);
             if (looser.complete && looser.error < 2 * goal)
-                result.seconds = std::min(result.seconds, laboratory.time_again(looser, 1).seconds);
+                result.seconds = std::min(result.seconds, experiment.time_again(looser, 1).seconds);
         }
     }
     return result;
 }
 
-Measurement polish(Laboratory& laboratory, const Measurement& crossing, double goal) {
+Measurement polish(Experiment& experiment, const Measurement& crossing, double goal) {
     const Member& member = crossing.candidate.member;
-    Measurement best = laboratory.time_again(crossing, 3);
-    const double share = 0.15 * std::max(0.0, laboratory.left());
-    const double began = laboratory.elapsed();
+    Measurement best = experiment.time_again(crossing, 3);
+    const double share = 0.15 * std::max(0.0, experiment.left());
+    const double began = experiment.elapsed();
     const auto try_one = [&](std::int64_t steps, double tolerance) {
-        const Measurement m = laboratory.measure({member, steps, tolerance}, false);
+        const Measurement m = experiment.measure({member, steps, tolerance}, false);
         if (!m.complete || m.error > goal) return infinity;
-        const Measurement timed = m.seconds < 1.3 * best.seconds ? laboratory.time_again(m, 2) : m;
+        const Measurement timed = m.seconds < 1.3 * best.seconds ? experiment.time_again(m, 2) : m;
         if (timed.seconds < best.seconds) best = timed;
         return timed.seconds;
     };
-    const StepLadder ladder = laboratory.ladder(fine_ratio);
-    const auto is_late = [&] { return laboratory.elapsed() - began > share; };
+    const StepLadder ladder = experiment.ladder(fine_ratio);
+    const auto is_late = [&] { return experiment.elapsed() - began > share; };
     // Longer steps, until twice in a row they are far beyond the goal: errors do not always grow evenly, near rounding
     // least of all.
     std::vector<std::int64_t> starts = {crossing.candidate.steps};
     int far_beyond = 0;
     for (std::int64_t steps = starts.front(); steps > 1 && far_beyond < 2 && !is_late();) {
         steps = ladder.at_most(static_cast<double>(steps) / fine_ratio);
-        const Measurement m = laboratory.measure({member, steps, 0}, false);
+        const Measurement m = experiment.measure({member, steps, 0}, false);
         far_beyond = m.complete && m.error < 100 * goal ? 0 : far_beyond + 1;
         if (m.complete && m.error <= goal) starts.push_back(steps);
     }
     if (starts.size() > 2) starts = {starts.front(), starts.back()};
     std::vector<double> tolerances = {0};
     for (const double digits : {0.0, 1.0, 2.0, 3.0, 4.0})
-        if (has_tolerance(laboratory, member) && tolerances.back() != fitting_tolerance(goal, digits))
+        if (has_tolerance(experiment, member) && tolerances.back() != fitting_tolerance(goal, digits))
             tolerances.push_back(fitting_tolerance(goal, digits));
     for (const double tolerance : tolerances)
         for (const std::int64_t start : starts) {
@@ -233,60 +233,60 @@ std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double be
 
 }  // namespace
 
-Search search(Laboratory& laboratory, double goal) {
-    Workshop& workshop = laboratory.workshop();
-    const bool is_separable = laboratory.derivation().system.separable;
+Search search(Experiment& experiment, double goal) {
+    KernelBuilder& kernel_builder = experiment.kernel_builder();
+    const bool is_separable = experiment.derivation().system.separable;
     Search result;
     result.least_error = infinity;
     std::map<Member, Attempt> tried;
     std::vector<Member> queue = first_guess(goal, 4);
     if (is_separable) queue.push_back({Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35});
-    const double reserve = 0.2 * laboratory.request().seconds;  // for polishing
+    const double reserve = 0.2 * experiment.request().seconds;  // for polishing
     bool tried_clean = false;                                   // only where rounding stands in the way
-    for (const Member& member : queue) workshop.order(member);
+    for (const Member& member : queue) kernel_builder.order(member);
     const auto best_cost = [&] {
         double best = infinity;
         for (const auto& [member, crossing] : tried) best = std::min(best, crossing.seconds);
         return best;
     };
     while (true) {
-        laboratory.check_interruption();
+        experiment.check_interruption();
         // What is ready is measured; else the compilers are waited for.
         const auto ready =
-            std::find_if(queue.begin(), queue.end(), [&](const Member& m) { return workshop.is_ready(m); });
+            std::find_if(queue.begin(), queue.end(), [&](const Member& m) { return kernel_builder.is_ready(m); });
         if (ready != queue.end()) {
             const Member member = *ready;
             queue.erase(ready);
             const Candidate shown{member, 0, 0};
-            laboratory.request().say(fmt::format("measuring {}", shown.name()));
-            tried[member] = cross(laboratory, member, goal);
+            experiment.request().say(fmt::format("measuring {}", shown.name()));
+            tried[member] = cross(experiment, member, goal);
             result.least_error = std::min(result.least_error, tried[member].least_error);
         } else if (!queue.empty()) {
-            if (laboratory.left() < reserve && best_cost() < infinity) break;
-            if (laboratory.left() < -reserve) break;
+            if (experiment.left() < reserve && best_cost() < infinity) break;
+            if (experiment.left() < -reserve) break;
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
             continue;
         }
-        const bool has_time = laboratory.left() > reserve || best_cost() == infinity;
-        if (has_time && laboratory.left() > -reserve && queue.size() < 2) {
+        const bool has_time = experiment.left() > reserve || best_cost() == infinity;
+        if (has_time && experiment.left() > -reserve && queue.size() < 2) {
             for (const Member& member : neighbours(tried, best_cost(), is_separable)) {
                 if (std::find(queue.begin(), queue.end(), member) != queue.end()) continue;
-                workshop.order(member);
+                kernel_builder.order(member);
                 queue.push_back(member);
-                if (queue.size() >= std::max(2u, workshop.threads())) break;
+                if (queue.size() >= std::max(2u, kernel_builder.threads())) break;
             }
         }
-        if (queue.empty() && !tried_clean && is_separable && best_cost() == infinity && laboratory.left() > 0) {
+        if (queue.empty() && !tried_clean && is_separable && best_cost() == infinity && experiment.left() > 0) {
             tried_clean = true;
             queue = cleaner(tried);
-            for (const Member& member : queue) workshop.order(member);
+            for (const Member& member : queue) kernel_builder.order(member);
         }
         if (queue.empty()) {
             result.complete = true;
             break;
         }
     }
-    workshop.cancel();
+    kernel_builder.cancel();
     result.members = static_cast<int>(tried.size());
 
     std::vector<Attempt> crossings;
@@ -297,13 +297,13 @@ Search search(Laboratory& laboratory, double goal) {
     std::vector<Measurement> finalists;
     for (const Attempt& crossing : crossings) {
         if (crossing.seconds > hopeless * crossings.front().seconds || finalists.size() >= most_finalists) break;
-        laboratory.request().say(fmt::format("refining {}", crossing.measurement->candidate.name()));
-        finalists.push_back(polish(laboratory, *crossing.measurement, goal));
+        experiment.request().say(fmt::format("refining {}", crossing.measurement->candidate.name()));
+        finalists.push_back(polish(experiment, *crossing.measurement, goal));
     }
     // In turn, so that what disturbs one disturbs all.
     for (int round = 0; round < 3; ++round)
         for (Measurement& finalist : finalists)
-            if (finalist.seconds < 1.5 * finalists.front().seconds) finalist = laboratory.time_again(finalist, 1);
+            if (finalist.seconds < 1.5 * finalists.front().seconds) finalist = experiment.time_again(finalist, 1);
     for (const Measurement& finalist : finalists)
         if (!result.best || finalist.seconds < result.best->seconds) result.best = finalist;
     result.by_member = finalists;

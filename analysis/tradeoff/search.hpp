@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 
 namespace lobatto {
 
@@ -16,11 +16,11 @@ struct Attempt {
     double seconds = 0;  // infinite without; else the less of its time and of the same steps' with a looser iteration
 };
 // Runs to stagnation, with a handful of steps: from the error of one the next is told by the order.
-Attempt cross(Laboratory& laboratory, const Member& member, double goal);
+Attempt cross(Experiment& experiment, const Member& member, double goal);
 
 // The fastest way to the goal with this member: with longer steps, where the error does not grow evenly with them; with
-// iterations that stop earlier; with steps that are shorter but need fewer sweeps.
-Measurement polish(Laboratory& laboratory, const Measurement& crossing, double goal);
+// iterations that stop earlier; with steps that are shorter but need fewer fixed-point iterations.
+Measurement polish(Experiment& experiment, const Measurement& crossing, double goal);
 
 // The fastest of the whole family for an error at most `goal`, as far as the time goes.
 struct Search {
@@ -30,7 +30,7 @@ struct Search {
     bool complete = false;            // no member that was not tried can be expected to win
     std::vector<Measurement> by_member;
 };
-Search search(Laboratory& laboratory, double goal);
+Search search(Experiment& experiment, double goal);
 // The kernels to begin with.
 std::vector<Member> first_guess(double goal, std::size_t count);
 

@@ -170,15 +170,15 @@ void run(const RunOptions& options) {
     std::vector<double> counts(1 + event_kinds, 0);  // of the states and of each kind of event
     std::optional<Checkpoint> from;
     if (options.resume) {
-        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.seen().size() + 1);
+        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.save().size() + 1);
         if (from) {
             const auto by_watch = from->watched.begin() + std::ssize(counts),
-                       by_energy = by_watch + std::ssize(watch.seen()) + 1,
+                       by_energy = by_watch + std::ssize(watch.save()) + 1,
                        by_judge = by_energy + std::llround(*(by_energy - 1));
             std::copy(from->watched.begin(), by_watch, counts.begin());
-            watch.go_on_after({by_watch, by_energy - 1});
-            energy_watch.go_on_after({by_energy, by_judge});
-            judge.go_on_after({by_judge, from->watched.end()});
+            watch.restore({by_watch, by_energy - 1});
+            energy_watch.restore({by_energy, by_judge});
+            judge.restore({by_judge, from->watched.end()});
             request.from = &from->halfway;
         }
         if (!options.quiet)
@@ -207,18 +207,18 @@ void run(const RunOptions& options) {
                 event_file->sync();
                 checkpoint.files.push_back(event_file->written());
             }
-            const std::vector<double> by_energy = energy_watch.seen();
+            const std::vector<double> by_energy = energy_watch.save();
             for (const std::vector<double>& seen :
-                 {watch.seen(), {static_cast<double>(by_energy.size())}, by_energy, judge.seen()})
+                 {watch.save(), {static_cast<double>(by_energy.size())}, by_energy, judge.save()})
                 checkpoint.watched.insert(checkpoint.watched.end(), seen.begin(), seen.end());
             write_checkpoint(checkpoint_path(path), checkpoint);
         };
     }
     request.sink = [&](const Records& records) {
         file.write(records);
-        watch.look(records);
-        judge.look(records);
-        energy_watch.look(records);
+        watch.observe(records);
+        judge.observe(records);
+        energy_watch.observe(records);
         counts[0] += static_cast<double>(records.count);
     };
     TrajectoryResult result;

@@ -266,7 +266,7 @@ void sweep(const SweepOptions& options) {
     request.sink = [&](const EnsembleTrajectory& trajectory) {
         const bool departs = trajectory.status == LOBATTO_OK && watch.departs(trajectory);
         departures += departs ? 1 : 0;
-        if (trajectory.status == LOBATTO_OK) watch.look(trajectory);
+        if (trajectory.status == LOBATTO_OK) watch.observe(trajectory);
         const int status = departs ? departed : trajectory.status;
         write(table, scene, grid, request, trajectory, status);
         if (status == LOBATTO_OK || failures.size() == failures_told) return;

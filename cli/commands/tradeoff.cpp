@@ -43,14 +43,14 @@ void tradeoff(const TradeoffOptions& options) {
 
     const Interruption interruption;
     Say say;
-    LaboratoryRequest request;
+    ExperimentRequest request;
     request.seconds = seconds;
-    request.notebook = folder + "/measurements.jsonl";
+    request.store = folder + "/measurements.jsonl";
     request.first = first_of_tour();
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
     bool interrupted = false;
-    std::optional<Laboratory> begun;
+    std::optional<Experiment> begun;
     try {
         begun.emplace(derive(written), scene, request);
         explore(*begun);
@@ -60,26 +60,25 @@ void tradeoff(const TradeoffOptions& options) {
         throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
     }
     say.clear();
-    if (interrupted && (!begun || begun->notebook().all().empty())) {
+    if (interrupted && (!begun || begun->store().all().empty())) {
         fmt::print(stderr,
                    "lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
         throw ExitCode{interrupted_exit};
     }
-    Laboratory& laboratory = *begun;
-    if (laboratory.notebook().all().empty())
+    Experiment& experiment = *begun;
+    if (experiment.store().all().empty())
         throw ComputationError(fmt::format(
             "{}: nothing could be measured within {:.3g} s; give more time with --budget", scene.path, seconds));
-    fmt::print(
-        "{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, laboratory.notebook().all().size(),
-        laboratory.notebook().found() > 0 ? fmt::format(" ({} of an earlier run)", laboratory.notebook().found()) : "",
-        laboratory.until(), laboratory.elapsed(), reference_text(laboratory), front_table(laboratory));
-    write(folder + "/tradeoff.csv", csv_of(laboratory));
-    const std::string json = json_of(laboratory);
+    fmt::print("{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, experiment.store().all().size(),
+               experiment.store().found() > 0 ? fmt::format(" ({} of an earlier run)", experiment.store().found()) : "",
+               experiment.until(), experiment.elapsed(), reference_text(experiment), front_table(experiment));
+    write(folder + "/tradeoff.csv", csv_of(experiment));
+    const std::string json = json_of(experiment);
     write(folder + "/tradeoff.json", json);
-    fmt::print("\n{}", calibration_text(calibration_of(laboratory)));
+    fmt::print("\n{}", calibration_text(calibration_of(experiment)));
     if (!interrupted) {
-        const std::vector<std::string> pictures = draw_pictures(laboratory, folder);
-        write(folder + "/report.html", report_page(laboratory, folder, pictures, json));
+        const std::vector<std::string> pictures = draw_pictures(experiment, folder);
+        write(folder + "/report.html", report_page(experiment, folder, pictures, json));
         fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
                    fmt::join(pictures, ".svg, "));
     } else {

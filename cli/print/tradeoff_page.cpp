@@ -78,19 +78,19 @@ th { white-space: normal; } td.text, th.text { text-align: left; } table.words t
 pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.8rem; } .note { background: #fff3cd; padding: 0.6rem 0.8rem; }
 )";
 
-std::string front_rows(const Laboratory& laboratory) {
+std::string front_rows(const Experiment& experiment) {
     std::string rows;
     const auto optional = [](double value) {
         return std::isfinite(value) ? fmt::format("{:.1e}", value) : std::string("–");
     };
-    for (const Measurement& m : front_rows_of(laboratory)) {
+    for (const Measurement& m : front_rows_of(experiment)) {
         const Candidate& c = m.candidate;
         rows += fmt::format(
             "<tr><td>{:.1e}</td><td>{:.3g}</td><td class=\"text\">{}</td><td>{:.4g}</td><td class=\"text\">{}</td>"
             "<td>{}</td><td>{:.2f}</td><td>{:.3g}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.4g}</td></tr>\n",
-            m.error, m.seconds / laboratory.until() * 1e9, c.name(), laboratory.until() / static_cast<double>(c.steps),
+            m.error, m.seconds / experiment.until() * 1e9, c.name(), experiment.until() / static_cast<double>(c.steps),
             precision_name(c.member.precision), c.tolerance > 0 ? fmt::format("{:.0e}", c.tolerance) : "rounding",
-            m.iterations, m.gradients / laboratory.until(), optional(m.energy_error), optional(m.drift),
+            m.iterations, m.gradients / experiment.until(), optional(m.energy_error), optional(m.drift),
             optional(m.defect), m.reaches);
     }
     return rows;
@@ -98,14 +98,14 @@ std::string front_rows(const Laboratory& laboratory) {
 
 }  // namespace
 
-std::string report_page(const Laboratory& laboratory, const std::string& folder,
+std::string report_page(const Experiment& experiment, const std::string& folder,
                         const std::vector<std::string>& pictures, const std::string& json) {
-    const Scene& scene = laboratory.scene();
+    const Scene& scene = experiment.scene();
     std::string figures, findings;
     for (const std::string& name : pictures)
         figures += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption>{}</figcaption></figure>\n", name,
                                data_address(file_text(folder + "/" + name + ".svg")), captions.at(name));
-    for (const Finding& finding : laboratory.derivation().structure.findings)
+    for (const Finding& finding : experiment.derivation().structure.findings)
         findings +=
             fmt::format("<tr><td class=\"text\">{}</td><td class=\"text\">{}</td><td class=\"text\">{}</td></tr>\n",
                         escaped(finding.name), finding.holds ? "yes" : "no", escaped(finding.reason));
@@ -128,7 +128,7 @@ std::string report_page(const Laboratory& laboratory, const std::string& folder,
 <p{note}>{reference}</p>
 <h2>The best ways</h2>
 <table><thead><tr><th>error</th><th>ns a unit of time</th><th class="text">method</th><th>step</th><th class="text">number type</th><th>iterated to</th>
-<th>sweeps a step</th><th>gradients a unit</th><th>energy error</th><th>drift</th><th>symplectic defect</th><th>followed until</th></tr></thead>
+<th>iterations per step</th><th>gradients per unit</th><th>energy error</th><th>drift</th><th>symplectic defect</th><th>followed until</th></tr></thead>
 <tbody>
 {front}</tbody></table>
 {figures}<h2>The scene</h2>
@@ -146,12 +146,12 @@ std::string report_page(const Laboratory& laboratory, const std::string& folder,
 </html>
 )",
         fmt::arg("title", escaped(scene.title.empty() ? scene.name : scene.title)), fmt::arg("style", style),
-        fmt::arg("until", laboratory.until()), fmt::arg("note", laboratory.is_chaotic() ? " class=\"note\"" : ""),
-        fmt::arg("reference", escaped(reference_text(laboratory))), fmt::arg("front", front_rows(laboratory)),
+        fmt::arg("until", experiment.until()), fmt::arg("note", experiment.is_chaotic() ? " class=\"note\"" : ""),
+        fmt::arg("reference", escaped(reference_text(experiment))), fmt::arg("front", front_rows(experiment)),
         fmt::arg("figures", figures), fmt::arg("scene", escaped(scene.source.content())),
         fmt::arg("findings", findings), fmt::arg("machine", escaped(processor_name())),
         fmt::arg("compiler", escaped(find_compiler(false).words.back())),
-        fmt::arg("count", laboratory.notebook().all().size()), fmt::arg("data", data));
+        fmt::arg("count", experiment.store().all().size()), fmt::arg("data", data));
 }
 
 }  // namespace lobatto

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 
 namespace lobatto {
 
 // `pictures`: names of SVG files in the folder, in order; `json`: the data.
-std::string report_page(const Laboratory& laboratory, const std::string& folder,
+std::string report_page(const Experiment& experiment, const std::string& folder,
                         const std::vector<std::string>& pictures, const std::string& json);
 
 }  // namespace lobatto

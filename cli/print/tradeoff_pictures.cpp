@@ -24,17 +24,17 @@ std::string name_of(const Member& member) {
 }
 
 // What is on the axis of errors.
-std::string figure_name(const Laboratory& laboratory) {
-    if (!laboratory.is_chaotic()) return "largest error, relative to the amplitude of the motion";
-    return laboratory.conserves() ? "largest energy error, relative" : "1 / time until which the motion is followed";
+std::string figure_name(const Experiment& experiment) {
+    if (!experiment.is_chaotic()) return "largest error, relative to the amplitude of the motion";
+    return experiment.conserves() ? "largest energy error, relative" : "1 / time until which the motion is followed";
 }
 
-void draw_work_precision(const Laboratory& laboratory, const std::string& folder) {
+void draw_work_precision(const Experiment& experiment, const std::string& folder) {
     std::map<Member, std::vector<const Measurement*>> members;
-    for (const auto& [key, m] : laboratory.notebook().all())
-        if (m.complete && m.candidate.tolerance == 0 && laboratory.figure(m) < 0.3 && laboratory.figure(m) > 0)
+    for (const auto& [key, m] : experiment.store().all())
+        if (m.complete && m.candidate.tolerance == 0 && experiment.figure(m) < 0.3 && experiment.figure(m) > 0)
             members[m.candidate.member].push_back(&m);
-    const std::vector<Measurement> front = pareto_front(laboratory);
+    const std::vector<Measurement> front = pareto_front(experiment);
     // Those that are most often the best, then those of which most is known.
     const auto merit = [&](const Member& member) {
         return std::pair(std::count_if(front.begin(), front.end(),
@@ -47,7 +47,7 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
                      [&](const Member* a, const Member* b) { return merit(*a) > merit(*b); });
     if (shown.size() > most_curves) shown.resize(most_curves);
     std::sort(shown.begin(), shown.end(), [](const Member* a, const Member* b) { return *a < *b; });
-    const double until = laboratory.until();
+    const double until = experiment.until();
     std::string data, curves;
     const auto add = [&](std::vector<const Measurement*> list, const std::string& style, const std::string& title) {
         std::sort(list.begin(), list.end(),
@@ -55,14 +55,14 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
         const std::string name = fmt::format("$m{}", std::count(data.begin(), data.end(), '$'));
         data += name + " << END\n";
         for (const Measurement* m : list)
-            data += fmt::format("{:.4e},{:.4e}\n", laboratory.figure(*m), m->seconds / until * 1e9);
+            data += fmt::format("{:.4e},{:.4e}\n", experiment.figure(*m), m->seconds / until * 1e9);
         data += "END\n";
         curves +=
             fmt::format("{}{} using 1:2 {} title \"{}\"", curves.empty() ? "plot " : ", \\\n     ", name, style, title);
     };
     std::vector<const Measurement*> best;
     for (const Measurement& m : front)
-        if (laboratory.figure(m) < 0.3 && laboratory.figure(m) > 0) best.push_back(&m);
+        if (experiment.figure(m) < 0.3 && experiment.figure(m) > 0) best.push_back(&m);
     if (best.empty()) return;
     std::sort(best.begin(), best.end(), [](const auto* a, const auto* b) { return a->seconds < b->seconds; });
     int number = 0;
@@ -76,23 +76,23 @@ void draw_work_precision(const Laboratory& laboratory, const std::string& folder
     }
     data += "$front << END\n";
     for (const Measurement* m : best)
-        data += fmt::format("{:.4e},{:.4e}\n", laboratory.figure(*m), m->seconds / until * 1e9);
+        data += fmt::format("{:.4e},{:.4e}\n", experiment.figure(*m), m->seconds / until * 1e9);
     data += "END\n";
     curves += ", \\\n     $front using 1:2 with lines lc rgb \"#000000\" lw 4 title \"the best of all\"";
     draw(folder, "work_precision",
          fmt::format("{}set logscale xy\nset xrange [*:*] reverse\nset format \"10^{{%T}}\"\n"
                      "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
                      "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds a unit of time\"\n{}\n",
-                     data, gnuplot_text(laboratory.scene().title), figure_name(laboratory), curves),
+                     data, gnuplot_text(experiment.scene().title), figure_name(experiment), curves),
          960, 560);
 }
 
 // For some decades the cheapest way.
-std::vector<Measurement> representatives(const Laboratory& laboratory) {
+std::vector<Measurement> representatives(const Experiment& experiment) {
     std::vector<Measurement> chosen;
     for (const double target : targets)
-        for (const Measurement& m : pareto_front(laboratory))
-            if (laboratory.figure(m) <= target) {
+        for (const Measurement& m : pareto_front(experiment))
+            if (experiment.figure(m) <= target) {
                 if (m.candidate.member.precision == Precision::double_ &&
                     (chosen.empty() || chosen.back().candidate.key() != m.candidate.key()))
                     chosen.push_back(m);
@@ -126,15 +126,15 @@ void draw_course(const std::string& folder, const std::string& name, const std::
 
 }  // namespace
 
-std::vector<std::string> draw_pictures(Laboratory& laboratory, const std::string& folder) {
-    draw_work_precision(laboratory, folder);
+std::vector<std::string> draw_pictures(Experiment& experiment, const std::string& folder) {
+    draw_work_precision(experiment, folder);
     std::vector<std::string> names = {"work_precision"}, titles;
     std::vector<std::vector<double>> times, errors, energies;
-    for (const Measurement& m : representatives(laboratory)) {
+    for (const Measurement& m : representatives(experiment)) {
         const Measurer::Course course =
-            laboratory.measurer().course(laboratory.workshop().kernel(m.candidate.member), m.candidate);
+            experiment.measurer().course(experiment.kernel_builder().kernel(m.candidate.member), m.candidate);
         titles.push_back(fmt::format("{}, h = {:.3g}", m.candidate.name(),
-                                     laboratory.until() / static_cast<double>(m.candidate.steps)));
+                                     experiment.until() / static_cast<double>(m.candidate.steps)));
         times.push_back(course.time);
         errors.push_back(course.error);
         energies.push_back(course.energy);
@@ -142,7 +142,7 @@ std::vector<std::string> draw_pictures(Laboratory& laboratory, const std::string
     if (titles.empty()) return names;
     draw_course(folder, "error", "error", titles, times, errors);
     names.push_back("error");
-    if (laboratory.conserves() && !energies.front().empty()) {
+    if (experiment.conserves() && !energies.front().empty()) {
         draw_course(folder, "energy", "energy error", titles, times, energies);
         names.push_back("energy");
     }

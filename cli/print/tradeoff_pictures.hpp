@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 
 namespace lobatto {
 
 // NAME.svg each, in the folder; the names that were drawn. MachineError when gnuplot is missing.
-std::vector<std::string> draw_pictures(Laboratory& laboratory, const std::string& folder);
+std::vector<std::string> draw_pictures(Experiment& experiment, const std::string& folder);
 
 }  // namespace lobatto

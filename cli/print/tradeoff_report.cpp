@@ -15,7 +15,7 @@ namespace lobatto {
 
 namespace {
 
-constexpr double trusted = Laboratory::trusted;
+constexpr double trusted = Experiment::trusted;
 
 std::string tolerance_text(double tolerance) {
     return tolerance > 0 ? fmt::format("{:.0e}", tolerance) : "rounding";
@@ -27,11 +27,11 @@ std::string time_a_unit(double seconds, double until) {
 
 }  // namespace
 
-std::string reference_text(const Laboratory& laboratory) {
-    const Reference& reference = laboratory.reference();
+std::string reference_text(const Experiment& experiment) {
+    const Reference& reference = experiment.reference();
     std::string text = fmt::format("reference: {}; {} differs from it by {:.1e} at most", reference.first,
                                    reference.second, reference.disagreement.back());
-    if (laboratory.is_chaotic())
+    if (experiment.is_chaotic())
         text += fmt::format(
             "\nThe two disagree: beyond t = {:.4g} nobody knows this motion to {:.0e}. It is chaotic, and errors of "
             "states mean "
@@ -40,35 +40,35 @@ std::string reference_text(const Laboratory& laboratory) {
     return text;
 }
 
-std::vector<Measurement> front_rows_of(const Laboratory& laboratory) {
+std::vector<Measurement> front_rows_of(const Experiment& experiment) {
     std::vector<Measurement> rows;
     double next = 0.3;                                                 // errors above this are of no use
-    if (laboratory.is_chaotic() && !laboratory.conserves()) next = 1;  // 1/t
-    for (const Measurement& m : pareto_front(laboratory)) {
-        if (laboratory.figure(m) > next) continue;
+    if (experiment.is_chaotic() && !experiment.conserves()) next = 1;  // 1/t
+    for (const Measurement& m : pareto_front(experiment)) {
+        if (experiment.figure(m) > next) continue;
         rows.push_back(m);
-        next = laboratory.figure(m) / (laboratory.is_chaotic() && !laboratory.conserves() ? 1.1 : std::sqrt(10));
+        next = experiment.figure(m) / (experiment.is_chaotic() && !experiment.conserves() ? 1.1 : std::sqrt(10));
     }
     return rows;
 }
 
-Calibration calibration_of(const Laboratory& laboratory) {
+Calibration calibration_of(const Experiment& experiment) {
     std::vector<Measurement> measurements;
-    for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(m);
-    return calibrate(telling(measurements, std::fmax(1e-12, 100 * laboratory.reference().disagreement.back())));
+    for (const auto& [key, m] : experiment.store().all()) measurements.push_back(m);
+    return calibrate(telling(measurements, std::fmax(1e-12, 100 * experiment.reference().disagreement.back())));
 }
 
-std::string front_table(const Laboratory& laboratory) {
-    const double until = laboratory.until();
+std::string front_table(const Experiment& experiment) {
+    const double until = experiment.until();
     const auto optional = [](double value) {
         return std::isfinite(value) ? fmt::format("{:.1e}", value) : std::string("-");
     };
-    const bool chaotic = laboratory.is_chaotic();
+    const bool chaotic = experiment.is_chaotic();
     std::string text = chaotic ? fmt::format("  {:>9}  {:>9}  {:>9}", "energy", "momenta", "followed")
                                : fmt::format("  {:>9}  {:>9}", "error", "energy");
     text += fmt::format("  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}\n", "ns a unit", "method", "step", "precision",
                         "iterate", "gradients");
-    for (const Measurement& m : front_rows_of(laboratory)) {
+    for (const Measurement& m : front_rows_of(experiment)) {
         text += chaotic ? fmt::format("  {:>9}  {:>9}  {:>9.4g}", optional(m.energy_error), optional(m.momentum_error),
                                       m.reaches)
                         : fmt::format("  {:>9.1e}  {:>9}", m.error, optional(m.energy_error));
@@ -80,27 +80,27 @@ std::string front_table(const Laboratory& laboratory) {
     return text;
 }
 
-std::string csv_of(const Laboratory& laboratory) {
+std::string csv_of(const Experiment& experiment) {
     std::string text = csv_header();
-    for (const auto& [key, m] : laboratory.notebook().all()) text += csv_row(m, laboratory.until());
+    for (const auto& [key, m] : experiment.store().all()) text += csv_row(m, experiment.until());
     return text;
 }
 
-std::string json_of(const Laboratory& laboratory) {
-    const Reference& reference = laboratory.reference();
+std::string json_of(const Experiment& experiment) {
+    const Reference& reference = experiment.reference();
     nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
-    for (const auto& [key, m] : laboratory.notebook().all()) measurements.push_back(json_of(m));
-    for (const Measurement& m : pareto_front(laboratory)) front.push_back(json_of(m));
+    for (const auto& [key, m] : experiment.store().all()) measurements.push_back(json_of(m));
+    for (const Measurement& m : pareto_front(experiment)) front.push_back(json_of(m));
     nlohmann::ordered_json calibration = nlohmann::ordered_json::array();
-    for (const Calibration::Law& law : calibration_of(laboratory).laws)
+    for (const Calibration::Law& law : calibration_of(experiment).laws)
         calibration.push_back({{"family", word_of(law.member.family)},
                                {"points", law.member.points},
                                {"factor", law.factor},
                                {"power", law.power},
                                {"runs", law.runs}});
-    const nlohmann::ordered_json json = {{"scene", laboratory.scene().name},
-                                         {"title", laboratory.scene().title},
-                                         {"until", laboratory.until()},
+    const nlohmann::ordered_json json = {{"scene", experiment.scene().name},
+                                         {"title", experiment.scene().title},
+                                         {"until", experiment.until()},
                                          {"reference",
                                           {{"method", reference.first},
                                            {"check", reference.second},
@@ -108,7 +108,7 @@ std::string json_of(const Laboratory& laboratory) {
                                            {"trusted_until", reference.trusted_until(trusted)},
                                            {"samples", reference.samples},
                                            {"frequency", reference.frequency}}},
-                                         {"chaotic", laboratory.is_chaotic()},
+                                         {"chaotic", experiment.is_chaotic()},
                                          {"calibration", calibration},
                                          {"front", front},
                                          {"measurements", measurements}};

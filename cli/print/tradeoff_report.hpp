@@ -6,21 +6,21 @@
 #include <vector>
 
 #include "analysis/tradeoff/calibration.hpp"
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 
 namespace lobatto {
 
 // What is to be said before any number: what the errors are errors of.
-std::string reference_text(const Laboratory& laboratory);
+std::string reference_text(const Experiment& experiment);
 
 // How the estimates of the error follow the true one here.
-Calibration calibration_of(const Laboratory& laboratory);
+Calibration calibration_of(const Experiment& experiment);
 
 // Pareto's front, thinned to about two rows a decade.
-std::vector<Measurement> front_rows_of(const Laboratory& laboratory);
-std::string front_table(const Laboratory& laboratory);
+std::vector<Measurement> front_rows_of(const Experiment& experiment);
+std::string front_table(const Experiment& experiment);
 
-std::string csv_of(const Laboratory& laboratory);
-std::string json_of(const Laboratory& laboratory);
+std::string csv_of(const Experiment& experiment);
+std::string json_of(const Experiment& experiment);
 
 }  // namespace lobatto

@@ -208,7 +208,7 @@ private:
             for (std::size_t k = 0; k < n_; ++k) expected.push_back(second[k * n_ + l]);
             compare(claim, expected, times(mass_, column));
         }
-        machine_.run("acceleration");
+        machine_.run("minus_acceleration");
         compare(claim, gradient, times(mass_, machine_.get("W", n_)), force_size_);
         if (machine_.has("remainder")) {  // W = R + D q
             machine_.run("quadratic_part");

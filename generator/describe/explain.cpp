@@ -165,11 +165,12 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    const bool swept = !derivation.structure.general &&
-                       (derivation.structure.form == Form::separable || derivation.system.n <= most_swept);
+    const bool has_fixed_point = !derivation.structure.general &&
+                                 (derivation.structure.form == Form::separable || derivation.system.n <= most_swept);
     std::string text = derivation.structure.linear ? "once a step, without iteration; "
-                       : swept                     ? "by sweeps over all points at once; where they do not contract, "
-                                                   : "";
+                       : has_fixed_point
+                           ? "by fixed-point iteration over all points at once; where it does not contract, "
+                           : "";
     if (!derivation.structure.linear)
         text +=
             derivation.structure.absorbed ? "by iterations with one matrix for all steps; " : "by Newton's iteration; ";

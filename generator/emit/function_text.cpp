@@ -46,7 +46,7 @@ bool is_prepared(const Program& program) {
 Hoisted::Hoisted(const Programs& programs) {
     const Graph& graph = programs.graph;
     const auto is_early = [&graph](Id id) {
-        return graph[id].stage == Stage::parameter || graph[id].stage == Stage::step_size;
+        return graph[id].phase == Phase::parameter || graph[id].phase == Phase::step_size;
     };
     std::set<Id> wanted;
     std::vector<Id> roots;
@@ -58,7 +58,7 @@ Hoisted::Hoisted(const Programs& programs) {
         }
     }
     for (const Id id : graph.topological(roots))
-        if (graph[id].stage > Stage::step_size)
+        if (graph[id].phase > Phase::step_size)
             for (const Id operand : graph[id].operands)
                 if (is_early(operand)) wanted.insert(operand);
     std::vector<Id> all = graph.topological(roots);
@@ -101,7 +101,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Output>& 
             ++uses[id];
             if (!seen.insert(id).second) return;
             if (graph.is_constant(id) || graph[id].op == Op::input ||
-                (graph[id].stage <= style.given && !external(id).empty()))
+                (graph[id].phase <= style.given && !external(id).empty()))
                 return;
             for (const Id operand : graph[id].operands) visit(operand);
             computed.push_back(id);
@@ -129,7 +129,7 @@ FunctionText::FunctionText(const Programs& programs, const std::vector<Output>& 
     std::map<Id, std::string> local;
     std::string aliases;
     for (const auto& [id, count] : uses) {
-        if (graph[id].op != Op::input || graph[id].stage <= Stage::step_size) continue;
+        if (graph[id].op != Op::input || graph[id].phase <= Phase::step_size) continue;
         const Input& input = graph.input_of(id);
         if (input.name == input.code || !is_identifier(input.name)) continue;
         const std::string name = identifier(input.name);

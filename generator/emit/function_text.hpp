@@ -22,7 +22,7 @@ struct Hoisted {
 // How a function is written.
 struct FunctionStyle {
     Precision precision = Precision::double_;
-    Stage given = Stage::constant;      // values up to this stage that have a name are not computed
+    Phase given = Phase::constant;      // values up to this stage that have a name are not computed
     bool any_number = false;            // a template on the type of numbers: locals are `auto`
     bool fuses = false;                 // products are added by fused_sum()
     Notation notation = Notation::cpp;  // or Notation::plain

@@ -43,7 +43,7 @@ std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
     const auto moving_below = [&graph](Id id) {
         std::set<Id> inputs;
         for (const Id one : graph.topological({id}))
-            if (graph[one].op == Op::input && graph[one].stage > Stage::step_size && graph.input_of(one).code != "time")
+            if (graph[one].op == Op::input && graph[one].phase > Phase::step_size && graph.input_of(one).code != "time")
                 inputs.insert(one);
         return inputs;
     };
@@ -146,18 +146,19 @@ private:
         const std::string name = declaration.program;
         if (name == "stage") return takes_angles(declaration);
         return d_.structure.form == Form::separable && !d_.structure.looped &&
-               (name == "node" || name == "acceleration" || name == "remainder") && optimised_.cost_of_node <= 200;
+               (name == "node" || name == "minus_acceleration" || name == "remainder") &&
+               optimised_.cost_of_node <= 200;
     }
 
     std::string costs() const {
         if (d_.structure.form != Form::separable) return "";
-        const bool costly = optimised_.costly, remainder = optimised_.has_remainder;
+        const bool uses_hessian = optimised_.uses_hessian, remainder = optimised_.has_remainder;
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool has_remainder = {};", remainder),
                            remainder ? "forces without the part in the stage map are a function of their own"
                                      : "forces have no function without a part") +
-               fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool costly = {};", costly),
-                           costly ? "forces are evaluated less often for having second derivatives"
-                                  : "second derivatives would cost more than the evaluations they save");
+               fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool uses_hessian = {};", uses_hessian),
+                           uses_hessian ? "forces are evaluated less often for having second derivatives"
+                                        : "second derivatives would cost more than the evaluations they save");
     }
 
     // Whether `stage` is written out, in packs of double: where angles may be near others.
@@ -267,10 +268,10 @@ private:
         const auto names = [&](Id id) -> std::string {
             const Node& node = p_.graph[id];
             if (node.op != Op::input) return "";
-            return node.stage == Stage::parameter ? "p." + p_.graph.input_of(id).code : p_.graph.input_of(id).code;
+            return node.phase == Phase::parameter ? "p." + p_.graph.input_of(id).code : p_.graph.input_of(id).code;
         };
         FunctionText body(p_, statements, names,
-                          {options_.precision, Stage::constant, false, false, Notation::cpp, {}});
+                          {options_.precision, Phase::constant, false, false, Notation::cpp, {}});
         std::string text = body.lines();
         if (d_.structure.looped) text += looped_.after_prepare();
         if (!pivots.empty())
@@ -319,7 +320,7 @@ private:
         const auto program =
             std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
         if (program == p_.programs.end()) return "";
-        const FunctionStyle style{options_.precision,     Stage::step_size,
+        const FunctionStyle style{options_.precision,     Phase::step_size,
                                   declaration.any_number, false,
                                   Notation::cpp,          takes_angles(declaration) ? angles_ : std::map<Id, int>()};
         return FunctionText(
@@ -361,7 +362,7 @@ private:
     std::string row_function(const RowFunction& row) const {
         std::vector<std::pair<std::string, const char*>> parameters{{"const CoefficientsOf<given>&", "k"}};
         if (!d_.system.autonomous) parameters.emplace_back("clock", "time");
-        parameters.emplace_back(fmt::format("lobatto::Rows<number, {}, in_lanes>&", row.variables), "rows");
+        parameters.emplace_back(fmt::format("lobatto::FormulaRows<number, {}, in_lanes>&", row.variables), "rows");
         return fmt::format(
                    "\n    // What {} gives for a row, or for rows side by side.\n"
                    "    template <class given, {}class number, bool in_lanes>\n",
@@ -371,7 +372,7 @@ private:
 
     bool takes_how(const Declaration& declaration) const {
         return d_.structure.neighbours && has_lanes(options_.precision) &&
-               std::string(declaration.program) == "acceleration";
+               std::string(declaration.program) == "minus_acceleration";
     }
     bool forced() const {
         return std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
@@ -386,7 +387,8 @@ private:
     Hoisted hoisted_;
     LoopedText looped_;
     int n_;
-    std::map<Id, int> angles_;  // of the function that sweeps evaluate, where they may be near others
+    std::map<Id, int>
+        angles_;  // of the function that the fixed-point iteration evaluates, where they may be near others
 };
 
 // Where the Stepper of a kernel is; as stepping_of in runtime/kernel/base/contract.hpp.

@@ -34,7 +34,7 @@ LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, P
     : d_(derivation),
       p_(programs),
       precision_(precision),
-      style_{precision, Stage::step_size, true, false, Notation::cpp, {}},
+      style_{precision, Phase::step_size, true, false, Notation::cpp, {}},
       names_(std::move(names)),
       general_(derivation.structure.form == Form::general),
       neighbours_(derivation.structure.neighbours && has_lanes(precision)) {}
@@ -206,7 +206,7 @@ std::vector<RowFunction> LoopedText::row_functions() const {
 // W = M^-1 grad V along the rows, in the way `how`.
 std::string LoopedText::along_rows() const {
     const std::string time = d_.system.autonomous ? "" : "time, ";
-    const Walls& walls = d_.structure.walls;
+    const FixedEnds& fixed_ends = d_.structure.fixed_ends;
     std::string text;
     bool is_first = true;
     for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
@@ -215,9 +215,9 @@ std::string LoopedText::along_rows() const {
         const std::string name = element_name(number);
         const bool sets = is_first && covers(element, d_.system.n);
         std::string hung;
-        if (number == walls.element) {
-            if (walls.before) hung = ", lobatto::wall_before";
-            if (walls.behind) hung += hung.empty() ? ", lobatto::wall_behind" : " | lobatto::wall_behind";
+        if (number == fixed_ends.element) {
+            if (fixed_ends.before) hung = ", lobatto::fixed_before";
+            if (fixed_ends.behind) hung += hung.empty() ? ", lobatto::fixed_behind" : " | lobatto::fixed_behind";
         }
         if (is_first && !sets) text += "        how::template clear<coordinates>(W);\n";
         is_first = false;
@@ -227,7 +227,7 @@ std::string LoopedText::along_rows() const {
                         "            ");
     }
     std::vector<Output> list;
-    for (const Output& output : program(walls.before || walls.behind ? "inside_slope" : "rest_slope").outputs)
+    for (const Output& output : program(fixed_ends.before || fixed_ends.behind ? "inside_slope" : "rest_slope").outputs)
         list.push_back({"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W)",
                         output.value, Effect::add});
     text += FunctionText(p_, list, names_, style_).lines();
@@ -244,8 +244,8 @@ std::string LoopedText::body(const std::string& function) const {
         if (function == "node")
             return clear + clear_entries + "S[e] = number(0);\n" + loops("node", "q") + statements("rest_node", "") +
                    scale + clear_entries + "S[e] *= k.inverse_mass[entry_row[e]];\n";
-        if (function == "acceleration" && neighbours_) return along_rows();
-        if (function == "acceleration") return clear + loops("slope", "q") + statements("rest_slope", "") + scale;
+        if (function == "minus_acceleration" && neighbours_) return along_rows();
+        if (function == "minus_acceleration") return clear + loops("slope", "q") + statements("rest_slope", "") + scale;
         if (function == "quadratic_part")
             return !d_.structure.absorbed && !d_.structure.diagonal_part
                        ? ""

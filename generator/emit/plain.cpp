@@ -239,7 +239,7 @@ public:
                    node() + general_step;
         else
             all += function("W = M^-1 (grad V - F): minus the acceleration at q (D1).", "void", "minus_acceleration",
-                            {"real time", "const real* q", "real* W"}, "acceleration") +
+                            {"real time", "const real* q", "real* W"}, "minus_acceleration") +
                    function("p = M v (D2).", "void", "momentum", {"const real* velocity", "real* p"}, "momentum") +
                    function("v = M^-1 p.", "void", "velocity", {"const real* p", "real* velocity"}, "velocity") +
                    (d_.quadrature.is_explicit() ? explicit_step : solved_step);
@@ -321,7 +321,7 @@ private:
                 table("b", rule.b, rule.is_explicit() ? "Kicks at these." : "Their weights.");
         // Without inner points there is no stage matrix, but the step that is never taken must compile.
         if (rule.is_explicit()) return text;
-        return text + (rule.points > 2 ? table("A", rule.A, "Stage matrix of the inner points.")
+        return text + (rule.points > 2 ? table("A", rule.A, "Phase matrix of the inner points.")
                                        : table("A", GiNaC::matrix(1, 1), "No inner points: unused."));
     }
 
@@ -353,9 +353,9 @@ private:
             const Node& node = p_.graph[id];
             if (node.op != Op::input) return "";
             const std::string& code = p_.graph.input_of(id).code;
-            return node.stage == Stage::parameter ? "parameters." + code : code;
+            return node.phase == Phase::parameter ? "parameters." + code : code;
         };
-        const FunctionStyle style{precision_, Stage::constant, false, false, Notation::plain, {}};
+        const FunctionStyle style{precision_, Phase::constant, false, false, Notation::plain, {}};
         // The text stands in a function of a class there, in a function of a namespace here.
         std::string inner, text = FunctionText(p_, outputs, names, style).lines();
         for (std::size_t begin = 0; begin < text.size();) {

@@ -48,13 +48,13 @@ std::string separable_shapes(const Structure& structure, const System& system, i
         if (structure.neighbours && has_lanes(precision)) {
             line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
                  "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
-            const bool in_passing = is_one_pass(structure.elements, structure.walls, system.q);
+            const bool immediate = is_one_pass(structure.elements, structure.fixed_ends, system.q);
             const bool unit_masses = has_unit_masses(system);
             line(text, fmt::format("bool unit_masses = {}", unit_masses),
                  unit_masses ? "forces are accelerations" : "forces are divided by them");
-            line(text, fmt::format("bool in_passing = {}", in_passing),
-                 in_passing ? "coordinates may move one after another, each as soon as its force is known"
-                            : "coordinates move when all forces are known");
+            line(text, fmt::format("bool immediate = {}", immediate),
+                 immediate ? "coordinates may move one after another, each as soon as its force is known"
+                           : "coordinates move when all forces are known");
         }
         line(text, fmt::format("bool clean = {}", structure.clean),
              structure.clean ? "round-off-clean steps" : "steps as fast as can be");
@@ -190,7 +190,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
     line(text, fmt::format("bool any_number = {}", !structure.general),
          structure.general ? "Newton's iteration alone"
-                           : "formulas of a state are templates on the type of its numbers: sweeps first");
+                           : "formulas are templates on the type of numbers: fixed-point iteration first");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");

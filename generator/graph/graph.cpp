@@ -24,7 +24,7 @@ Id Graph::intern(Node node) {
     for (const Id operand : node.operands) put(operand);
     const auto [place, is_new] = known_.emplace(std::move(key), size());
     if (!is_new) return place->second;
-    for (const Id operand : node.operands) node.stage = std::max(node.stage, (*this)[operand].stage);
+    for (const Id operand : node.operands) node.phase = std::max(node.phase, (*this)[operand].phase);
     nodes_.push_back(std::move(node));
     return place->second;
 }
@@ -38,7 +38,7 @@ Id Graph::constant(const cln::cl_R& value, const std::string& label) {
     same_hash.push_back(size());
     constant_words_.emplace(value.word, size());
     constants_.push_back({value, label});
-    nodes_.push_back({Op::constant, Stage::constant, static_cast<int>(constants_.size()) - 1, {}});
+    nodes_.push_back({Op::constant, Phase::constant, static_cast<int>(constants_.size()) - 1, {}});
     return size() - 1;
 }
 
@@ -50,12 +50,12 @@ Id Graph::input(const Input& input) {
     const auto [place, is_new] = known_.emplace("input " + input.code + " " + input.name, size());
     if (!is_new) return place->second;
     inputs_.push_back(input);
-    nodes_.push_back({Op::input, input.stage, static_cast<int>(inputs_.size()) - 1, {}});
+    nodes_.push_back({Op::input, input.phase, static_cast<int>(inputs_.size()) - 1, {}});
     return place->second;
 }
 
 Id Graph::raw(Op op, std::vector<Id> operands, int index) {
-    return intern({op, Stage::constant, index, std::move(operands)});
+    return intern({op, Phase::constant, index, std::move(operands)});
 }
 
 bool Graph::is_number(Id id, long value) const {
@@ -94,7 +94,7 @@ Id Graph::add(const std::vector<Id>& terms) {
             is_plain(constant_of(node.operands.front()))) {
             coefficient = constant_of(node.operands.front()).value;
             std::vector<Id> others(node.operands.begin() + 1, node.operands.end());
-            rest = others.size() == 1 ? others.front() : intern({Op::multiply, Stage::constant, 0, std::move(others)});
+            rest = others.size() == 1 ? others.front() : intern({Op::multiply, Phase::constant, 0, std::move(others)});
         }
         const auto [known, is_new] = place.emplace(rest, collected.size());
         if (is_new)
@@ -111,7 +111,7 @@ Id Graph::add(const std::vector<Id>& terms) {
     if (!cln::zerop(constant_term)) operands.push_back(constant(constant_term));
     if (operands.empty()) return number(0);
     if (operands.size() == 1) return operands.front();
-    return intern({Op::add, Stage::constant, 0, std::move(operands)});
+    return intern({Op::add, Phase::constant, 0, std::move(operands)});
 }
 
 Id Graph::multiply(const std::vector<Id>& factors) {
@@ -170,7 +170,7 @@ Id Graph::multiply(const std::vector<Id>& factors) {
         operands.insert(operands.begin(), constant(coefficient));
     }
     if (operands.size() == 1) return operands.front();
-    return intern({Op::multiply, Stage::constant, 0, std::move(operands)});
+    return intern({Op::multiply, Phase::constant, 0, std::move(operands)});
 }
 
 Id Graph::power(Id base, int exponent) {
@@ -189,15 +189,15 @@ Id Graph::power(Id base, int exponent) {
         return multiply(factors);
     }
     if (node.op == Op::sqrt && exponent % 2 == 0) return power(node.operands.front(), exponent / 2);
-    return intern({Op::power, Stage::constant, exponent, {base}});
+    return intern({Op::power, Phase::constant, exponent, {base}});
 }
 
 Id Graph::function(Op op, Id argument) {
-    return intern({op, Stage::constant, 0, {argument}});
+    return intern({op, Phase::constant, 0, {argument}});
 }
 
 Id Graph::raise(Id base, Id exponent) {
-    return intern({Op::raise, Stage::constant, 0, {base, exponent}});
+    return intern({Op::raise, Phase::constant, 0, {base, exponent}});
 }
 
 int Graph::compare(Id a, Id b) const {

@@ -44,12 +44,12 @@ enum class Op : std::uint8_t {
     add  // n-ary
 };
 
-// When a value is known; of an operation, the maximum over its operands. Hoisting is a partition by stage.
-enum class Stage : std::uint8_t { constant, parameter, step_size, step, iterate };
+// When a value is known; of an operation, the maximum over its operands. Hoisting is a partition by phase.
+enum class Phase : std::uint8_t { constant, parameter, step_size, step, iterate };
 
 struct Node {
     Op op = Op::constant;
-    Stage stage = Stage::constant;
+    Phase phase = Phase::constant;
     int index = 0;             // constant, input: which; power: the exponent
     std::vector<Id> operands;  // add, multiply: sorted
 };
@@ -66,7 +66,7 @@ struct Constant {
 struct Input {
     std::string code;  // q[0]
     std::string name;  // theta
-    Stage stage = Stage::iterate;
+    Phase phase = Phase::iterate;
     double start = 0.5;  // near this value the formulas are real, as far as is known
 };
 

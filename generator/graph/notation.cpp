@@ -323,7 +323,7 @@ std::string canonical_text(const GiNaC::ex& expression, Notation notation) {
     collect_symbols(expression, symbols);
     Graph graph;
     GiNaC::exmap inputs;
-    for (const auto& [name, symbol] : symbols) inputs[symbol] = graph.input({name, name, Stage::iterate});
+    for (const auto& [name, symbol] : symbols) inputs[symbol] = graph.input({name, name, Phase::iterate});
     return formula(graph, graph.from(expression, inputs), notation);
 }
 

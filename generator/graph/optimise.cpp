@@ -94,10 +94,10 @@ Operations count(const Graph& graph, const std::vector<Id>& nodes) {
         for (const Id operand : graph[id].operands) ++uses[operand];
     for (const Id id : nodes) {
         const Node& node = graph[id];
-        if (node.stage == Stage::constant) continue;
+        if (node.phase == Phase::constant) continue;
         // A reciprocal known earlier is hoisted, one used twice has a name: then it is a factor like others.
         const auto is_reciprocal = [&](Id operand) {
-            return graph[operand].op == Op::power && graph[operand].index < 0 && graph[operand].stage == node.stage &&
+            return graph[operand].op == Op::power && graph[operand].index < 0 && graph[operand].phase == node.phase &&
                    uses[operand] == 1;
         };
         switch (node.op) {
@@ -149,7 +149,7 @@ Operations count(const Programs& programs) {
         std::vector<Id> roots, here;
         for (const Output& output : program.outputs) roots.push_back(output.value);
         for (const Id id : programs.graph.topological(roots)) {
-            if (programs.graph[id].stage <= Stage::step_size)
+            if (programs.graph[id].phase <= Phase::step_size)
                 hoisted.insert(id);
             else
                 here.push_back(id);
@@ -169,7 +169,7 @@ std::vector<PassReport> optimise(Programs& programs) {
     constexpr std::array<Pass, 7> passes = {{{"fold constants", fold_constants, false},
                                              {"factor sums (Horner)", factor_sums, true},
                                              {"powers by multiplication", multiply_powers, false},
-                                             {"group by stage", group_by_stage, false},
+                                             {"group by phase", group_by_phase, false},
                                              {"share common parts", share_pairs, true},
                                              {"sums of angles", add_angles, false},
                                              {"pair sines and cosines", pair_sines, false}}};

@@ -9,7 +9,7 @@
 
 namespace lobatto {
 
-// Operations of one evaluation of every program (a value that two programs need counts in both; values of stage
+// Operations of one evaluation of every program (a value that two programs need counts in both; values of phase
 // constant are free, values hoisted to parameters and step size count once).
 struct Operations {
     long additions = 0, multiplications = 0, divisions = 0, functions = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs.
+// Graph to graph: fold, factor, powers, phases, shared parts, sine-cosine pairs.
 #include "generator/graph/passes.hpp"
 
 #include <cln/cln.h>
@@ -96,7 +96,7 @@ Programs fold_constants(const Programs& programs) {
 namespace {
 
 // A factor is taken out only of terms that are known no earlier than the factor itself: coefficients of an earlier
-// stage are hoisted for free.
+// phase are hoisted for free.
 Id horner(Graph& graph, const std::vector<Id>& terms) {
     const auto factors_of = [&graph](Id term) {
         return graph[term].op == Op::multiply ? graph[term].operands : std::vector<Id>{term};
@@ -109,7 +109,7 @@ Id horner(Graph& graph, const std::vector<Id>& terms) {
         for (const Id factor : factors_of(terms[t])) {
             const Id base = base_of(factor);
             const Node& node = graph[base];
-            if (graph.is_constant(base) || node.op == Op::power || node.stage != graph[terms[t]].stage) continue;
+            if (graph.is_constant(base) || node.op == Op::power || node.phase != graph[terms[t]].phase) continue;
             auto use = std::find_if(uses.begin(), uses.end(), [base](const auto& u) { return u.first == base; });
             if (use == uses.end()) use = uses.insert(uses.end(), {base, {}});
             use->second.push_back(t);
@@ -192,7 +192,7 @@ Programs multiply_powers(const Programs& programs) {
     });
 }
 
-// ---- stages: the operands known first are combined first, so that their part can be hoisted
+// ---- phases: the operands known first are combined first, so that their part can be hoisted
 
 namespace {
 
@@ -205,7 +205,7 @@ std::string positive_label(const Constant& negative) {
 
 }  // namespace
 
-Programs group_by_stage(const Programs& programs) {
+Programs group_by_phase(const Programs& programs) {
     // Products that have a name of their own keep their sign.
     std::set<std::vector<Id>> named;
     for (const auto& [id, name] : programs.names) named.insert(programs.graph[id].operands);
@@ -216,8 +216,8 @@ Programs group_by_stage(const Programs& programs) {
         // sign.
         std::vector<Id> early;
         for (const Id operand : node.operands)
-            if (before[operand].stage <= Stage::step_size) early.push_back(operand);
-        const bool minus = node.op == Op::multiply && node.stage > Stage::step_size &&
+            if (before[operand].phase <= Phase::step_size) early.push_back(operand);
+        const bool minus = node.op == Op::multiply && node.phase > Phase::step_size &&
                            graph.is_negative(operands.front()) && !named.contains(early);
         if (minus) {
             operands.front() = graph.constant(-graph.constant_of(operands.front()).value,
@@ -225,10 +225,10 @@ Programs group_by_stage(const Programs& programs) {
             if (graph.is_number(operands.front(), 1)) operands.erase(operands.begin());
         }
         std::vector<Id> group;
-        for (const Stage stage : {Stage::constant, Stage::parameter, Stage::step_size, Stage::step, Stage::iterate}) {
+        for (const Phase phase : {Phase::constant, Phase::parameter, Phase::step_size, Phase::step, Phase::iterate}) {
             std::vector<Id> here;
             for (const Id operand : operands)
-                if (graph[operand].stage == stage) here.push_back(operand);
+                if (graph[operand].phase == phase) here.push_back(operand);
             if (here.empty()) continue;
             // What came before forms one operand; a lone constant stays beside what it multiplies or is added to.
             if (group.size() > 1) group = {graph.raw(node.op, group)};

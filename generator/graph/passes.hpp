@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Graph to graph: fold, factor, powers, stages, shared parts, sine-cosine pairs.
+// Graph to graph: fold, factor, powers, phases, shared parts, sine-cosine pairs.
 #pragma once
 
 #include <string>
@@ -41,7 +41,7 @@ std::vector<Id> roots_of(const Programs& programs);
 Programs fold_constants(const Programs& programs);   // numbers of 60 digits; the formula stays as label
 Programs factor_sums(const Programs& programs);      // Horner
 Programs multiply_powers(const Programs& programs);  // integer powers by multiplication
-Programs group_by_stage(const Programs& programs);   // what is known first is combined first
+Programs group_by_phase(const Programs& programs);   // what is known first is combined first
 Programs share_pairs(const Programs& programs);      // common parts of sums and products
 Programs add_angles(const Programs& programs);       // sin(a - b) from those of a and b, where these are there
 Programs pair_sines(const Programs& programs);       // sine and cosine of one argument together

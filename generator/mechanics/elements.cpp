@@ -65,7 +65,7 @@ private:
 
     void input(const GiNaC::symbol& symbol, int meaning) {
         const std::string name = "x" + std::to_string(symbols_.size());
-        inputs_[symbol] = graph_.input({name, name, Stage::iterate});
+        inputs_[symbol] = graph_.input({name, name, Phase::iterate});
         symbols_.push_back(symbol);
         meanings_.push_back(meaning);
     }
@@ -321,7 +321,7 @@ bool covers(const Element& element, int count) {
     return runs.size() == 1 && *least == 0 && *most <= 2 && *most + runs.front().count == count;
 }
 
-bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector<GiNaC::symbol>& q) {
+bool is_one_pass(const Elements& elements, const FixedEnds& fixed_ends, const std::vector<GiNaC::symbol>& q) {
     const auto rests = [&](const ex& term) {
         return std::none_of(q.begin(), q.end(), [&](const GiNaC::symbol& one) { return term.has(one); });
     };
@@ -329,12 +329,12 @@ bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector
     for (const Element& element : elements.repeated)
         if (!element.x.empty()) formulas.push_back(&element);
     return formulas.size() == 1 && covers(*formulas.front(), static_cast<int>(q.size())) && row_reach(elements) <= 1 &&
-           elements.other_forces.empty() && std::all_of(walls.others.begin(), walls.others.end(), rests);
+           elements.other_forces.empty() && std::all_of(fixed_ends.others.begin(), fixed_ends.others.end(), rests);
 }
 
-Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
-    Walls walls;
-    walls.others = elements.others;
+FixedEnds fixed_ends_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
+    FixedEnds fixed_ends;
+    fixed_ends.others = elements.others;
     for (std::size_t number = 0; number < elements.repeated.size(); ++number) {
         const Element& element = elements.repeated[number];
         if (element.target >= 0 || element.x.size() != 2 || !element.a.empty()) continue;
@@ -346,7 +346,7 @@ Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
         const auto hangs = [&](const GiNaC::symbol& end, std::size_t slot) {
             std::vector<ex> rest;
             ex alone = 0;
-            for (const ex& term : walls.others) {
+            for (const ex& term : fixed_ends.others) {
                 const bool is_alone = term.has(end) && std::all_of(q.begin(), q.end(), [&](const GiNaC::symbol& other) {
                                           return other == end || !term.has(other);
                                       });
@@ -364,15 +364,15 @@ Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q) {
             } catch (const std::exception&) {  // the formula has no value at zero
                 return false;
             }
-            walls.others = rest;
+            fixed_ends.others = rest;
             return true;
         };
-        walls.element = number;
-        walls.before = hangs(q.front(), upper);
-        walls.behind = hangs(q.back(), lower);
-        if (walls.before || walls.behind) break;
+        fixed_ends.element = number;
+        fixed_ends.before = hangs(q.front(), upper);
+        fixed_ends.behind = hangs(q.back(), lower);
+        if (fixed_ends.before || fixed_ends.behind) break;
     }
-    return walls;
+    return fixed_ends;
 }
 
 }  // namespace lobatto

@@ -41,14 +41,14 @@ bool covers(const Element& element, int count);
 
 // Where the formula of all pairs of neighbours holds beyond the first coordinate, or the last, with zero for the one
 // that is not there: a chain between walls.
-struct Walls {
+struct FixedEnds {
     std::size_t element = 0;  // its number
     bool before = false, behind = false;
     std::vector<GiNaC::ex> others;  // without what stands for the walls
 };
-Walls walls_of(const Elements& elements, const std::vector<GiNaC::symbol>& q);
+FixedEnds fixed_ends_of(const Elements& elements, const std::vector<GiNaC::symbol>& q);
 // Whether the slope is that of one formula, of single coordinates or pairs of neighbours, which covers all of them.
-bool is_one_pass(const Elements& elements, const Walls& walls, const std::vector<GiNaC::symbol>& q);
+bool is_one_pass(const Elements& elements, const FixedEnds& fixed_ends, const std::vector<GiNaC::symbol>& q);
 
 // The terms of a potential (or Lagrangian) in the variables, and of forces: (variable acted on, term).
 Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables,

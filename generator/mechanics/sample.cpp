@@ -107,7 +107,7 @@ std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>
 void Formulas::set(const GiNaC::ex& symbol, const cln::cl_R& value) {
     if (!inputs_.contains(symbol)) {
         const std::string name = "x" + std::to_string(inputs_.size());
-        inputs_[symbol] = graph_.input({name, name, Stage::iterate});
+        inputs_[symbol] = graph_.input({name, name, Phase::iterate});
     }
     const std::size_t index = static_cast<std::size_t>(graph_[static_cast<Id>(index_of(inputs_, symbol))].index);
     if (index >= values_.size()) values_.resize(index + 1);

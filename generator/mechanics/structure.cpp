@@ -326,12 +326,13 @@ private:
             "iteration");
         if (result_.diagonal_part)
             reason = fmt::format(
-                "the constant part of V'' is diagonal and taken into the stage map: at the start a sweep "
+                "the constant part of V'' is diagonal and taken into the stage map: at the start an iteration "
                 "leaves {:.1g} of the error, not {:.1g}",
                 with, without);
         else if (result_.absorbed)
             reason = fmt::format(
-                "V is nearly quadratic at the start, so that where sweeps do not contract one matrix serves "
+                "V is nearly quadratic at the start, so that where the fixed-point iteration does not contract one "
+                "matrix serves "
                 "all iterations: one leaves {:.1g} of the error there",
                 with);
         else if (!diagonal)
@@ -347,14 +348,14 @@ private:
              : result_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
                                      : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
         if (!result_.neighbours) return;
-        result_.walls = walls_of(result_.elements, system_.q);
-        const bool before = result_.walls.before, behind = result_.walls.behind;
+        result_.fixed_ends = fixed_ends_of(result_.elements, system_.q);
+        const bool before = result_.fixed_ends.before, behind = result_.fixed_ends.behind;
         if (before || behind)
-            find("walls", true,
-                 (before && behind ? "both ends hang on them"
-                  : before         ? name(0) + " hangs on one"
-                                   : name(static_cast<int>(system_.q.size()) - 1) + " hangs on one") +
-                     std::string(" by the formula of neighbours, in whose loop it goes along"));
+            find("fixed ends", true,
+                 (before && behind ? "both ends are"
+                  : before         ? name(0) + " is"
+                                   : name(static_cast<int>(system_.q.size()) - 1) + " is") +
+                     std::string(" held by the formula of neighbours; one loop computes all of them"));
     }
 
     // h^2 |A| |entries|, where those of M^-1 V'' stand, at the start; norms of largest row sums.

@@ -61,7 +61,7 @@ struct Structure {
     bool diagonal_mass = false;  // of a separable system
     bool looped = false;         // terms of L that repeat are written once, in loops over tables
     Elements elements;           // looped: of V in q, or of L in z
-    Walls walls;                 // of neighbours
+    FixedEnds fixed_ends;        // of neighbours
     bool neighbours = false;     // looped, and its formulas go along neighbouring coordinates
     bool diagonal_part =
         false;              // separable: the constant part of M^-1 V'' is diagonal, and taken into the stage map (D31)

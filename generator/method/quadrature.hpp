@@ -54,7 +54,7 @@ struct Quadrature {
     std::vector<GiNaC::ex> legendre;  // r: the shifted Legendre polynomial of degree r - 1 at the nodes, for Lobatto
                                       // (cyclic coordinates); zeros for Gauss
 
-    // What sweeps over the nodes need, with the Lagrange polynomials l_j on the quadrature nodes.
+    // What the fixed-point iteration over the nodes needs, with the Lagrange polynomials l_j on the quadrature nodes.
     GiNaC::matrix integration;  // r x r: the integral of l_j from 0 to nodes_i
     GiNaC::matrix reach;        // (controls - 1) x r: the same to control_i, i = 1, 2, ...
     GiNaC::matrix ahead;        // r x r: l_j(1 + nodes_i)

@@ -12,7 +12,7 @@
 namespace lobatto {
 
 using Ids = std::vector<Id>;
-using Rows = std::vector<Ids>;
+using IdMatrix = std::vector<Ids>;
 
 class ProgramBuilder {
 public:
@@ -23,15 +23,15 @@ protected:
     static std::string at(const std::string& array, std::size_t index) {
         return array + "[" + std::to_string(index) + "]";
     }
-    Id in(const std::string& array, std::size_t index, Stage stage = Stage::step) {
-        return g().input({at(array, index), at(array, index), stage});
+    Id in(const std::string& array, std::size_t index, Phase phase = Phase::step) {
+        return g().input({at(array, index), at(array, index), phase});
     }
     Id convert(const GiNaC::ex& expression) { return g().from(expression, symbols_); }
     Id named(const std::string& name, Id value) {
         p_.names.emplace_back(value, name);
         return value;
     }
-    Ids times(const Rows& matrix, const Ids& vector);
+    Ids times(const IdMatrix& matrix, const Ids& vector);
     void program(const std::string& name, const std::string& array, const Ids& values);
     // The program event(q, velocity): what the scene's events watch.
     void events();

@@ -36,7 +36,7 @@ private:
             const std::string& name = d_.scene.coordinates[k].name;
             const std::string shown = kind == 0 ? name + "_dot" : kind == 1 ? name : "p_" + name;
             symbols_[routhian.z[i]] =
-                g().input({at("z", i), shown, Stage::iterate, kind == 1 ? g().input_of(q_[k]).start : 0.1});
+                g().input({at("z", i), shown, Phase::iterate, kind == 1 ? g().input_of(q_[k]).start : 0.1});
         }
         Ids slopes;
         for (const ex& slope : routhian.gradient) slopes.push_back(convert(slope));

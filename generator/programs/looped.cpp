@@ -80,7 +80,7 @@ private:
             for (std::size_t i = 0; i < variables.size(); ++i) {
                 const std::size_t k = i % n_;
                 const double start = i < n_ ? 0.1 : g().input_of(q_[k]).start;
-                symbols_[variables[i]] = g().input({at("z", i), at("z", i), Stage::iterate, start});
+                symbols_[variables[i]] = g().input({at("z", i), at("z", i), Phase::iterate, start});
             }
         const Elements& elements = d_.structure.elements;
         // The gradient of terms and the forces beside them.
@@ -117,10 +117,10 @@ private:
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));
         p_.programs.push_back(std::move(quadratic));
-        if (!d_.structure.walls.before && !d_.structure.walls.behind) return;
+        if (!d_.structure.fixed_ends.before && !d_.structure.fixed_ends.behind) return;
         // The same where the walls of a chain are rows.
         Program inside{"inside_slope", {}};
-        add_slopes(inside, d_.structure.walls.others);
+        add_slopes(inside, d_.structure.fixed_ends.others);
         p_.programs.push_back(std::move(inside));
     }
 
@@ -132,10 +132,10 @@ private:
         };
         for (std::size_t j = 0; j < element.x.size(); ++j)
             symbols_[element.x[j]] = g().input({fmt::format("x{}", j), fmt::format("x{} of {}", j, name),
-                                                Stage::iterate, start_of(element.rows.front()[j])});
+                                                Phase::iterate, start_of(element.rows.front()[j])});
         for (std::size_t j = 0; j < element.a.size(); ++j)
             symbols_[element.a[j]] =
-                g().input({fmt::format("a{}", j), fmt::format("a{} of {}", j, name), Stage::step,
+                g().input({fmt::format("a{}", j), fmt::format("a{} of {}", j, name), Phase::step,
                            d_.scene.evaluate(element.coefficients.front()[j], "a coefficient").to_double()});
         const bool is_force = element.target >= 0;
         const ex term = is_force && !general_ ? -element.term : element.term;

@@ -22,19 +22,19 @@ ProgramBuilder::ProgramBuilder(const Derivation& derivation)
     for (std::size_t i = 0; i < d_.scene.parameters.size(); ++i) {
         const std::string& name = d_.scene.parameters[i].name;
         const double value = start_of(d_.scene.parameters[i].value, "the parameter " + name);
-        symbols_[d_.system.parameters[i]] = g().input({identifier(name), name, Stage::parameter, value});
+        symbols_[d_.system.parameters[i]] = g().input({identifier(name), name, Phase::parameter, value});
     }
-    h_ = g().input({"h", "h", Stage::step_size});
+    h_ = g().input({"h", "h", Phase::step_size});
     for (std::size_t k = 0; k < n_; ++k) {
         const std::string& name = d_.scene.coordinates[k].name;
         const double value = start_of(d_.scene.initial_position[k], "the initial position of " + name);
-        q_.push_back(g().input({at("q", k), name, Stage::step, value}));
+        q_.push_back(g().input({at("q", k), name, Phase::step, value}));
         symbols_[d_.system.q[k]] = q_.back();
     }
-    if (!d_.system.autonomous) symbols_[d_.system.t] = g().input({"time", d_.system.t.get_name(), Stage::step, 0});
+    if (!d_.system.autonomous) symbols_[d_.system.t] = g().input({"time", d_.system.t.get_name(), Phase::step, 0});
 }
 
-Ids ProgramBuilder::times(const Rows& matrix, const Ids& vector) {
+Ids ProgramBuilder::times(const IdMatrix& matrix, const Ids& vector) {
     Ids result;
     for (const Ids& row : matrix) {
         Ids terms;
@@ -92,19 +92,19 @@ double cost_of(const Programs& programs, const Structure& structure, const std::
 
 // Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
 // and five products for each of them (measured).
-bool is_costly(const Programs& programs, const Structure& structure) {
-    const double evaluation = cost_of(programs, structure, "acceleration", "_slope"),
+bool hessian_pays(const Programs& programs, const Structure& structure) {
+    const double evaluation = cost_of(programs, structure, "minus_acceleration", "_slope"),
                  with_slopes = cost_of(programs, structure, "node", "_node");
     return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
 }
 
-// Whether sweeps are solved by accelerations alone, without what is taken into the stage map. Passes may change what is
-// costly: a program that was left out before them stays so.
+// Whether fixed-point iterations are solved by accelerations alone, without what is taken into the stage map. Passes
+// may change what is uses_hessian: a program that was left out before them stays so.
 bool takes_remainder(const Programs& programs, const Structure& structure) {
     const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
                                       [](const Program& program) { return program.name == "remainder"; });
     return is_there && !structure.looped && !structure.is_explicit && !structure.clean &&
-           !is_costly(programs, structure);
+           !hessian_pays(programs, structure);
 }
 
 }  // namespace
@@ -117,7 +117,7 @@ OptimisedPrograms optimised_programs(const Derivation& derivation) {
         std::erase_if(result.programs.programs, [](const Program& program) { return program.name == "remainder"; });
     result.report = optimise(result.programs);
     result.cost_of_node = cost_of(result.programs, structure, "node", "_node");
-    result.costly = is_costly(result.programs, structure);
+    result.uses_hessian = hessian_pays(result.programs, structure);
     result.has_remainder = takes_remainder(result.programs, structure);
     return result;
 }

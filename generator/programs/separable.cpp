@@ -16,9 +16,9 @@ namespace {
 
 // M^-1 as straight-line code: Gauss-Jordan elimination on the graph, zeros skipped. The pivots are the values that must
 // not vanish.
-Rows invert(Graph& graph, Rows matrix, Ids& pivots) {
+IdMatrix invert(Graph& graph, IdMatrix matrix, Ids& pivots) {
     const std::size_t n = matrix.size();
-    Rows result(n, Ids(n, graph.number(0)));
+    IdMatrix result(n, Ids(n, graph.number(0)));
     for (std::size_t k = 0; k < n; ++k) result[k][k] = graph.number(1);
     for (std::size_t k = 0; k < n; ++k) {
         std::size_t row = k;
@@ -103,7 +103,7 @@ private:
         for (std::size_t e = 0; e < d_.structure.entries.size(); ++e)
             node.outputs.push_back({at("S", e), stiffness(e, d_.system.hessian)});
         p_.programs.push_back(std::move(node));
-        program("acceleration", "W", W);
+        program("minus_acceleration", "W", W);
     }
 
     // Entry e of M^-1 V'', for the V'' given.
@@ -156,7 +156,7 @@ private:
             while (std::any_of(inputs.begin(), inputs.end(), [&](const Input& other) { return other.code == name; }))
                 name += "_";
             prepare_map.outputs.push_back({name, value, Effect::declare});
-            return g().input({name, name, Stage::step_size});
+            return g().input({name, name, Phase::step_size});
         };
         const Id h_by_m = g().multiply({h_, g().power(m, -1)});
         const Id z = local("z", g().multiply({h_by_m, h_, k}));
@@ -188,7 +188,7 @@ private:
     }
 
     Ids pivots_;
-    Rows mass_, inverse_mass_;
+    IdMatrix mass_, inverse_mass_;
 };
 
 }  // namespace

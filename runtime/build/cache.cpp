@@ -125,7 +125,7 @@ void unlock_stem(const std::string& stem, int descriptor) {
 }
 
 // Removes what killed builders left: locks that nobody holds, and building folders whose lock nobody holds.
-void sweep(const fs::path& folder) {
+void evict(const fs::path& folder) {
     std::error_code ignored;
     std::set<fs::path> stems;
     for (const auto& file : fs::directory_iterator(folder, ignored)) {
@@ -252,7 +252,7 @@ void CacheEntry::keep_failure() const {
 }
 
 CacheEntry::Lock::Lock(const CacheEntry& entry) : stem_(entry.stem_), descriptor_(lock_stem(stem_, true)) {
-    sweep(fs::path(stem_).parent_path());
+    evict(fs::path(stem_).parent_path());
     remove_buildings(stem_);
     if (::mkdir(entry.building_path().c_str(), 0700) != 0) {
         const int error = errno;

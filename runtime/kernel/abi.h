@@ -127,12 +127,12 @@ and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
      * q[l * n ...], p[l * n ...]. status: one lobatto_status a lane, which each function sets; a lane whose status is
      * not LOBATTO_OK on entry of start or advance is left alone: where it has not started, its state means nothing.
      * No lane's results depend on its neighbours. */
-    int32_t lanes; /* 0: none, and the functions are null; else `advance` takes its steps without sweeps */
+    int32_t lanes; /* 0: none, and the functions are null; else `advance` takes its steps without fixed_point */
     int32_t ensemble_bytes;
     int32_t ensemble_alignment;
     void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);
     void (*ensemble_start)(void* ensemble, const void* time, const void* q, const void* p, int32_t* status);
-    /* steps_done and iterations (sweeps): one a lane, of this call. A lane that fails keeps its last good state. */
+    /* steps_done and iterations (fixed_point): one a lane, of this call. A lane that fails keeps its last good state. */
     void (*ensemble_advance)(void* ensemble, int64_t steps, double tolerance, int32_t* status, int64_t* steps_done,
                              int64_t* iterations);
     void (*ensemble_state)(const void* ensemble, void* q, void* p);

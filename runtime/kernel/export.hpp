@@ -20,7 +20,7 @@ struct NoEnsemble {
 #ifdef LOBATTO_ENSEMBLES
 // The functions of `lanes` trajectories side by side.
 template <class K, int width>
-struct ExportLanes {
+struct ExportEnsemble {
     using real = typename K::real;
     using Side = Ensemble<K, width>;
     static constexpr std::int32_t lanes = width, bytes = sizeof(Side), alignment = alignof(Side);
@@ -252,7 +252,7 @@ struct Export {
 // With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster.
 #ifdef LOBATTO_ENSEMBLES
 template <class K, int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
-using Exported = std::conditional_t<(lanes > 0), Export<Alone<K>, ExportLanes<K, lanes>>, Export<K>>;
+using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportEnsemble<K, lanes>>, Export<K>>;
 #else
 template <class K>
 using Exported = Export<K>;

@@ -253,16 +253,16 @@ private:
     // False: interrupted.
     bool run_together(std::int64_t first, std::vector<Ended>& ended, double& seconds) {
         begin(first, ended);
-        const auto going = [&] {
+        const auto active = [&] {
             return std::any_of(ended.begin(), ended.end(), [](const Ended& e) { return e.status == LOBATTO_OK; });
         };
         const auto side_by_side = static_cast<std::int64_t>(ended.size());
         std::int64_t done = 0;
-        while (done < request_.steps && going()) {
+        while (done < request_.steps && active()) {
             if (shared_.halted.load(std::memory_order_relaxed)) return false;
             const double start = processor_seconds();
             const std::int64_t from = done, target = done + std::min(chunk_, request_.steps - done);
-            while (done < target && going()) {
+            while (done < target && active()) {
                 const std::int64_t next =
                     request_.every == 0 ? target : std::min(target, done + request_.every - done % request_.every);
                 advance(next, next - done, ended);

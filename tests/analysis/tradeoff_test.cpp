@@ -19,10 +19,10 @@
 #include "analysis/kernel_of.hpp"
 #include "analysis/stability/limit.hpp"
 #include "analysis/tradeoff/calibration.hpp"
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 #include "analysis/tradeoff/measurement_json.hpp"
+#include "analysis/tradeoff/measurement_store.hpp"
 #include "analysis/tradeoff/method_text.hpp"
-#include "analysis/tradeoff/notebook.hpp"
 #include "cli/options/budget.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/measure/extrapolation.hpp"
@@ -222,7 +222,7 @@ TEST_CASE("a choice written into a scene leaves everything else, and reads back"
     CHECK(contains(second.source.content(), "# [method]\n  - x^2/2\"\"\""));
 }
 
-TEST_CASE("a notebook keeps measurements, and leaves out a torn line and another subject's") {
+TEST_CASE("a measurement store keeps measurements, and leaves out a torn line and another subject's") {
     const test::TemporaryFolder folder;
     const std::string path = folder / "m.jsonl";
     Measurement measurement;
@@ -231,14 +231,14 @@ TEST_CASE("a notebook keeps measurements, and leaves out a torn line and another
     measurement.error = 1.25e-7;
     measurement.energy_error = std::nan("");
     {
-        Notebook notebook(path, "a subject");
-        notebook.add(measurement);
+        MeasurementStore store(path, "a subject");
+        store.add(measurement);
     }
     test::write_text(path, test::read_file(path) + "{\"family\": \"lob");
     {
-        Notebook notebook(path, "a subject");
-        REQUIRE(notebook.found() == 1);
-        const Measurement* found = notebook.find(measurement.candidate);
+        MeasurementStore store(path, "a subject");
+        REQUIRE(store.found() == 1);
+        const Measurement* found = store.find(measurement.candidate);
         REQUIRE(found != nullptr);
         CHECK(found->error == 1.25e-7);
         CHECK(std::isnan(found->energy_error));
@@ -246,19 +246,19 @@ TEST_CASE("a notebook keeps measurements, and leaves out a torn line and another
     }
     const std::string line = test::read_file(path);
     test::write_text(path, std::regex_replace(line, std::regex("\"gauss\""), "\"euler\""));
-    CHECK(Notebook(path, "a subject").found() == 0);
-    CHECK(Notebook(path, "another").found() == 0);
+    CHECK(MeasurementStore(path, "a subject").found() == 0);
+    CHECK(MeasurementStore(path, "another").found() == 0);
 }
 
 TEST_CASE("what was measured for its error alone is measured again when everything is asked for") {
     const Scene scene = read_scene(pendulum);
-    Laboratory laboratory(derive(scene), scene, {});
+    Experiment experiment(derive(scene), scene, {});
     const Candidate candidate{{Family::lobatto, 4}, 2400, 0};
-    const Measurement error_only = laboratory.measure(candidate, false), all = laboratory.measure(candidate);
+    const Measurement error_only = experiment.measure(candidate, false), all = experiment.measure(candidate);
     CHECK(std::isnan(error_only.energy_error));
     CHECK(all.energy_error > 0);
     CHECK(all.error == error_only.error);
-    CHECK(laboratory.measure(candidate, false).energy_error == all.energy_error);
+    CHECK(experiment.measure(candidate, false).energy_error == all.energy_error);
 }
 
 TEST_CASE("a budget is a time with a unit") {
@@ -355,18 +355,18 @@ TEST_CASE(
 
 TEST_CASE("Ctrl-C leaves the measurements of a tradeoff, and the next call measures only the rest") {
     const Place place;
-    const std::string out = place.folder / "out", notebook = out + "/measurements.jsonl", log = place.folder / "log";
+    const std::string out = place.folder / "out", store = out + "/measurements.jsonl", log = place.folder / "log";
     const std::vector<std::string> command = {LOBATTO_PROGRAM, "tradeoff", pendulum, "--until", "10",
                                               "--budget",      "10min",    "-o",     out};
     std::vector<std::string> before;
     for (const std::size_t more : {4u, 3u, 3u}) {
-        const auto has_more = [&] { return lines_of(notebook).size() >= before.size() + more; };
+        const auto has_more = [&] { return lines_of(store).size() >= before.size() + more; };
         CHECK(interrupted_when(command, log, has_more) == 130);
         const std::string said = test::read_file(log);
         CAPTURE(said);
         CHECK(contains(said, "interrupted; the measurements are kept, and the same command goes on from them."));
         if (!before.empty()) CHECK(contains(said, fmt::format("({} of an earlier run)", before.size() - 1)));
-        const std::vector<std::string> now = lines_of(notebook);
+        const std::vector<std::string> now = lines_of(store);
         REQUIRE(now.size() >= before.size() + more);
         CHECK(std::equal(before.begin(), before.end(), now.begin()));
         before = now;
@@ -377,7 +377,7 @@ TEST_CASE("Ctrl-C leaves the measurements of a tradeoff, and the next call measu
         CHECK(candidates.insert(before[i].substr(0, before[i].find("\"complete\""))).second);
     // Before anything is measured: what there was stays.
     CHECK(interrupted_when(command, log, [] { return true; }) == 130);
-    CHECK(lines_of(notebook) == before);
+    CHECK(lines_of(store) == before);
 }
 
 TEST_CASE("run warns beyond the linear stability limit") {
@@ -398,19 +398,19 @@ struct Ratios {
 
 Ratios ratios_on(const std::string& name, const std::vector<Member>& members) {
     const Scene scene = read_scene(LOBATTO_SOURCE_DIR "/scenes/" + name + ".toml");
-    LaboratoryRequest wish;
+    ExperimentRequest wish;
     wish.seconds = 120;
     wish.wanted = 1e-10;
     wish.first = members;
-    Laboratory laboratory(derive(scene), scene, wish);
-    const double until = laboratory.until(), omega = laboratory.reference().frequency;
-    const StepLadder ladder(laboratory.reference().samples, 1.1);
+    Experiment experiment(derive(scene), scene, wish);
+    const double until = experiment.until(), omega = experiment.reference().frequency;
+    const StepLadder ladder(experiment.reference().samples, 1.1);
     Ratios ratios;
     for (const Member& member : members)
         for (const double radians : {2.0, 1.0, 0.5, 0.25, 0.1}) {
-            const Measurement m = laboratory.measure({member, ladder.at_least(until * omega / radians), 0});
+            const Measurement m = experiment.measure({member, ladder.at_least(until * omega / radians), 0});
             if (!m.complete || m.growth == 0) continue;
-            if (!(m.error > std::fmax(1e-11, 100 * laboratory.reference().disagreement.back()) && m.error < 0.1))
+            if (!(m.error > std::fmax(1e-11, 100 * experiment.reference().disagreement.back()) && m.error < 0.1))
                 continue;
             CAPTURE(name);
             CAPTURE(m.candidate.name());

@@ -42,43 +42,44 @@ TEST_CASE("check says what it found, what that saves, and what it looked for in 
     CHECK(done.err == "");
     CHECK(done.exit_code == 0);
     const std::string text = std::regex_replace(done.out, std::regex("\\d\\.\\d\\d s"), "TIME s");
-    CHECK(text == "A plane pendulum (" + scene_path("pendulum") +
-                      ")\n"
-                      "\n"
-                      "  Lagrangian                  m*q'^2/2 - m*omega^2*(1 - cos(q))\n"
-                      "  its kind                    Kinetic minus potential energy, with constant masses.\n"
-                      "\n"
-                      "Found, and put to use\n"
-                      "  constant mass matrix        the masses are the same everywhere, so the end of a step needs "
-                      "no equations\n"
-                      "  no explicit time            nothing depends on the time itself: no formula takes it\n"
-                      "  no forces                   all forces come from L, so every step is symplectic\n"
-                      "  solution in closed form     q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = "
-                      "omega^2\n"
-                      "\n"
-                      "Looked for, not found\n"
-                      "  linear system               d2V/dqdq = m*omega^2*cos(q) depends on the position\n"
-                      "  cyclic coordinates          no coordinate is without a force\n"
-                      "  quadratic part absorbed     V has no quadratic part\n"
-                      "\n"
-                      "A step of Lobatto, 4 points (order 6)\n"
-                      "  its form                    the positions at the 2 points inside it are solved for; its end "
-                      "follows from them\n"
-                      "  unknowns                    2; 3 without what was found\n"
-                      "  solved                      by sweeps over all points at once; where they do not contract, by "
-                      "Newton's\n"
-                      "                              iteration; 2 equations, as a full matrix\n"
-                      "  elimination                 some 6 multiplications; 18 without what was found\n"
-                      "\n"
-                      "The kernel\n"
-                      "  energy                      H at every kept state: 7 operations\n"
-                      "  momenta                     columns p_... of the trajectory\n"
-                      "  tangent                     the derivative of a step, from the matrix of its equations\n"
-                      "  dense                       not asked for, left out\n"
-                      "  events                      not asked for, left out\n"
-                      "  operations                  16 in all its formulas, each counted once; 24 without what was "
-                      "found\n"
-                      "  derived and written in      TIME s\n");
+    CHECK(text ==
+          "A plane pendulum (" + scene_path("pendulum") +
+              ")\n"
+              "\n"
+              "  Lagrangian                  m*q'^2/2 - m*omega^2*(1 - cos(q))\n"
+              "  its kind                    Kinetic minus potential energy, with constant masses.\n"
+              "\n"
+              "Found, and put to use\n"
+              "  constant mass matrix        the masses are the same everywhere, so the end of a step needs "
+              "no equations\n"
+              "  no explicit time            nothing depends on the time itself: no formula takes it\n"
+              "  no forces                   all forces come from L, so every step is symplectic\n"
+              "  solution in closed form     q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = "
+              "omega^2\n"
+              "\n"
+              "Looked for, not found\n"
+              "  linear system               d2V/dqdq = m*omega^2*cos(q) depends on the position\n"
+              "  cyclic coordinates          no coordinate is without a force\n"
+              "  quadratic part absorbed     V has no quadratic part\n"
+              "\n"
+              "A step of Lobatto, 4 points (order 6)\n"
+              "  its form                    the positions at the 2 points inside it are solved for; its end "
+              "follows from them\n"
+              "  unknowns                    2; 3 without what was found\n"
+              "  solved                      by fixed-point iteration over all points at once; where it does not "
+              "contract, by\n"
+              "                              Newton's iteration; 2 equations, as a full matrix\n"
+              "  elimination                 some 6 multiplications; 18 without what was found\n"
+              "\n"
+              "The kernel\n"
+              "  energy                      H at every kept state: 7 operations\n"
+              "  momenta                     columns p_... of the trajectory\n"
+              "  tangent                     the derivative of a step, from the matrix of its equations\n"
+              "  dense                       not asked for, left out\n"
+              "  events                      not asked for, left out\n"
+              "  operations                  16 in all its formulas, each counted once; 24 without what was "
+              "found\n"
+              "  derived and written in      TIME s\n");
 }
 
 TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
@@ -139,8 +140,7 @@ TEST_CASE("coordinates that do not act on one another are solved each by itself"
     CHECK(groups.at(1).at("coordinates") == nlohmann::json{"y"});
     const std::string text = check(scene).out;
     CHECK(std::regex_replace(text, std::regex("\\s+"), " ")
-              .find("by Newton's iteration; for each of 2 groups 2 equations, as a full matrix") !=
-          std::string::npos);
+              .find("by Newton's iteration; for each of 2 groups 2 equations, as a full matrix") != std::string::npos);
 }
 
 TEST_CASE("outputs that are not asked for are left out of the kernel, and what the others add is counted") {

@@ -209,7 +209,7 @@ TEST_CASE("emit writes the header and its support, says what each pass saved and
     CHECK(test::read_file(path + "/pendulum.hpp") == test::read_file(tree + "/generated/pendulum.hpp"));
     CHECK(contains(emitted.out, "\nWrote " + path + "/pendulum.hpp and " + path + "/kernel.hpp\n"));
     for (const char* pass : {"as derived ", "fold constants ", "factor sums (Horner) ", "powers by multiplication ",
-                             "group by stage ", "share common parts ", "sums of angles ", "pair sines and cosines "})
+                             "group by phase ", "share common parts ", "sums of angles ", "pair sines and cosines "})
         CHECK(contains(emitted.out, pass));
     CHECK(contains(emitted.out, "  lobatto::Stepper<lobatto::kernels::pendulum> stepper;\n"));
     CHECK(contains(emitted.out, " -I " + path + " program.cpp\n"));

@@ -107,16 +107,16 @@ TEST_CASE("clean steps are plain ones to rounding in every precision") {
     CHECK(difference<__float128>(henon_heiles, "points = 6", Precision::quadruple, 100, 0.2) < 300);  // 14 measured
 }
 
-TEST_CASE("where sweeps do not contract clean steps are found by Newton's iteration") {
-    // h omega = 8: a sweep of Gauss's three stages enlarges errors threefold.
+TEST_CASE("where the fixed-point iteration does not contract clean steps are found by Newton's iteration") {
+    // h omega = 8: an iteration with Gauss's three stages enlarges errors threefold.
     const double step = 8 / std::sqrt(1.5);
     const std::string method = "family = \"gauss\"\nstages = 3";
     CHECK(difference<double>(harmonic_oscillator, method, Precision::double_, 50, step) < 500);
     CHECK(difference<double>(pendulum, "points = 4", Precision::double_, 50, 1.5) < 5000);
 }
 
-TEST_CASE("sweeps that alternate, or that begin at rest, are not taken for solved") {
-    // h omega = 2 with the midpoint rule: each sweep turns the error round, X = a - X, for ever.
+TEST_CASE("iterations that alternate, or that begin at rest, are not taken for solved") {
+    // h omega = 2 with the midpoint rule: each iteration turns the error round, X = a - X, for ever.
     Motion oscillator = harmonic_oscillator;
     oscillator.parameters = {1, 1};
     CHECK(difference<double>(oscillator, "family = \"gauss\"\nstages = 1", Precision::double_, 50, 2) < 1000);
@@ -132,7 +132,7 @@ TEST_CASE("sweeps that alternate, or that begin at rest, are not taken for solve
     auto beside = started<double>(
         kernel_in_own_cache(derivation_of(both, clean(midpoint), untangent), Precision::double_), both, 1);
     CHECK(std::fabs(after(beside, 50).q[1]) < 1.5);  // -1 or 0 or 1
-    // Nothing moves yet, so nothing is small beside the motion; sweeps enlarge errors threefold.
+    // Nothing moves yet, so nothing is small beside the motion; iterations enlarge errors threefold.
     const Motion stiff{
         "time = \"t\"\nlagrangian = \"q'^2/2 - 32*(q - sin(t))^2\"\n[coordinates]\nq = { position = 0, "
         "velocity = 0 }\n",

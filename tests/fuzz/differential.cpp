@@ -147,7 +147,7 @@ public:
         const System& s = derivation.system;
         GiNaC::exmap inputs;
         const auto declare = [&](const GiNaC::symbol& symbol, const std::string& code) {
-            inputs[symbol] = graph_.input({code, code, Stage::iterate, 0.5});
+            inputs[symbol] = graph_.input({code, code, Phase::iterate, 0.5});
         };
         for (std::size_t i = 0; i < s.parameters.size(); ++i) declare(s.parameters[i], fmt::format("p{}", i));
         for (std::size_t i = 0; i < n_; ++i) declare(s.q[i], fmt::format("q{}", i));
@@ -193,7 +193,7 @@ public:
     }
 
     // The acceleration; false when the mass matrix is singular or something is not a number.
-    bool acceleration(const Reals& parameters, const real* q, const real* v, real t, real* a) {
+    bool minus_acceleration(const Reals& parameters, const real* q, const real* v, real t, real* a) {
         const Reals inputs = joined(parameters, Reals(q, q + n_), Reals(v, v + n_), t);
         for (std::size_t k = 0; k < order_.size(); ++k) at(order_[k]) = value(order_[k], constants_[k], inputs);
         std::vector<Reals> M(n_, Reals(n_ + 1));
@@ -336,7 +336,7 @@ private:
     }
     bool slope(const Reals& y, real t, Reals& f) {
         std::copy_n(y.begin() + static_cast<std::ptrdiff_t>(n_), n_, f.begin());
-        return mechanics_.acceleration(parameters_, y.data(), y.data() + n_, t, f.data() + n_);
+        return mechanics_.minus_acceleration(parameters_, y.data(), y.data() + n_, t, f.data() + n_);
     }
     Reals midpoint(const Reals& y, real t0, real t1, int steps) {
         const real h = (t1 - t0) / steps;

@@ -55,7 +55,7 @@ struct HandwrittenChain : HandwrittenKernel, Tables {
     }
 
     static real stretch(const real* q, int i) { return (i < n ? q[i] : real(0)) - (i > 0 ? q[i - 1] : real(0)); }
-    static void acceleration(const Coefficients& k, const real* q, real* W) {
+    static void minus_acceleration(const Coefficients& k, const real* q, real* W) {
         real before = stretch(q, 0);
         before += k.beta * before * before * before;
         for (int i = 0; i < n; ++i) {
@@ -76,7 +76,7 @@ struct HandwrittenChain : HandwrittenKernel, Tables {
     }
     static void node(const Coefficients& k, const real* q, real* W, real* S) {
         ++nodes_evaluated;
-        acceleration(k, q, W);
+        minus_acceleration(k, q, W);
         second(k.beta, q, S);
     }
     static void quadratic_part(const Coefficients&, real* S0) {

@@ -74,11 +74,11 @@ struct HandwrittenDrivenSeparable : HandwrittenDriven<number, Tables> {
     static constexpr bool absorbed = false;
     static constexpr int entries = 1, entry_row[1] = {0}, entry_column[1] = {0};
 
-    static void acceleration(const Coefficients& k, real time, const real* q, real* W) {
+    static void minus_acceleration(const Coefficients& k, real time, const real* q, real* W) {
         W[0] = lobatto::sin(q[0]) - k.a * lobatto::cos(k.w * time);
     }
     static void node(const Coefficients& k, real time, const real* q, real* W, real* S) {
-        acceleration(k, time, q, W);
+        minus_acceleration(k, time, q, W);
         S[0] = lobatto::cos(q[0]);
     }
     static void momentum(const Coefficients&, const real* v, real* p) { p[0] = v[0]; }

@@ -27,7 +27,8 @@ struct HandwrittenPendulum {
     static constexpr int entries = 1;  // S = V''/m has one entry
     static constexpr Form form = Form::separable;
     static constexpr bool autonomous = true, linear = false, has_energy = true, has_tangent = true, absorbed = false;
-    static constexpr bool any_number = false, diagonal_part = false, clean = false, is_explicit = false, costly = true;
+    static constexpr bool any_number = false, diagonal_part = false, clean = false, is_explicit = false,
+                          uses_hessian = true;
     static constexpr bool has_remainder = false;
     static constexpr int events = 0, angles = 0;
     static constexpr const char* method = "Lobatto, 4 points";
@@ -88,7 +89,7 @@ struct HandwrittenPendulum {
     static void momentum(const Coefficients& k, const real* velocity, real* p) { p[0] = k.m * velocity[0]; }
     static void velocity(const Coefficients& k, const real* p, real* velocity) { velocity[0] = p[0] / k.m; }
 
-    static void acceleration(const Coefficients& k, const real* q, real* W) {
+    static void minus_acceleration(const Coefficients& k, const real* q, real* W) {
         real sine, cosine;
         sincos(q[0], sine, cosine);
         W[0] = k.omega_squared * sine;

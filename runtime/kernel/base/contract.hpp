@@ -10,17 +10,17 @@
 //                for falling, 0 for both
 // Form::linear_map and Form::separable: is_explicit; of splitting methods they have c, b and drift_length[s - 1], the
 //   way between nodes, and neither A nor E nor what orders unknowns.
-// Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), acceleration(k, q, W),
+// Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), minus_acceleration(k, q, W),
 //   node(k, q, W, S), propagate(k, q, p, q1, p1).
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
 //   entry_column of S; unknowns, N = n (s - 2); E[(s - 2) * s] extrapolates (D15); the tables of base/solve.hpp order
 //   the unknowns; `neighbours` says that acceleration can go SideBySide (base/rows.hpp; with row_reach, how far its
-//   rows reach, in_passing, that it can go InPassing, and unit_masses), and `absorbed` says that quadratic_part(k, S0)
+//   rows reach, immediate, that it can go Immediate, and unit_masses), and `absorbed` says that quadratic_part(k, S0)
 //   gives a constant part of S to iterate with; `clean` that steps are those of steppers/clean.hpp. Gauss's nodes stand
 //   between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal, D, and
 //   taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
-// Form::general: see steppers/general.hpp.
-// Form::general: angles, how many arguments of sine and cosine `stage` holds; where there are any it takes one more
+// Form::general: see steppers/general.hpp; angles, how many arguments of sine and cosine `stage` holds; where there are
+// any it takes one more
 //   argument, AnglesAnew by default, which gives their sines and cosines (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
@@ -60,7 +60,7 @@ enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
 template <class K>
 struct Formulas {
     LOBATTO_WITH_TIME(node)
-    LOBATTO_WITH_TIME(acceleration)
+    LOBATTO_WITH_TIME(minus_acceleration)
     LOBATTO_WITH_TIME(remainder)
     LOBATTO_WITH_TIME(slope)
     LOBATTO_WITH_TIME(slopes)
@@ -73,24 +73,20 @@ struct Formulas {
     template <class How, class Given, class Time, class Position, class Slope>
     LOBATTO_INLINE static void along_rows(const Given& k, [[maybe_unused]] Time time, Position position, Slope slope) {
         if constexpr (K::autonomous)
-            K::template acceleration<How>(k, position, slope);
+            K::template minus_acceleration<How>(k, position, slope);
         else
-            K::template acceleration<How>(k, time, position, slope);
+            K::template minus_acceleration<How>(k, time, position, slope);
     }
 };
 #undef LOBATTO_WITH_TIME
 
-// What an array of coordinates, a pointer or anything with [], holds.
-template <class Array>
-using element_of = std::decay_t<decltype(std::declval<const Array&>()[0])>;
-
 // How the steps of systems with constant mass are taken: the equations of inner nodes solved, round-off-clean
 // (steppers/clean.hpp), or kicks and drifts in turn (steppers/splitting.hpp).
-enum class Stepping { solved, clean, in_turn };
+enum class Stepping { solved, clean, composition };
 template <class K>
 constexpr Stepping stepping_of() {
     if constexpr (K::form == Form::separable)
-        return K::clean ? Stepping::clean : K::is_explicit ? Stepping::in_turn : Stepping::solved;
+        return K::clean ? Stepping::clean : K::is_explicit ? Stepping::composition : Stepping::solved;
     else
         return Stepping::solved;
 }
@@ -101,9 +97,9 @@ constexpr bool is_clean() {
 
 // Whether a coordinate may move as soon as its acceleration is known.
 template <class K>
-constexpr bool moves_in_passing() {
-    if constexpr (K::neighbours && stepping_of<K>() == Stepping::in_turn)
-        return K::in_passing;
+constexpr bool moves_immediately() {
+    if constexpr (K::neighbours && stepping_of<K>() == Stepping::composition)
+        return K::immediate;
     else
         return false;
 }
@@ -138,16 +134,16 @@ struct Motion {
 template <class K, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Stepper;
 
-// K for what a trajectory side by side with others rarely does alone: its steps by Newton's iteration, so that sweeps
-// are compiled for lanes only.
+// K for what a trajectory side by side with others rarely does alone: its steps by Newton's iteration, so that
+// iterations are compiled for lanes only.
 template <class K>
-struct Unswept : K {
+struct NewtonOnly : K {
     static constexpr bool any_number = false;
 };
 template <class K>
-using Alone = std::conditional_t<stepping_of<K>() == Stepping::in_turn, K, Unswept<K>>;
+using FallbackKernel = std::conditional_t<stepping_of<K>() == Stepping::composition, K, NewtonOnly<K>>;
 template <class K>
-using Single = Stepper<Alone<K>>;
+using ScalarFallback = Stepper<FallbackKernel<K>>;
 
 // The fixed-point iteration of one trajectory of a separable system: along its nodes (iteration/fixed_point.hpp), or
 // along its neighbouring coordinates (iteration/neighbours.hpp).
@@ -157,7 +153,7 @@ struct FixedPointOf;
 // How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
 // going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
-struct Lanes;
+struct LaneStepper;
 
 // A system with constant mass, whose velocity is kept beside its position.
 template <class K>
@@ -186,17 +182,17 @@ struct ConstantMass : Motion<K> {
     // dL/dv = M v and dL/dq + F = -M W.
     void slopes(real time, const real* position, const real* velocity, real* Lv, real* Lq) const {
         real W[n];
-        Formulas<K>::acceleration(coefficients, time, position, +W);
+        Formulas<K>::minus_acceleration(coefficients, time, position, +W);
         for (int k = 0; k < n; ++k) W[k] = -W[k];
         K::momentum(coefficients, velocity, Lv);
         K::momentum(coefficients, static_cast<const real*>(W), Lq);
     }
 };
 
-// When to try sweeps: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.
+// When to try iterations: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.
 struct Pause {
     std::int32_t left{};   // steps
-    std::int32_t next{1};  // how many, the next time that sweeps fail
+    std::int32_t next{1};  // how many, the next time that iterations fail
 
     // Once a step: whether the pause is over with it.
     bool count_down() { return left == 0 || --left == 0; }

@@ -640,15 +640,6 @@ inline real lane_of(const real& value, int) {
     return value;
 }
 
-// A Pack at a time.
-template <int count, class real>
-LOBATTO_INLINE void copy_lanes(const real* from, real* to) {
-    using V = Pack<real, native_lanes<real>>;
-    int i = 0;
-    for (; i + lanes_of<V> <= count; i += lanes_of<V>) V::load(from + i).store(to + i);
-    for (; i < count; ++i) to[i] = from[i];
-}
-
 }  // namespace lobatto
 
 #endif

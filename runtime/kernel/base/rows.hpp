@@ -18,10 +18,14 @@
 
 namespace lobatto {
 
+// What an array of coordinates, a pointer or anything with [], holds.
+template <class Array>
+using element_of = std::decay_t<decltype(std::declval<const Array&>()[0])>;
+
 // Rows of a repeated formula: its variables x, and what it gives for each, to be added to W, or taken away from it. V:
 // a number, of one row; or, `in_lanes`, a Pack of `count` rows that follow one another from `row` on.
 template <class V, int variables, bool in_lanes>
-struct Rows {
+struct FormulaRows {
     V x[variables], result[variables]{};
     bool takes[variables]{};  // known to the compiler
     int row, count;
@@ -45,7 +49,7 @@ constexpr int long_run = 8;
 
 // Where a chain hangs on walls: rows of two neighbours go on beyond its first coordinate, or its last, with zero in the
 // place of the coordinate that is not there.
-constexpr int no_wall = 0, wall_before = 1, wall_behind = 2;
+constexpr int free_ends = 0, fixed_before = 1, fixed_behind = 2;
 
 // The coordinates of one node in registers, a Pack of neighbours each; beyond the last there are zeros.
 template <class V, int parts>
@@ -107,7 +111,7 @@ LOBATTO_INLINE void written_out(int count, const F& f) {
 // Going through rows of formulas. `indices` has the `variables` of each row; a run is rows whose variables are those of
 // the row before plus one. All runs of more than one row have the same distances between the variables of a row. With
 // walls there is one run, over all coordinates, of rows of two neighbours.
-template <int variables, const auto& indices, int walls = no_wall>
+template <int variables, const auto& indices, int fixed_ends = free_ends>
 struct RowLoop {
     // How far variable j is behind the first.
     static constexpr int least() {
@@ -134,14 +138,14 @@ struct RowLoop {
         constexpr bool in_lanes = !std::is_same_v<V, element_of<Position>>;
         constexpr int width = in_lanes ? lanes_of<V> : 1;
         constexpr std::make_integer_sequence<int, variables> every{};
-        static_assert(walls == no_wall || (variables == 2 && offset(0) + offset(1) == 1));
+        static_assert(fixed_ends == free_ends || (variables == 2 && offset(0) + offset(1) == 1));
         const int first = indices[begin * variables] + least();
         constexpr bool overlaps = farthest_within(width) > 0;  // what is loaded for one V serves the next too
         V before[variables], here = load_from<V>(q, first);
         bool takes[variables]{};
         for (int j = 0; j < variables; ++j) before[j] = V(number(0));
-        if constexpr ((walls & wall_before) != 0) {  // the last lane of what would stand before
-            Rows<V, variables, in_lanes> rows;
+        if constexpr ((fixed_ends & fixed_before) != 0) {  // the last lane of what would stand before
+            FormulaRows<V, variables, in_lanes> rows;
             rows.row = begin;
             rows.count = width;
             each(every, [&](auto j) LOBATTO_FORMULA {
@@ -152,14 +156,14 @@ struct RowLoop {
         }
         const auto add = [&](int r, auto is_whole) LOBATTO_FORMULA {
             const int at = first + r;
-            Rows<V, variables, in_lanes> rows;
+            FormulaRows<V, variables, in_lanes> rows;
             rows.row = begin + r;
             rows.count = is_whole ? width : count - r;
             if constexpr (!overlaps) here = load_from<V>(q, at);
             V there = here;
             if constexpr (overlaps) {
                 // One by one, no zero stands behind the last coordinate.
-                if constexpr (in_lanes || is_whole || (walls & wall_behind) == 0)
+                if constexpr (in_lanes || is_whole || (fixed_ends & fixed_behind) == 0)
                     there = load_from<V>(q, at + width);
                 else
                     there = V(number(0));
@@ -178,7 +182,7 @@ struct RowLoop {
                 V& result = rows.result[j];
                 if constexpr (in_lanes) {
                     // The row at the wall gives to its first variable only.
-                    constexpr bool hangs = (walls & wall_behind) != 0 && offset(j) > 0;
+                    constexpr bool hangs = (fixed_ends & fixed_behind) != 0 && offset(j) > 0;
                     if constexpr (!is_whole) result = first_lanes(result, count - (hangs ? 1 : 0) - r);
                 }
                 takes[j] = rows.takes[j];
@@ -192,7 +196,7 @@ struct RowLoop {
             });
             store_to(W, at, sum);
         };
-        constexpr bool last_apart = !in_lanes && (walls & wall_behind) != 0;
+        constexpr bool last_apart = !in_lanes && (fixed_ends & fixed_behind) != 0;
         const int whole = last_apart ? count - 1 : count / width * width;
         if constexpr (are_registers<Position>)
             written_out<width>(whole, [&](int r) LOBATTO_FORMULA { add(r, std::true_type()); });
@@ -205,7 +209,7 @@ struct RowLoop {
                 behind += width;
             }
         }
-        if ((walls & wall_behind) == 0 && behind < count + farthest_within(width)) {
+        if ((fixed_ends & fixed_behind) == 0 && behind < count + farthest_within(width)) {
             V sum = V(number(0));
             if constexpr (adds) sum = load_from<V>(W, first + behind);
             each(every, [&](auto j) LOBATTO_FORMULA {
@@ -218,7 +222,7 @@ struct RowLoop {
 
     template <class number, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void one_row(int row, Position q, Slope W, const Formula& formula) {
-        Rows<number, variables, false> one;
+        FormulaRows<number, variables, false> one;
         one.row = row;
         one.count = 1;
         for (int j = 0; j < variables; ++j) one.x[j] = q[indices[row * variables + j]];
@@ -230,7 +234,7 @@ struct RowLoop {
     template <class number, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void wall_rows(int count, Position q, Slope W, const Formula& formula) {
         const auto hang = [&](int place, bool is_behind) LOBATTO_FORMULA {
-            Rows<number, variables, false> one;
+            FormulaRows<number, variables, false> one;
             one.row = 0;
             one.count = 1;
             for (int j = 0; j < variables; ++j) one.x[j] = (offset(j) == 0) == is_behind ? q[place] : number(0);
@@ -238,20 +242,20 @@ struct RowLoop {
             for (int j = 0; j < variables; ++j)
                 if ((offset(j) == 0) == is_behind) add_to(W, place, sign(one.result[j], one.takes[j]));
         };
-        if constexpr ((walls & wall_before) != 0) hang(0, false);
-        if constexpr ((walls & wall_behind) != 0) hang(count - 1, true);
+        if constexpr ((fixed_ends & fixed_before) != 0) hang(0, false);
+        if constexpr ((fixed_ends & fixed_behind) != 0) hang(count - 1, true);
     }
 
     // The one run, with the rows at the walls where they are rows as others are.
     template <class V, bool adds, const auto& runs, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void entire(Position q, Slope W, const Formula& formula) {
-        run<V, adds>(runs[0], runs[1] + ((walls & wall_behind) != 0 ? 1 : 0), q, W, formula);
+        run<V, adds>(runs[0], runs[1] + ((fixed_ends & fixed_behind) != 0 ? 1 : 0), q, W, formula);
     }
 
     // All runs of `runs`, pairs (first row, how many).
     template <class V, const auto& runs, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void all(Position q, Slope W, const Formula& formula) {
-        static_assert(walls == no_wall);
+        static_assert(fixed_ends == free_ends);
         constexpr int run_count = sizeof(runs) / sizeof(runs[0]) / 2;
         if constexpr (are_registers<Position>) {
             each(std::make_integer_sequence<int, run_count>(), [&](auto i) LOBATTO_FORMULA {
@@ -318,33 +322,33 @@ struct OneByOne {
         return W[place];
     }
     // `runs`: pairs (first row, how many).
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class number,
               class Formula>
     LOBATTO_INLINE static void add_rows(const number* q, number* W, const Formula& formula) {
         RowLoop<variables, indices>::template all<number, runs>(q, W, formula);
-        RowLoop<variables, indices, walls>::template wall_rows<number>(count, q, W, formula);
+        RowLoop<variables, indices, fixed_ends>::template wall_rows<number>(count, q, W, formula);
     }
     // The same where the rows are one run that reaches all of W, of `count`, on which nothing stands yet.
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class number,
               class Formula>
     LOBATTO_INLINE static void set_rows(const number* q, number* W, const Formula& formula) {
         if constexpr (RowLoop<variables, indices>::reach() <= 1) {
-            RowLoop<variables, indices, walls>::template entire<number, false, runs>(q, W, formula);
+            RowLoop<variables, indices, fixed_ends>::template entire<number, false, runs>(q, W, formula);
         } else {
             clear<count>(W);
-            add_rows<count, variables, indices, runs, walls>(q, W, formula);
+            add_rows<count, variables, indices, runs, fixed_ends>(q, W, formula);
         }
     }
 };
 
 // or the same where each entry of W is given away as soon as it is known, with its coordinate no longer needed
-// (K::in_passing); masses are the receiver's,
-struct InPassing {
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class number,
+// (K::immediate); masses are the receiver's,
+struct Immediate {
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class number,
               class Receiver, class Formula>
     LOBATTO_INLINE static void set_rows(const number* q, Receiver W, const Formula& formula) {
         static_assert(RowLoop<variables, indices>::reach() <= 1);
-        RowLoop<variables, indices, walls>::template entire<number, false, runs>(q, W, formula);
+        RowLoop<variables, indices, fixed_ends>::template entire<number, false, runs>(q, W, formula);
     }
     template <int, class Receiver, class Factor>
     LOBATTO_INLINE static void scale(Receiver, const Factor*) {}
@@ -353,15 +357,15 @@ struct InPassing {
 // or those of a run side by side in a Pack, for plain numbers in arrays with room,
 struct SideBySide {
     template <class real>
-    using Lanes = Pack<real, native_lanes<real>>;
+    using NativePack = Pack<real, native_lanes<real>>;
 
     template <int count, class real>
     LOBATTO_INLINE static void clear(real* W) {
-        for (int i = 0; i < count; i += native_lanes<real>) Lanes<real>(real(0)).store(W + i);
+        for (int i = 0; i < count; i += native_lanes<real>) NativePack<real>(real(0)).store(W + i);
     }
     template <int count, class real>
     LOBATTO_INLINE static void scale(real* W, const real* factor) {
-        using V = Lanes<real>;
+        using V = NativePack<real>;
         int i = 0;
         for (; i + lanes_of<V> <= count; i += lanes_of<V>) (V::load(W + i) * V::load(factor + i)).store(W + i);
         for (; i < count; ++i) W[i] *= factor[i];
@@ -372,7 +376,7 @@ struct SideBySide {
         real* W;
         LOBATTO_INLINE void operator+=(real x) const {
             constexpr int lane = place % native_lanes<real>;
-            using V = Lanes<real>;
+            using V = NativePack<real>;
             (V::load(W + place - lane) + only_lane<lane, lanes_of<V>>(x)).store(W + place - lane);
         }
     };
@@ -380,18 +384,18 @@ struct SideBySide {
     LOBATTO_INLINE static Place<real, place> at(real* W) {
         return {W};
     }
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class real,
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class real,
               class Formula>
     LOBATTO_INLINE static void add_rows(const real* q, real* W, const Formula& formula) {
-        if constexpr (walls != no_wall)
-            RowLoop<variables, indices, walls>::template entire<Lanes<real>, true, runs>(q, W, formula);
+        if constexpr (fixed_ends != free_ends)
+            RowLoop<variables, indices, fixed_ends>::template entire<NativePack<real>, true, runs>(q, W, formula);
         else
-            RowLoop<variables, indices>::template all<Lanes<real>, runs>(q, W, formula);
+            RowLoop<variables, indices>::template all<NativePack<real>, runs>(q, W, formula);
     }
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class real,
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class real,
               class Formula>
     LOBATTO_INLINE static void set_rows(const real* q, real* W, const Formula& formula) {
-        RowLoop<variables, indices, walls>::template entire<Lanes<real>, false, runs>(q, W, formula);
+        RowLoop<variables, indices, fixed_ends>::template entire<NativePack<real>, false, runs>(q, W, formula);
     }
 };
 
@@ -420,18 +424,18 @@ struct WrittenOut {
     LOBATTO_INLINE static Place<Slope, place> at(Slope W) {
         return {W};
     }
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class V, int parts,
-              class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class V,
+              int parts, class Formula>
     LOBATTO_INLINE static void add_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
-        if constexpr (walls != no_wall)
-            RowLoop<variables, indices, walls>::template entire<V, true, runs>(q, W, formula);
+        if constexpr (fixed_ends != free_ends)
+            RowLoop<variables, indices, fixed_ends>::template entire<V, true, runs>(q, W, formula);
         else
             RowLoop<variables, indices>::template all<V, runs>(q, W, formula);
     }
-    template <int count, int variables, const auto& indices, const auto& runs, int walls = no_wall, class V, int parts,
-              class Formula>
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class V,
+              int parts, class Formula>
     LOBATTO_INLINE static void set_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
-        RowLoop<variables, indices, walls>::template entire<V, false, runs>(q, W, formula);
+        RowLoop<variables, indices, fixed_ends>::template entire<V, false, runs>(q, W, formula);
     }
 };
 

@@ -91,6 +91,15 @@ LOBATTO_INLINE Pack<real, width> rough_inverse(const Pack<real, width>& x) {
     return from_bits(Bits<real, width>(line) - bits(x));
 }
 
+// A Pack at a time.
+template <int count, class real>
+LOBATTO_INLINE void copy_lanes(const real* from, real* to) {
+    using V = Pack<real, native_lanes<real>>;
+    int i = 0;
+    for (; i + lanes_of<V> <= count; i += lanes_of<V>) V::load(from + i).store(to + i);
+    for (; i < count; ++i) to[i] = from[i];
+}
+
 }  // namespace lobatto
 
 #endif

@@ -1,33 +1,34 @@
 // SPDX-License-Identifier: MIT
-// The step of many trajectories of a separable system side by side, one in each lane, by sweeps over its nodes.
+// The step of many trajectories of a separable system side by side, one in each lane, by iterations over its nodes.
 //
 // Formula numbers (D..) refer to docs/derivation.md. The unknown is what the nodes X still have to move by (D41): with
 // the stage map M = -h^2 P A (iteration/stage_map.hpp), W and S = dW/dq at X and the sums P that X was made with,
 //     delta = d + M (S - D) delta,    d = M (W - D X) - P
-// to first order. Where S pays (K::costly) one evaluation gives both sides, and delta follows by repetition; elsewhere
-// delta = d. X moves by delta and is evaluated again until delta is small.
+// to first order. Where S pays (K::uses_hessian) one evaluation gives both sides, and delta follows by repetition;
+// elsewhere delta = d. X moves by delta and is evaluated again until delta is small.
 //
 // No lane sees its neighbours: one that is solved stands still while others go on, and what is computed of it again
 // has the same bits. What the tests ask for does not lie on the chain of operations that a step waits for.
-#ifndef LOBATTO_KERNEL_ENSEMBLE_SWEEPS_HPP
-#define LOBATTO_KERNEL_ENSEMBLE_SWEEPS_HPP
+#ifndef LOBATTO_KERNEL_ENSEMBLE_FIXED_POINT_HPP
+#define LOBATTO_KERNEL_ENSEMBLE_FIXED_POINT_HPP
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "convergence.hpp"
 #include "stage_map.hpp"
 
 namespace lobatto {
 
 template <class K, class T>
-struct EnsembleSweeps : StageMap<K, T> {
+struct EnsembleFixedPoint : StageMap<K, T> {
     using real = typename K::real;
     using Tables = StageMap<K, T>;
     using Tables::h, Tables::usable, Tables::has_history, Tables::w, Tables::rest, Tables::diagonal, Tables::node_time,
         Tables::weight, Tables::arrival, Tables::map_of;
     using Tables::n, Tables::s, Tables::m, Tables::inner_room, Tables::absorbs, Tables::entries, Tables::maps,
         Tables::parts;
-    using typename Tables::Going;
+    using typename Tables::ActiveMask;
     static constexpr int values = inner_room * n;  // node by node
     static constexpr int evaluation_limit = 16;
 
@@ -67,9 +68,9 @@ struct EnsembleSweeps : StageMap<K, T> {
         for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * W0[c]);
     }
     template <class Acceleration, class Position>
-    void recall(const real* u, const Acceleration& acceleration, const Position& position, int lane) {
-        Tables::recall(acceleration, position, lane);
-        for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * acceleration(s - 1, c));
+    void recall(const real* u, const Acceleration& minus_acceleration, const Position& position, int lane) {
+        Tables::recall(minus_acceleration, position, lane);
+        for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * minus_acceleration(s - 1, c));
     }
 
     // Increments of positions are measured against what a coordinate moves by in a step. They count as nothing when
@@ -83,19 +84,20 @@ struct EnsembleSweeps : StageMap<K, T> {
                 real(8) * Limits<real>::smallest / linear};
     }
 
-    // One step of the lanes `going`, h from `time`. The lanes that the answer names have moved; the others stay.
+    // One step of the lanes that are `active`, h from `time`. The lanes that the answer names have moved; the others
+    // stay.
     template <class Given>
-    LOBATTO_INLINE Going step(const Given& k, real time, T* q, T* u, Going going) {
+    LOBATTO_INLINE ActiveMask step(const Given& k, real time, T* q, T* u, ActiveMask active) {
         return workspace.with([&](Arrays& a) LOBATTO_FORMULA {
             begin_step(q, u, a);
-            going = going & usable;
+            active = active & usable;
             if constexpr (m == 0)
                 evaluations = T(real(0));
-            else if constexpr (K::costly)
-                going = solve_with_slopes(k, time, going, a);
+            else if constexpr (K::uses_hessian)
+                active = solve_with_slopes(k, time, active, a);
             else
-                going = solve(k, time, going, a);
-            return any(going) ? finish(k, time, q, u, going, a) : going;
+                active = solve(k, time, active, a);
+            return any(active) ? finish(k, time, q, u, active, a) : active;
         });
     }
 
@@ -201,53 +203,47 @@ private:
     LOBATTO_INLINE void evaluate(const Given& k, real time, Arrays& a) const {
 #pragma GCC unroll 4
         for (int j = 0; j < m; ++j)
-            if constexpr (K::costly)
+            if constexpr (K::uses_hessian)
                 Formulas<K>::node(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n,
                                   a.S + j * entries);
             else if constexpr (K::has_remainder)
                 Formulas<K>::remainder(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
             else
-                Formulas<K>::acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+                Formulas<K>::minus_acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n),
+                                                a.W + j * n);
     }
     // W at the nodes X.
     template <class Given>
     LOBATTO_INLINE void settle(const Given& k, real time, Arrays& a) const {
         for (int j = 0; j < m; ++j)
-            Formulas<K>::acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+            Formulas<K>::minus_acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
     }
 
     // X and P of these lanes move on by delta.
-    LOBATTO_INLINE static void move_on(Going going, Arrays& a) {
+    LOBATTO_INLINE static void move_on(ActiveMask active, Arrays& a) {
         for (int i = 0; i < values; ++i) {
-            const T delta = select(going, a.delta[i], T(real(0)));
+            const T delta = select(active, a.delta[i], T(real(0)));
             a.X[i] += delta;
             a.P[i] += delta;
         }
     }
-    // Whether increments of this size (squared) are still worth going on, from the fourth evaluation on.
-    LOBATTO_INLINE static Going shrinks(const T& e, const T& e_before, const T& enough) {
-        return (e < T(real(0.64)) * e_before) | (e <= T(real(256)) * enough);
-    }
-
     // The lanes whose stage equations are solved, with W at their nodes X, by evaluations alone.
     template <class Given>
-    LOBATTO_INLINE Going solve(const Given& k, real time, Going going, Arrays& a) {
-        const T enough = T(settled.enough);
+    LOBATTO_INLINE ActiveMask solve(const Given& k, real time, ActiveMask active, Arrays& a) {
+        const Convergence<T, 2> rule{T(settled.enough)};
         T e_before = T(real(0));
-        Going solved = going & !going;
+        ActiveMask solved = active & !active;
         evaluations = T(real(0));
-        for (int evaluation = 1; evaluation <= evaluation_limit && any(going); ++evaluation) {
+        for (int evaluation = 1; evaluation <= evaluation_limit && any(active); ++evaluation) {
             evaluate(k, time, a);
-            evaluations += select(going, T(real(1)), T(real(0)));
+            evaluations += select(active, T(real(1)), T(real(0)));
             residual(a, a.delta);
             const T e = size(a.delta, a.inverse_scale);
-            // What is left, e times its ratio to the one before, is rounding; or it no longer shrinks.
-            const Going ready = going & ((e * e <= enough * e_before) | (e <= enough) |
-                                         ((e <= T(real(256)) * enough) & (e >= T(real(0.25)) * e_before)));
-            move_on(going, a);
+            const ActiveMask ready = active & rule.reached(e, e_before);
+            move_on(active, a);
             solved = solved | ready;
-            going = going & !ready;
-            if (evaluation > 3) going = going & shrinks(e, e_before, enough);
+            active = active & !ready;
+            if (evaluation > rule.judged_after) active = active & rule.contracts(e, e_before);
             // Not beyond 1: a coordinate that began at rest moves by any multiple of nothing.
             e_before = minimum(e, T(real(1)));
         }
@@ -255,57 +251,59 @@ private:
         return solved;
     }
 
-    // The same by evaluations with S: X becomes the nodes, and W is carried to them. One sweep with S follows the first
-    // evaluation; it is often the last.
+    // The same by evaluations with S: X becomes the nodes, and W is carried to them. One iteration with S follows the
+    // first evaluation; it is often the last.
     template <class Given>
-    LOBATTO_INLINE Going solve_with_slopes(const Given& k, real time, Going going, Arrays& a) {
+    LOBATTO_INLINE ActiveMask solve_with_slopes(const Given& k, real time, ActiveMask active, Arrays& a) {
         evaluate(k, time, a);
         residual(a, a.d);
         slopes_times(a, a.d, a.bend);
-        Going at_first = sweep(a);
-        at_first = at_first & S_stands_for_W(a);  // of what the sweep has left, so not in one expression
-        evaluations = select(going, T(real(1)), T(real(0)));
-        if (any(going & !at_first)) going = evaluate_again(k, time, going, at_first, a);
+        ActiveMask at_first = iterate(a);
+        at_first = at_first & S_stands_for_W(a);  // of what the iteration has left, so not in one expression
+        evaluations = select(active, T(real(1)), T(real(0)));
+        if (any(active & !at_first)) active = evaluate_again(k, time, active, at_first, a);
         for (int i = 0; i < values; ++i) {
             a.X[i] += a.delta[i];
             if constexpr (absorbs) a.bend[i] = fused(diagonal[i % n], a.delta[i], a.bend[i]);
             a.W[i] += a.bend[i];
         }
-        return going;
+        return active;
     }
-    // The evaluations after the first, each with two sweeps; `at_first`: the lanes that need none of them.
+    // The evaluations after the first, each with two iterations; `at_first`: the lanes that need none of them.
     template <class Given>
-    LOBATTO_INLINE Going evaluate_again(const Given& k, real time, Going going, Going at_first, Arrays& a) {
+    LOBATTO_INLINE ActiveMask evaluate_again(const Given& k, real time, ActiveMask active, ActiveMask at_first,
+                                             Arrays& a) {
+        const Convergence<T, 2> rule{T(settled.enough)};
         T e_before = T(real(0));
-        Going further = going & !at_first;
+        ActiveMask further = active & !at_first;
         for (int evaluation = 2;; ++evaluation) {
             move_on(further, a);
             evaluate(k, time, a);
             evaluations += select(further, T(real(1)), T(real(0)));
             residual(a, a.d);
             slopes_times(a, a.d, a.bend);
-            Going is_solved = sweep(a);
-            is_solved = sweep_others(at_first, is_solved, a);
+            ActiveMask is_solved = iterate(a);
+            is_solved = iterate_others(at_first, is_solved, a);
             is_solved = is_solved & S_stands_for_W(a);
-            further = going & !is_solved;
+            further = active & !is_solved;
             if (!any(further)) break;
-            if (evaluation == evaluation_limit) return going & is_solved;
+            if (evaluation == evaluation_limit) return active & is_solved;
             if (evaluation >= 3) {
                 const T e = size(a.d, a.inverse_scale);
-                if (evaluation > 3) going = going & (is_solved | shrinks(e, e_before, T(settled.enough)));
+                if (evaluation > rule.judged_after) active = active & (is_solved | rule.contracts(e, e_before));
                 e_before = e;
-                further = going & further;
+                further = active & further;
             }
         }
-        return going;
+        return active;
     }
 
-    LOBATTO_INLINE Going S_stands_for_W(const Arrays& a) const {
+    LOBATTO_INLINE ActiveMask S_stands_for_W(const Arrays& a) const {
         return size(a.delta, a.inverse_linear) <= T(near.enough);
     }
-    // delta = d + M bend, and bend = (S - D) delta; where the next sweep would change nothing: it would move X by M
+    // delta = d + M bend, and bend = (S - D) delta; where the next iteration would change nothing: it would move X by M
     // times what `bend` has changed by, at most `reach` times its size.
-    LOBATTO_INLINE Going sweep(Arrays& a) const {
+    LOBATTO_INLINE ActiveMask iterate(Arrays& a) const {
         T change[values];
         for (int i = 0; i < values; ++i) {
             change[i] = a.bend[i];
@@ -316,15 +314,15 @@ private:
         for (int i = 0; i < values; ++i) change[i] = a.bend[i] - change[i];
         return size(change, a.inverse_next) <= T(settled.enough);
     }
-    // Another sweep, but of the lanes `resting`, whose answer is `known`.
-    LOBATTO_INLINE Going sweep_others(Going resting, Going known, Arrays& a) const {
-        if (!any(resting)) return sweep(a);
+    // Another iteration, but of the lanes `resting`, whose answer is `known`.
+    LOBATTO_INLINE ActiveMask iterate_others(ActiveMask resting, ActiveMask known, Arrays& a) const {
+        if (!any(resting)) return iterate(a);
         T bend[values], delta[values];
         for (int i = 0; i < values; ++i) {
             bend[i] = a.bend[i];
             delta[i] = a.delta[i];
         }
-        const Going found = sweep(a);
+        const ActiveMask found = iterate(a);
         for (int i = 0; i < values; ++i) {
             a.bend[i] = select(resting, bend[i], a.bend[i]);
             a.delta[i] = select(resting, delta[i], a.delta[i]);
@@ -334,14 +332,14 @@ private:
 
     // (D16), (D17): the end of the step, each sum of increments rounded once; then the memory of the step.
     template <class Given>
-    LOBATTO_INLINE Going finish(const Given& k, real time, T* q, T* u, Going solved, const Arrays& a) {
+    LOBATTO_INLINE ActiveMask finish(const Given& k, real time, T* q, T* u, ActiveMask solved, const Arrays& a) {
         T q1[n], u1[n], W1[n], change[n];
         for (int c = 0; c < n; ++c) {
             const T* const W = a.W + c;
             q1[c] = q[c] + sum_over_nodes(T(h) * a.rate[c], arrival, W);
             change[c] = sum_over_nodes(T(-h * K::b[0]) * w[c * s + s - 1], weight, W);
         }
-        Formulas<K>::acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
+        Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
         T not_finite = T(real(0));
         for (int c = 0; c < n; ++c) {
             u1[c] = u[c] + fused(T(-h * K::b[s - 1]), W1[c], change[c]);
@@ -362,7 +360,7 @@ private:
 
     // The end of the step becomes the state, and its accelerations the memory, of all lanes or of those solved.
     template <bool is_all>
-    LOBATTO_INLINE void remember(T* q, T* u, const T* q1, const T* u1, const T* change, const T* W1, Going solved,
+    LOBATTO_INLINE void remember(T* q, T* u, const T* q1, const T* u1, const T* change, const T* W1, ActiveMask solved,
                                  const Arrays& a) {
         const auto keep = [&](T& old, const T& value)
                               LOBATTO_FORMULA { old = is_all ? value : select(solved, value, old); };
@@ -386,41 +384,43 @@ private:
 };
 
 template <class K, class T>
-struct Lanes<K, T, Form::separable, Stepping::solved> {
+struct LaneStepper<K, T, Form::separable, Stepping::solved> {
     using real = typename K::real;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], u[n], evaluations = T(real(0));
-    EnsembleSweeps<K, T> sweeps;
+    EnsembleFixedPoint<K, T> fixed_point;
 
     const T& position(int c) const { return q[c]; }
-    void prepare(const Single<K>& single, int lane) { sweeps.prepare(single.coefficients, single.step_size, lane); }
-    void set_tolerance(real tolerance) { sweeps.set_tolerance(tolerance); }
-    void start(const Single<K>& single, const real*, int lane) {
-        follow_state(single, lane);
-        sweeps.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
+    void prepare(const ScalarFallback<K>& single, int lane) {
+        fixed_point.prepare(single.coefficients, single.step_size, lane);
     }
-    void momentum(const Single<K>& single, int lane, real* momentum) const {
+    void set_tolerance(real tolerance) { fixed_point.set_tolerance(tolerance); }
+    void start(const ScalarFallback<K>& single, const real*, int lane) {
+        follow_state(single, lane);
+        fixed_point.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
+    }
+    void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
         real velocity[n];
         for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
     template <class Given>
-    Going step(const Given& k, real time, Going going) {
-        const Going moved = sweeps.step(k, time, q, u, going);
-        evaluations = sweeps.evaluations;
+    ActiveMask step(const Given& k, real time, ActiveMask active) {
+        const ActiveMask moved = fixed_point.step(k, time, q, u, active);
+        evaluations = fixed_point.evaluations;
         return moved;
     }
     // Takes over the state and the memory of the step that `single` has taken.
-    void follow(const Single<K>& single, int lane) {
+    void follow(const ScalarFallback<K>& single, int lane) {
         follow_state(single, lane);
-        sweeps.recall(
-            single.u, [&](int i, int c) { return single.node_acceleration(i, c); },
+        fixed_point.recall(
+            single.u, [&](int i, int c) { return single.node_minus_acceleration(i, c); },
             [&](int i, int c) { return single.node_position(i, c); }, lane);
     }
 
 private:
-    void follow_state(const Single<K>& single, int lane) {
+    void follow_state(const ScalarFallback<K>& single, int lane) {
         for (int c = 0; c < n; ++c) {
             set_lane(q[c], lane, single.q[c]);
             set_lane(u[c], lane, single.u[c]);

@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: MIT
-// The step of one separable system by sweeps over its nodes: accelerations of all nodes at once, in the lanes of Packs,
-// then the stage map (iteration/stage_map.hpp).
+// The step of one separable system by iterations over its nodes: accelerations of all nodes at once, in the lanes of
+// Packs, then the stage map (iteration/stage_map.hpp).
 //
-// Formula numbers (D..) refer to docs/derivation.md. A sweep, Q <- q + h c v - h^2 A W(Q), contracts like h^2 |A| |S|,
-// S = dW/dq; once the increment e is below sqrt(epsilon), W(Q) + S (Q' - Q) stands for W(Q'), which errs by e^2, and
-// the sweeps that are left evaluate nothing. Where the constant part of S is taken into the map, they contract like
-// what is left of S.
-#ifndef LOBATTO_KERNEL_SWEEPS_HPP
-#define LOBATTO_KERNEL_SWEEPS_HPP
+// Formula numbers (D..) refer to docs/derivation.md. An iteration, Q <- q + h c v - h^2 A W(Q), contracts like h^2 |A|
+// |S|, S = dW/dq; once the increment e is below sqrt(epsilon), W(Q) + S (Q' - Q) stands for W(Q'), which errs by e^2,
+// and the iterations that are left evaluate nothing. Where the constant part of S is taken into the map, they contract
+// like what is left of S.
+#ifndef LOBATTO_KERNEL_FIXED_POINT_HPP
+#define LOBATTO_KERNEL_FIXED_POINT_HPP
 
 #include <type_traits>
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "convergence.hpp"
 #include "stage_map.hpp"
 
 namespace lobatto {
 
 template <class K>
-struct Sweeps : StageMap<K, typename K::real> {
+struct FixedPoint : StageMap<K, typename K::real> {
     using real = typename K::real;
     using Tables = StageMap<K, real>;
     using Tables::h, Tables::usable, Tables::has_history, Tables::w, Tables::rest, Tables::diagonal, Tables::node_time,
@@ -69,10 +70,10 @@ private:
         return terms > 1 ? even + odd : even;
     }
 
-    // One sweep: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place, unless W is
-    // K's remainder. The size of what Y moved by; `displaced`: the same, in the measure for carrying.
+    // One iteration: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place, unless W
+    // is K's remainder. The size of what Y moved by; `displaced`: the same, in the measure for carrying.
     template <bool is_carried>
-    LOBATTO_INLINE real sweep(Arrays& a, real& displaced) const {
+    LOBATTO_INLINE real iterate(Arrays& a, real& displaced) const {
         for (int p = 0; p < parts; ++p) {
             V r[n];
             if constexpr (is_carried)
@@ -93,7 +94,7 @@ private:
                 const V moved = next - (is_carried ? Y : a.X[p * n + c]);
                 Y = next;
                 worst = maximum(worst, fabs(moved) * V(a.inverse_scale[c]));
-                if constexpr (K::costly && !is_carried)
+                if constexpr (K::uses_hessian && !is_carried)
                     farthest = maximum(farthest, fabs(moved) * V(a.inverse_linear[c]));
             }
         displaced = largest(farthest);
@@ -114,17 +115,18 @@ private:
 
     LOBATTO_INLINE void evaluate(const typename K::Coefficients& k, real time, Arrays& a) const {
         for (int p = 0; p < parts; ++p)
-            if constexpr (K::costly)
+            if constexpr (K::uses_hessian)
                 Formulas<K>::node(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n,
                                   a.S + p * entries);
             else if constexpr (K::has_remainder)
                 Formulas<K>::remainder(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
             else
-                Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
+                Formulas<K>::minus_acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n),
+                                                a.W + p * n);
     }
 
-    // A twentieth of h^2 |A| |S - D|, largest row sums. Sweeps contract by more than the norm says, but the first ratio
-    // of two increments can be small by chance: no estimate goes below this.
+    // A twentieth of h^2 |A| |S - D|, largest row sums. Fixed-point iterations contract by more than the norm says, but
+    // the first ratio of two increments can be small by chance: no estimate goes below this.
     real least_rate(const Arrays& a) const {
         V worst = V(real(0));
         for (int p = 0; p < parts; ++p) {
@@ -171,20 +173,21 @@ private:
             }
         evaluations = real(0);
         if (!usable) return false;
-        real e_before = K::costly ? Limits<real>::largest : real(0);
+        const Convergence<real> rule{small};
+        real e_before = K::uses_hessian ? Limits<real>::largest : real(0);
         [[maybe_unused]] real least = real(0);
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
             evaluate(k, time, a);
             evaluations += real(1);
             real displaced;
-            const real e = sweep<false>(a, displaced);
-            if (evaluation > 3 && !(e < real(0.8) * e_before || e <= real(16) * small)) return false;
-            if constexpr (K::costly) {
+            const real e = iterate<false>(a, displaced);
+            if (evaluation > rule.judged_after && !rule.contracts(e, e_before)) return false;
+            if constexpr (K::uses_hessian) {
                 if (evaluation == 1) least = least_rate(a);
                 if (displaced <= linear) return carry(e, e_before, least, small, a);
             } else {
                 // What is left, e times its ratio to the one before, is rounding; or it no longer shrinks.
-                if (e * e <= small * e_before || e <= small || (e <= real(16) * small && e >= real(0.5) * e_before)) {
+                if (rule.reached(e, e_before)) {
                     settle(k, time, a);
                     increment = e;
                     return true;
@@ -199,16 +202,17 @@ private:
     // W at the nodes Y.
     LOBATTO_INLINE void settle(const typename K::Coefficients& k, real time, Arrays& a) const {
         for (int p = 0; p < parts; ++p)
-            Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.Y + p * n), a.carried + p * n);
+            Formulas<K>::minus_acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.Y + p * n),
+                                            a.carried + p * n);
     }
 
-    // Sweeps with W + S (Y - X) in place of W(Y), until what is left of an increment, e times its ratio to the one
-    // before, is rounding; then that is what W is at the nodes.
+    // Fixed-point iterations with W + S (Y - X) in place of W(Y), until what is left of an increment, e times its ratio
+    // to the one before, is rounding; then that is what W is at the nodes.
     LOBATTO_INLINE bool carry(real e, real e_before, real least, real small, Arrays& a) {
         real ignored;
         bool still = !(e * e <= small * e_before && e * least <= small);
         for (int i = 0; i < carried_limit && still; ++i) {
-            const real next = sweep<true>(a, ignored);
+            const real next = iterate<true>(a, ignored);
             const bool stands = next >= real(0.5) * e && next > real(0);  // rounding, or no convergence
             if (stands && next > real(64) * small) return false;
             still = !stands && !(next * next <= small * e && next * least <= small);
@@ -235,7 +239,7 @@ private:
         if constexpr (with_end) {
             for (int c = 0; c < n; ++c) W1[c] = a.flat[c * parts * width + m];
         } else {
-            Formulas<K>::acceleration(k, time + h, static_cast<const real*>(q1), +W1);
+            Formulas<K>::minus_acceleration(k, time + h, static_cast<const real*>(q1), +W1);
         }
         real not_finite = real(0);
         for (int c = 0; c < n; ++c) {
@@ -273,7 +277,7 @@ private:
 
 template <class K>
 struct FixedPointOf<K, false> {
-    using type = Sweeps<K>;
+    using type = FixedPoint<K>;
 };
 
 }  // namespace lobatto

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The step of any Lagrangian system by sweeps over its nodes: no equations larger than the mass matrix of one node.
+// The step of any Lagrangian system by iterations over its nodes: no equations larger than the mass matrix of one node.
 //
 // With V, P = dL/dv and F = dL/dq + forces at the r nodes, A the matrix that integrates over the node polynomials,
 // A'_ij = b_j (1 - A_ji / b_i), and pi the Legendre polynomial of degree r - 1 for Lobatto's nodes, nothing for
 // Gauss's, the Galerkin equations (D28) are (D35)
 //     Q_i = q + h sum_j A_ij V_j,   P_i = p + h sum_j A'_ij F_j + kappa pi_i,   P_i = L_v(Q_i, V_i),   sum_i b_i pi_i
 //     V_i = 0 q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j
-// A sweep takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps the
-// last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every sweep.
-// Angles are taken from those at the start of the step (base/angles.hpp).
+// An iteration takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps
+// the last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every
+// iteration. Angles are taken from those at the start of the step (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_GALERKIN_HPP
 #define LOBATTO_KERNEL_GALERKIN_HPP
 
@@ -55,7 +55,7 @@ LOBATTO_INLINE void solve_symmetric(const V* M, V* x) {
 }
 
 template <class K, class T>
-struct GalerkinSweeps {
+struct GalerkinFixedPoint {
     using real = typename K::real;
     static constexpr int n = K::coordinates, r = K::nodes;
     using Layout = NodeLayout<real, T, r - 1>;  // r nodes
@@ -63,7 +63,7 @@ struct GalerkinSweeps {
     static constexpr bool in_lanes = Layout::in_lanes;
     static constexpr int width = Layout::width, parts = Layout::parts_of(r), entries = K::mass_entries;
     static constexpr int evaluation_limit = 30;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
 
     static constexpr bool has_kappa() {
         for (int i = 0; i < r; ++i)
@@ -113,10 +113,11 @@ struct GalerkinSweeps {
         }
     }
 
-    // One step of the lanes `going`, h from `time`. The lanes that the answer names have moved; the others stay.
+    // One step of the lanes that are `active`, h from `time`. The lanes that the answer names have moved; the others
+    // stay.
     template <class Given>
-    Going step(const Given& k, real time, T* q, T* p, Going going) {
-        return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, going, a); });
+    ActiveMask step(const Given& k, real time, T* q, T* p, ActiveMask active) {
+        return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, active, a); });
     }
 
     // Displacement and velocity of coordinate c of the last step at control point j + 1 and node i.
@@ -162,7 +163,7 @@ private:
     }
 
     template <class Given>
-    Going step_in(const Given& k, real time, T* q, T* p, Going going, Arrays& a) {
+    ActiveMask step_in(const Given& k, real time, T* q, T* p, ActiveMask active, Arrays& a) {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
         // Each coordinate has its own measure: increments as small as its rounding are so whatever the others do.
         const real least = maximum(tolerance, Limits<real>::epsilon);
@@ -192,22 +193,22 @@ private:
         }
         if constexpr (K::angles > 0) look_around(k, time, q, a);
         const T small = T(least);
-        Going solved = going & !going;
+        ActiveMask solved = active & !active;
         T e_before = T(Limits<real>::largest);
         evaluations = T(real(0));
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
-            evaluations = select(going, evaluations + T(real(1)), evaluations);
-            const T e = sweep(k, time, q, p, kappa_now, a);
-            if (evaluation > 4) going = going & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * small));
+            evaluations = select(active, evaluations + T(real(1)), evaluations);
+            const T e = iterate(k, time, q, p, kappa_now, a);
+            if (evaluation > 4) active = active & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * small));
             // Or no longer shrinking: the rounding of what it is computed from.
-            const Going done =
-                going & ((e <= T(real(2)) * small) | ((e <= T(real(64)) * small) & (e >= T(real(0.5)) * e_before)));
+            const ActiveMask done =
+                active & ((e <= T(real(2)) * small) | ((e <= T(real(64)) * small) & (e >= T(real(0.5)) * e_before)));
             if (any(done)) {
                 increment = select(done, e, increment);
                 solved = solved | finish(q, p, kappa_now, done, a);
-                going = going & !done;
+                active = active & !done;
             }
-            if (!any(going)) break;
+            if (!any(active)) break;
             e_before = e;
         }
         return solved;
@@ -237,9 +238,9 @@ private:
                 a.near.of(part)[i] = {spread(angles[i].x), spread(angles[i].sine), spread(angles[i].cosine)};
     }
 
-    // One sweep; the largest change of a velocity, relative.
+    // One iteration; the largest change of a velocity, relative.
     template <class Given>
-    LOBATTO_INLINE T sweep(const Given& k, real time, const T* q, const T* p, T* kappa_now, Arrays& a) {
+    LOBATTO_INLINE T iterate(const Given& k, real time, const T* q, const T* p, T* kappa_now, Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V packed[entries];
@@ -333,7 +334,7 @@ private:
         for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
     }
 
-    Going finish(T* q, T* p, const T* kappa_now, Going done, Arrays& a) {
+    ActiveMask finish(T* q, T* p, const T* kappa_now, ActiveMask done, Arrays& a) {
         T q1[n], p1[n], not_finite = T(real(0));
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
@@ -356,38 +357,38 @@ private:
 };
 
 template <class K, class T>
-struct Lanes<K, T, Form::general, Stepping::solved> {
+struct LaneStepper<K, T, Form::general, Stepping::solved> {
     using real = typename K::real;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
-    GalerkinSweeps<K, T> sweeps;
+    GalerkinFixedPoint<K, T> fixed_point;
 
     const T& position(int c) const { return q[c]; }
-    void prepare(const Single<K>& single, int) { sweeps.prepare(single.step_size); }
-    void set_tolerance(real tolerance) { sweeps.tolerance = tolerance; }
-    void start(const Single<K>& single, const real*, int lane) {
+    void prepare(const ScalarFallback<K>& single, int) { fixed_point.prepare(single.step_size); }
+    void set_tolerance(real tolerance) { fixed_point.tolerance = tolerance; }
+    void start(const ScalarFallback<K>& single, const real*, int lane) {
         follow_state(single, lane);
         real velocity[n] = {};
         single.velocity(single.time(), single.q, single.p, velocity);
-        sweeps.begin(velocity, lane);
+        fixed_point.begin(velocity, lane);
     }
-    void momentum(const Single<K>&, int lane, real* momentum) const {
+    void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
     template <class Given>
-    [[gnu::noinline]] Going step(const Given& k, real time, Going going) {
-        const Going moved = sweeps.step(k, time, q, p, going);
-        evaluations = sweeps.evaluations;
+    [[gnu::noinline]] ActiveMask step(const Given& k, real time, ActiveMask active) {
+        const ActiveMask moved = fixed_point.step(k, time, q, p, active);
+        evaluations = fixed_point.evaluations;
         return moved;
     }
-    void follow(const Single<K>& single, int lane) {
+    void follow(const ScalarFallback<K>& single, int lane) {
         follow_state(single, lane);
-        sweeps.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
+        fixed_point.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
     }
 
 private:
-    void follow_state(const Single<K>& single, int lane) {
+    void follow_state(const ScalarFallback<K>& single, int lane) {
         for (int c = 0; c < n; ++c) {
             set_lane(q[c], lane, single.q[c]);
             set_lane(p[c], lane, single.p[c]);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The step of a large separable system whose terms join neighbouring coordinates, which lie in the lanes of Packs.
 //
-// The same sweeps as in iteration/fixed_point.hpp, formula numbers (D..) of docs/derivation.md: accelerations W of all
-// nodes, then the stage map. What is different is the layout: of each node all coordinates stand one after another, and
-// every loop runs over them, so that the cost of a step is proportional to their number. Increments shrink by a factor
-// rho in each sweep, so W at positions that moved by e at last errs by rho e: the iteration ends when that is rounding,
-// or as much as is asked for, without another look at the new positions.
+// The same iterations as in iteration/fixed_point.hpp, formula numbers (D..) of docs/derivation.md: accelerations W of
+// all nodes, then the stage map. What is different is the layout: of each node all coordinates stand one after another,
+// and every loop runs over them, so that the cost of a step is proportional to their number. Increments shrink by a
+// factor rho in each iteration, so W at positions that moved by e at last errs by rho e: the iteration ends when that
+// is rounding, or as much as is asked for, without another look at the new positions.
 #ifndef LOBATTO_KERNEL_NEIGHBOURS_HPP
 #define LOBATTO_KERNEL_NEIGHBOURS_HPP
 
@@ -17,6 +17,7 @@
 #include "../base/pack.hpp"
 #include "../base/rows.hpp"
 #include "../base/shifts.hpp"
+#include "convergence.hpp"
 
 namespace lobatto {
 
@@ -34,11 +35,11 @@ constexpr bool fits_registers() {
 }
 
 // One trajectory; its state, the memory of its last step, and room for the next. Most steps are quick ones: as many
-// sweeps as the last measurement found enough, and one test of the last increment, in registers, all written out, or in
-// memory; to the same bits. A step that does not pass, and now and then one to measure with, is taken carefully: in
-// memory, and every sweep looks at its increments.
+// iterations as the last measurement found enough, and one test of the last increment, in registers, all written out,
+// or in memory; to the same bits. A step that does not pass, and now and then one to measure with, is taken carefully:
+// in memory, and every iteration looks at its increments.
 template <class K, bool in_registers = fits_registers<K>()>
-struct NeighbourSweeps {
+struct NeighbourFixedPoint {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2;
     static_assert(m > 0);
@@ -58,7 +59,7 @@ struct NeighbourSweeps {
     real noise{};          // increments to this tolerance that were rounding, and those up to twice as large
     int until_measured{};  // steps
     int interval{};        // between the last two measurements, in steps
-    int expected{};        // sweeps of a quick step; 0: unknown
+    int expected{};        // iterations of a quick step; 0: unknown
     int late{};            // how many of the last quick steps, without a break, took more
     // Squares of increments that are small enough: on_rate v^2 + still, the latter as in the last careful step.
     real on_rate{};
@@ -114,30 +115,36 @@ struct NeighbourSweeps {
         }
     }
 
+    // Position and velocity now.
+    void state(real* position, real* velocity) const {
+        copy_lanes<n>(q[now], position);
+        copy_lanes<n>(u[now], velocity);
+    }
+
     // W at node i of the last step.
-    real acceleration(int i, int c) const {
+    real minus_acceleration(int i, int c) const {
         return i == 0 ? w_end[then][c] : i < s - 1 ? w[last][(i - 1) * room + c] : w_end[now][c];
     }
 
-    // Takes over a step that was taken otherwise: acceleration_at(i, c) at node i.
+    // Takes over a step that was taken otherwise: minus_acceleration_at(i, c) at node i.
     template <class Acceleration>
-    void recall(const real* position, const real* velocity, const Acceleration& acceleration_at) {
+    void recall(const real* position, const real* velocity, const Acceleration& minus_acceleration_at) {
         begin(position, velocity, w_end[now]);
         has_history = true;
         for (int c = 0; c < n; ++c) {
-            w_end[then][c] = acceleration_at(0, c);
-            for (int i = 0; i < m; ++i) w[last][i * room + c] = acceleration_at(i + 1, c);
-            w_end[now][c] = acceleration_at(s - 1, c);
+            w_end[then][c] = minus_acceleration_at(0, c);
+            for (int i = 0; i < m; ++i) w[last][i * room + c] = minus_acceleration_at(i + 1, c);
+            w_end[now][c] = minus_acceleration_at(s - 1, c);
         }
     }
 
-    // One step, h from `time`. False, and nothing has moved, where the sweeps do not contract.
+    // One step, h from `time`. False, and nothing has moved, where the iterations do not contract.
     bool step(const typename K::Coefficients& k, real time) {
         if (tolerance != measured_for) {
             until_measured = 0;
             noise = real(0);
         }
-        int spent = 0;  // sweeps of a quick step that was none
+        int spent = 0;  // iterations of a quick step that was none
         if (expected > 0 && until_measured > 0) {
             bool good;
             if constexpr (in_registers) {
@@ -203,7 +210,7 @@ private:
         for (int i = 0; i < m; ++i) accelerate(k, time + K::c[i + 1] * h, row(a.X, i), W_at(a, i));
     }
 
-    // One sweep more than expected, or two, are no reason for a careful step.
+    // One iteration more than expected, or two, are no reason for a careful step.
     template <class Nodes>
     LOBATTO_INLINE bool quick_step(Nodes& a, const typename K::Coefficients& k, real time) {
         predict<true>(a);
@@ -213,7 +220,7 @@ private:
                 if (is_settled(a)) break;
                 if (evaluations > expected + 1) return false;
             }
-            sweep(a);
+            iterate(a);
         }
         return finish(a, k, time);
     }
@@ -278,7 +285,7 @@ private:
         }
     }
     template <class Nodes>
-    LOBATTO_INLINE void sweep(Nodes& a) {
+    LOBATTO_INLINE void iterate(Nodes& a) {
         over_parts<Nodes>([&](int at) LOBATTO_FORMULA {
             map_stages(a, at, [&](int i, const V& x) LOBATTO_FORMULA { store_to(row(a.X, i), at, x); });
         });
@@ -293,8 +300,8 @@ private:
     LOBATTO_INLINE V displacement(int at) const {
         return V(fabs(h)) * (fabs(V::load(memory.rate + at)) + fabs(V(h) * V::load(w_end[now] + at)));
     }
-    // A sweep that looks: the largest of what it moves by, measured against the displacement of each coordinate in a
-    // step, or what is `least`, with the rounding of its position as floor.
+    // An iteration that looks: the largest of what it moves by, measured against the displacement of each coordinate in
+    // a step, or what is `least`, with the rounding of its position as floor.
     real look(InMemory& a, real least) {
         const V on_position = V(on_distance()), floor = V(least + Limits<real>::smallest);
         V worst = V(real(0));
@@ -311,7 +318,7 @@ private:
         });
         return largest(worst);
     }
-    // Whether another sweep would move no coordinate by more than is small enough; in squares, which are the fewest
+    // Whether another iteration would move no coordinate by more than is small enough; in squares, which are the fewest
     // instructions, summed over the nodes. Of the differences only the signs are asked for.
     template <class Nodes>
     LOBATTO_INLINE bool is_settled(Nodes& a) {
@@ -327,8 +334,8 @@ private:
         });
         return !any(is_odd(signs >> (8 * static_cast<int>(sizeof(real)) - 1)));
     }
-    // Makes increments of `enough` small enough, relative to what they are measured against in a sweep that looks: of
-    // which the next steps compute the part of the velocity anew. False where squares are too small or too large for
+    // Makes increments of `enough` small enough, relative to what they are measured against in an iteration that looks:
+    // of which the next steps compute the part of the velocity anew. False where squares are too small or too large for
     // numbers: then no step is quick.
     bool settle_at(real enough, real least) {
         on_rate = (enough * h) * (enough * h);
@@ -349,8 +356,9 @@ private:
     bool solve(const typename K::Coefficients& k, real time) {
         const bool measures = until_measured == 0;
         const real small = bound(), least = least_distance();
+        const Convergence<real> rule{small};
         constexpr real trusted = real(0.015625);  // of rho, where this step has not shown it
-        real e_before = real(0), measured = real(0), after[evaluation_limit + 1];  // so many sweeps
+        real e_before = real(0), measured = real(0), after[evaluation_limit + 1];  // so many iterations
         for (evaluations = 1; evaluations <= evaluation_limit; ++evaluations) {
             accelerate_nodes(memory, k, time);
             const real e = look(memory, least);
@@ -358,7 +366,7 @@ private:
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
             const real known = real(4) * maximum(measured, shrinking);  // 4: the motion changes rho
             const real rho = measures ? real(1) : measured > real(0) ? known : maximum(known, trusted);
-            const bool is_rounding = e <= real(16) * small && e >= real(0.5) * e_before && e_before > real(0);
+            const bool is_rounding = e_before > real(0) && rule.stagnates(e, e_before);
             if (rho * e <= small || is_rounding) {
                 if (measured > real(0)) shrinking = measures ? measured : maximum(measured, shrinking);
                 real enough = shrinking > real(0) ? small / maximum(real(4) * shrinking, trusted) : small;
@@ -377,8 +385,7 @@ private:
                 if (!settle_at(enough, least)) expected = 0;
                 return true;
             }
-            if (evaluations > 3 && e_before != real(0) && !(e < real(0.8) * e_before || e <= real(16) * small))
-                return false;
+            if (evaluations > rule.judged_after && e_before != real(0) && !rule.contracts(e, e_before)) return false;
             e_before = e;
         }
         return false;
@@ -422,7 +429,7 @@ private:
 
 template <class K>
 struct FixedPointOf<K, true> {
-    using type = NeighbourSweeps<K>;
+    using type = NeighbourFixedPoint<K>;
 };
 
 }  // namespace lobatto

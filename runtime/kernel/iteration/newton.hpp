@@ -175,7 +175,8 @@ private:
     // One increment with the frozen Jacobian; its size.
     real frozen_increment(const Coefficients& k, real h, real time, Arrays& a, Outcome& outcome) const {
         for (int i = 0; i < m; ++i)
-            Formulas<K>::acceleration(k, node_time(time, h, i), static_cast<const real*>(a.Q + i * n), a.W + i * n);
+            Formulas<K>::minus_acceleration(k, node_time(time, h, i), static_cast<const real*>(a.Q + i * n),
+                                            a.W + i * n);
         ++outcome.iterations;
         Stages(h).solve(a.base, a.Q, a.W, frozen_.matrix, a.delta, a.sorted);
         return apply_increments(a);

@@ -32,7 +32,7 @@ struct NodeLayout {
     static constexpr int width = !in_lanes ? 1 : padded(inner + 1) < most ? padded(inner + 1) : most;
     using V = std::conditional_t<in_lanes, Pack<real, width>, T>;
     static constexpr int parts_of(int values) { return (values + width - 1) / width; }
-    // The end of the step is swept along with the inner nodes where that costs no further part.
+    // The end of the step is iterated along with the inner nodes where that costs no further part.
     static constexpr bool with_end = width > 1 && parts_of(inner + 1) == parts_of(inner);
     static constexpr int count = inner + (with_end ? 1 : 0);
     static constexpr int parts = parts_of(count);
@@ -50,7 +50,7 @@ inline void lay_flat(const V* values, int stride, T* flat) {
 }
 
 // The nodes of one trajectory lie in registers of 32 bytes at most: a step waits for its longest chain of operations,
-// and in wider ones divisions, roots and sums over the lanes answer later (docs/adr/0008-sweeps.md).
+// and in wider ones divisions, roots and sums over the lanes answer later (docs/measurements/fixed_point_iteration.md).
 template <class real>
 constexpr int node_lanes = native_lanes<real>* static_cast<int>(sizeof(real)) > 32 ? 32 / static_cast<int>(sizeof(real))
                                                                                    : native_lanes<real>;
@@ -67,7 +67,7 @@ struct StageMap {
     static constexpr int width = Layout::width, count = Layout::count;
     static constexpr int parts = Layout::parts > 0 ? Layout::parts : 1;
     static constexpr int entries = K::entries > 0 ? K::entries : 1, maps = absorbs ? n : 1;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
 
     // The stage map and its kin, minus and with their powers of h; of each coordinate where D is absorbed.
     struct Map {
@@ -83,7 +83,7 @@ struct StageMap {
     V weight[parts], arrival[parts];  // -h b and -h^2 b (1 - c), for a trajectory's Packs; zero in lanes to spare
     std::conditional_t<absorbs, T[n], Unit> diagonal{};
     real h{};
-    Going usable{};
+    ActiveMask usable{};
     bool has_history{};
     T w[n * s];                                          // W at the nodes of the last step; the last of each at q
     std::conditional_t<absorbs, T[n * s], Unit> rest{};  // W - D q there
@@ -115,7 +115,7 @@ struct StageMap {
     }
 
     // W at node i of the last step.
-    T acceleration(int i, int c) const { return w[c * s + i]; }
+    T minus_acceleration(int i, int c) const { return w[c * s + i]; }
 
     // Begins at q with W(q) = W0.
     void begin(const real* q, const real* W0, int lane = 0) {
@@ -126,16 +126,17 @@ struct StageMap {
         }
     }
 
-    // Takes over a step that was taken otherwise, into `lane`: acceleration(i, c) and position(i, c) at node i.
+    // Takes over a step that was taken otherwise, into `lane`: minus_acceleration(i, c) and position(i, c) at node i.
     // All lanes have a memory from then on.
     template <class Acceleration, class Position>
-    void recall(const Acceleration& acceleration, const Position& position, int lane = 0) {
+    void recall(const Acceleration& minus_acceleration, const Position& position, int lane = 0) {
         has_history = true;
         for (int c = 0; c < n; ++c)
             for (int i = 0; i < s; ++i) {
-                set_lane(w[c * s + i], lane, acceleration(i, c));
+                set_lane(w[c * s + i], lane, minus_acceleration(i, c));
                 if constexpr (absorbs)
-                    set_lane(rest[c * s + i], lane, acceleration(i, c) - lane_of(diagonal[c], lane) * position(i, c));
+                    set_lane(rest[c * s + i], lane,
+                             minus_acceleration(i, c) - lane_of(diagonal[c], lane) * position(i, c));
             }
     }
 

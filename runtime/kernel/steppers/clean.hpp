@@ -8,8 +8,9 @@
 //     eta_ij = eta_ji + gamma_i - gamma_j, all without rounding. With impulses f_j = -h b_j W(Q_j), however rounded,
 //         Q_i = q + gamma_i (u + f_1) + sum_j eta_ij f_j,   q1 = q + h (u + f_1) + sum_j beta_j f_j,   u1 = u + sum f
 //     is symplectic, since eta_ij - eta_ji = gamma_i - gamma_j. (In the nodes f and positions are rounded once.)
-//   Sweeps go on until they give the same bits again, or last bits alternate; a longer cycle of last bits is left after
-//     eight sweeps. Newton's iteration takes the steps in which sweeps do not get there.
+//   Fixed-point iterations go on until they give the same bits again, or last bits alternate; a longer cycle of last
+//   bits is left after
+//     eight iterations. Newton's iteration takes the steps in which iterations do not get there.
 //   Position and velocity are sums of two numbers each, and the increments of a step are added without error: products
 //     with b_j too, whose rounding is not random where b_j is a simple fraction.
 // The scheme is that of Antonana, Makazaga and Murua (Numer. Algorithms 76, 2017) for Gauss' methods, in the form that
@@ -95,7 +96,7 @@ struct TwoFold {
     }
 };
 
-// What a sweep has done to the positions.
+// What an iteration has done to the positions.
 template <class real>
 struct Change {
     bool none, back;  // the same bits as before; those of before the last change
@@ -112,7 +113,7 @@ real on_grid(real x, real unit) {
 }
 
 template <class K>
-struct CleanSweeps {
+struct CleanFixedPoint {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, inner_room = m > 0 ? m : 1;
     using Layout = NodeLayout<real, real, m>;
@@ -194,8 +195,8 @@ struct CleanSweeps {
         for (int c = 0; c < n; ++c) a.inverse_scale[c] = minimum(a.inverse_own[c], most);
     }
 
-    // The accelerations a.W at the inner nodes of a step, by sweeps. W: those of the step before, node-major. False
-    // where sweeps do not contract.
+    // The accelerations a.W at the inner nodes of a step, by iterations. W: those of the step before, node-major. False
+    // where iterations do not contract.
     template <class Given>
     bool solve(const Given& k, real time, const real* q, const real* q_rest, const real* W, bool has_history,
                Arrays& a) {
@@ -212,12 +213,13 @@ struct CleanSweeps {
                 a.older[p * n + c] = a.X[p * n + c] = V(q[c]) + Z;
             }
         real last = Limits<real>::largest;
-        int noisy = 0;  // sweeps that changed no more than rounding may
+        int noisy = 0;  // iterations that changed no more than rounding may
         while (evaluations < evaluation_limit) {
             for (int p = 0; p < parts; ++p)
-                Formulas<K>::acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
+                Formulas<K>::minus_acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n),
+                                                a.W + p * n);
             ++evaluations;
-            const Change<real> change = sweep(q, q_rest, a);
+            const Change<real> change = iterate(q, q_rest, a);
             increment = change.size;
             if (change.none || (change.back && change.own <= noise)) return true;
             noisy += change.own <= noise ? 1 : 0;
@@ -229,7 +231,7 @@ struct CleanSweeps {
     }
 
     // The positions that a.W gives, in place of X.
-    Change<real> sweep(const real* q, const real* q_rest, Arrays& a) const {
+    Change<real> iterate(const real* q, const real* q_rest, Arrays& a) const {
         V worst = V(real(0)), worst_own = V(real(0));
         bool none = true, back = true;
         for (int c = 0; c < n; ++c) {
@@ -290,7 +292,7 @@ struct CleanSweeps {
             moved.value.store(a.q1 + c);
             moved.rest.store(a.q1_rest + c);
         });
-        Formulas<K>::acceleration(k, end_time, static_cast<const real*>(a.q1), next + (s - 1) * n);
+        Formulas<K>::minus_acceleration(k, end_time, static_cast<const real*>(a.q1), next + (s - 1) * n);
         over_coordinates([&](auto lanes, int c) LOBATTO_FORMULA {
             using L = decltype(lanes);
             TwoFold<L> change{L(real(0)), L(real(0))};
@@ -321,16 +323,16 @@ struct Stepper<K, Form::separable, Stepping::clean> : Stepper<K, Form::separable
     using real = typename K::real;
     using Plain::n, Plain::m, Plain::s, Plain::q, Plain::u, Plain::W, Plain::coefficients, Plain::q_before,
         Plain::u_before, Plain::has_history, Plain::iterations, Plain::increment;
-    using Sweeps = CleanSweeps<K>;
+    using FixedPoint = CleanFixedPoint<K>;
 
     real q_rest[n]{}, u_rest[n]{};  // position and velocity are q + q_rest, u + u_rest
-    Sweeps sweeps;
+    FixedPoint fixed_point;
     Pause pause;
-    Workspace<typename Sweeps::Arrays> clean_workspace;
+    Workspace<typename FixedPoint::Arrays> clean_workspace;
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         const Status status = Plain::prepare(parameters, h);
-        return status == Status::ok ? sweeps.prepare(h) : status;
+        return status == Status::ok ? fixed_point.prepare(h) : status;
     }
 
     Status start(real time, const real* position, const real* momentum) {
@@ -341,22 +343,24 @@ struct Stepper<K, Form::separable, Stepping::clean> : Stepper<K, Form::separable
 
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
-        return clean_workspace.with([this](typename Sweeps::Arrays& a) { return step_in(a); });
+        return clean_workspace.with([this](typename FixedPoint::Arrays& a) { return step_in(a); });
     }
 
 private:
-    Status step_in(typename Sweeps::Arrays& a) {
+    Status step_in(typename FixedPoint::Arrays& a) {
         const real time = this->time();
         real q_old[n], u_old[n];
         for (int c = 0; c < n; ++c) {
             q_old[c] = q[c];
             u_old[c] = u[c];
         }
-        sweeps.set_out(q, u, u_rest, W, a);
-        const auto finish = [&] { return sweeps.finish(coefficients, this->next_time(), q, q_rest, u, u_rest, W, a); };
-        if (pause.count_down() && sweeps.solve(coefficients, time, q, q_rest, W, has_history, a) && finish()) {
+        fixed_point.set_out(q, u, u_rest, W, a);
+        const auto finish = [&] {
+            return fixed_point.finish(coefficients, this->next_time(), q, q_rest, u, u_rest, W, a);
+        };
+        if (pause.count_down() && fixed_point.solve(coefficients, time, q, q_rest, W, has_history, a) && finish()) {
             pause.succeed();
-            iterations = static_cast<std::int32_t>(sweeps.evaluations);
+            iterations = static_cast<std::int32_t>(fixed_point.evaluations);
         } else {
             if (pause.left == 0) pause.fail();
             const Status status =
@@ -368,25 +372,25 @@ private:
             q_before[c] = q_old[c];
             u_before[c] = u_old[c];
         }
-        increment = sweeps.increment;
+        increment = fixed_point.increment;
         has_history = true;
         ++this->steps;
         return Status::ok;
     }
 
-    // Where sweeps do not contract: Newton's iteration for the plain equations, then with its last Jacobian corrections
-    // of the clean ones, X -= J^-1 (X - sweep(X)), while they change anything and do not grow.
-    Status correct(typename Plain::Arrays& plain, typename Sweeps::Arrays& a) {
+    // Where iterations do not contract: Newton's iteration for the plain equations, then with its last Jacobian
+    // corrections of the clean ones, X -= J^-1 (X - iteration(X)), while they change anything and do not grow.
+    Status correct(typename Plain::Arrays& plain, typename FixedPoint::Arrays& a) {
         const Status status = this->solve_from_start(plain);
         if constexpr (m > 0) {
             if (status != Status::ok) return status;
-            constexpr int width = Sweeps::width;
+            constexpr int width = FixedPoint::width;
             real last = Limits<real>::largest;
-            for (int correction = 0; correction < Sweeps::correction_limit; ++correction) {
+            for (int correction = 0; correction < FixedPoint::correction_limit; ++correction) {
                 for (int i = 0; i < m; ++i)
-                    Formulas<K>::acceleration(coefficients, this->node_time(i),
-                                              static_cast<const real*>(plain.Q + i * n), plain.W + i * n);
-                for (int lane = 0; lane < Sweeps::parts * width; ++lane)
+                    Formulas<K>::minus_acceleration(coefficients, this->node_time(i),
+                                                    static_cast<const real*>(plain.Q + i * n), plain.W + i * n);
+                for (int lane = 0; lane < FixedPoint::parts * width; ++lane)
                     for (int c = 0; c < n; ++c) {
                         const int place = (lane / width) * n + c, i = lane < m ? lane : m - 1;
                         set_lane(a.W[place], lane % width, plain.W[i * n + c]);
@@ -394,7 +398,7 @@ private:
                         set_lane(a.older[place], lane % width, plain.Q[i * n + c]);
                     }
                 ++iterations;
-                sweeps.sweep(q, q_rest, a);
+                fixed_point.iterate(q, q_rest, a);
                 for (int i = 0; i < m; ++i)
                     for (int c = 0; c < n; ++c)
                         plain.delta[i * n + c] = lane_of(a.X[(i / width) * n + c], i % width) - plain.Q[i * n + c];
@@ -408,7 +412,7 @@ private:
                         changes = changes || node + delta != node;
                         worst = maximum(worst, fabs(delta) * a.inverse_scale[c]);
                     }
-                sweeps.increment = worst;
+                fixed_point.increment = worst;
                 if (!changes || (correction > 1 && !(worst < last))) break;
                 last = worst;
                 for (int i = 0; i < m * n; ++i) plain.Q[i] += plain.delta[i];

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Trajectories side by side: each in its lane, with its own parameters and state, one step size and time for all.
 //
-// What a lane computes depends on no other lane. Where the sweeps of one fail, a Stepper of its own takes that step by
-// Newton's iteration, in the general form after sweeps that begin anew; a lane that no way leads on keeps its last good
-// state and its status.
+// What a lane computes depends on no other lane. Where the iterations of one fail, a Stepper of its own takes that step
+// by Newton's iteration, in the general form after iterations that begin anew; a lane that no way leads on keeps its
+// last good state and its status.
 #ifndef LOBATTO_KERNEL_ENSEMBLE_HPP
 #define LOBATTO_KERNEL_ENSEMBLE_HPP
 
@@ -36,7 +36,7 @@ constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
     if (native == 1 || !K::any_number || is_clean<K>()) return 0;
     if constexpr (K::form == Form::separable) {
-        if (K::neighbours) return moves_in_passing<K>() && trajectories >= native ? native : 0;
+        if (K::neighbours) return moves_immediately<K>() && trajectories >= native ? native : 0;
     }
     if (K::form == Form::general) return K::coordinates > most_full ? 0 : native;
     return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;
@@ -46,14 +46,14 @@ template <class K, int width>
 struct Ensemble {
     using real = typename K::real;
     using T = Pack<real, width>;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates, lanes = width;
 
     typename K::template CoefficientsOf<T> coefficients;
-    Lanes<K, T> motion;
+    LaneStepper<K, T> motion;
     typename K::Parameters parameters[width];
     typename K::Coefficients coefficients_of[width];
-    mutable Single<K> single;  // takes the steps of a lane that has left the others
+    mutable ScalarFallback<K> single;  // takes the steps of a lane that has left the others
     real step_size{}, start_time{};
     std::int64_t steps{};
 
@@ -88,9 +88,9 @@ struct Ensemble {
     void advance(std::int64_t count, real tolerance, Status* status, std::int64_t* done, std::int64_t* iterations) {
         motion.set_tolerance(tolerance);
         single.tolerance = tolerance;
-        Going going = Going(false);
+        ActiveMask active = ActiveMask(false);
         for (int lane = 0; lane < width; ++lane) {
-            going.set(lane, status[lane] == Status::ok);
+            active.set(lane, status[lane] == Status::ok);
             done[lane] = 0;
         }
         T evaluations = T(real(0));
@@ -98,18 +98,18 @@ struct Ensemble {
         const auto leave = [&](int lane, Status why) {
             status[lane] = why;
             done[lane] = taken;
-            going.set(lane, false);
+            active.set(lane, false);
         };
-        for (; taken < count && any(going); ++taken, ++steps) {
+        for (; taken < count && any(active); ++taken, ++steps) {
             const real time = time_of(steps);
             if (time_of(steps + 1) == time) {
                 for (int lane = 0; lane < width; ++lane)
-                    if (going[lane]) leave(lane, Status::time_stands_still);
+                    if (active[lane]) leave(lane, Status::time_stands_still);
                 break;
             }
-            const Going moved = motion.step(coefficients, time, going);
+            const ActiveMask moved = motion.step(coefficients, time, active);
             evaluations += motion.evaluations;
-            if (any(going & !moved)) lead_on(going & !moved, time, evaluations, leave);
+            if (any(active & !moved)) retry(active & !moved, time, evaluations, leave);
         }
         for (int lane = 0; lane < width; ++lane) {
             if (status[lane] == Status::ok) done[lane] = taken;
@@ -157,8 +157,9 @@ private:
 
     // What becomes of the lanes that a step has not moved.
     template <class Leave>
-    [[gnu::noinline, gnu::cold]] void lead_on(Going left, real time, T& evaluations, const Leave& leave) {
-        // Sweeps of any Lagrangian that begin with the velocity alone solve many steps that those with a memory do not.
+    [[gnu::noinline, gnu::cold]] void retry(ActiveMask left, real time, T& evaluations, const Leave& leave) {
+        // Fixed-point iterations of any Lagrangian that begin with the velocity alone solve many steps that those with
+        // a memory do not.
         if constexpr (K::form == Form::general) {
             if (steps > 0) {
                 for (int lane = 0; lane < width; ++lane)

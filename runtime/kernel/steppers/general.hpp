@@ -132,20 +132,20 @@ struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
         real H[entry_room];
     };
 
-    // Sweeps need the mass matrix of a node alone, which is full for them.
-    static constexpr bool is_swept = K::any_number && !K::linear && N > 0 && n <= most_full;
-    struct Swept {
-        GalerkinSweeps<K, real> sweeps;
+    // Fixed-point iterations need the mass matrix of a node alone, which is full for them.
+    static constexpr bool has_fixed_point = K::any_number && !K::linear && N > 0 && n <= most_full;
+    struct FixedPointState {
+        GalerkinFixedPoint<K, real> iteration;
         Pause pause;
     };
 
     real p[n]{};                // momentum
     real q_before[n]{};         // before the last step
     bool has_history{};         // there is a last step
-    mutable bool is_current{};  // what follows is of the last step; else the sweeps' memory is
+    mutable bool is_current{};  // what follows is of the last step; else the iterations' memory is
     mutable real Y[room]{};     // displacements at the control points, then kappa, in the order of the solver
     mutable real cyclic_rates[r * cyclic_room]{};  // -g_P at the nodes
-    std::conditional_t<is_swept, Swept, Nothing> swept{};
+    std::conditional_t<has_fixed_point, FixedPointState, Nothing> fixed_point{};
     std::conditional_t<(cyclic > 0), real[m * m], Nothing> integration{};  // inverse of D at the first m nodes
     std::conditional_t<K::linear, Frozen, Nothing> frozen{};
     Workspace<Arrays> workspace;
@@ -165,7 +165,7 @@ struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
                 }
             lobatto::solve<m, m>(D, integration);
         }
-        if constexpr (is_swept) swept.sweeps.prepare(h);
+        if constexpr (has_fixed_point) fixed_point.iteration.prepare(h);
         if constexpr (K::linear) return freeze(frozen);
         return Status::ok;
     }
@@ -182,7 +182,7 @@ struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
         real v[n];
         const Status status = velocity(time, q, p, v);
         is_current = true;
-        if constexpr (is_swept) begin_sweeps(swept, v);
+        if constexpr (has_fixed_point) begin_fixed_point(fixed_point, v);
         if constexpr (K::events > 0) {
             if (status == Status::ok) Formulas<K>::event(coefficients, time, q, v, this->event_values);
         }
@@ -195,8 +195,8 @@ struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
 
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
-        if constexpr (is_swept) {
-            if (sweep(swept)) return Status::ok;
+        if constexpr (has_fixed_point) {
+            if (iterate(fixed_point)) return Status::ok;
         }
         return workspace.with([this](Arrays& arrays) { return step_in(arrays); });
     }
@@ -370,47 +370,47 @@ struct Stepper<K, Form::general, Stepping::solved> : Motion<K> {
     }
 
 private:
-    // Y, kappa and the cyclic rates of a step that sweeps have taken.
+    // Y, kappa and the cyclic rates of a step that iterations have taken.
     void refresh() const {
-        if constexpr (is_swept) {
+        if constexpr (has_fixed_point) {
             if (is_current || !has_history) return;
-            const auto& sweeps = swept.sweeps;
+            const auto& memory = fixed_point.iteration;
             for (int b = 0; b < active; ++b)
-                for (int j = 0; j < m; ++j) Y[Layout::index(b, j)] = sweeps.displacement(K::active_index[b], j);
+                for (int j = 0; j < m; ++j) Y[Layout::index(b, j)] = memory.displacement(K::active_index[b], j);
             for (int c = 0; c < cyclic; ++c) {
-                if (kappas > 0) Y[active * m + c] = sweeps.kappa[K::cyclic_index[c]];
-                for (int i = 0; i < r; ++i) cyclic_rates[i * cyclic + c] = sweeps.v[K::cyclic_index[c] * r + i];
+                if (kappas > 0) Y[active * m + c] = memory.kappa[K::cyclic_index[c]];
+                for (int i = 0; i < r; ++i) cyclic_rates[i * cyclic + c] = memory.v[K::cyclic_index[c] * r + i];
             }
             is_current = true;
         }
     }
 
-    template <class AnySwept>
-    void begin_sweeps(AnySwept& any, const real* v) {
+    template <class AnyFixedPoint>
+    void begin_fixed_point(AnyFixedPoint& any, const real* v) {
         any.pause = Pause();
-        any.sweeps.begin(v);
+        any.iteration.begin(v);
     }
 
-    // A step by sweeps; where they fail, all is made ready for Newton's iteration.
-    template <class AnySwept>
-    bool sweep(AnySwept& any) {
+    // A step by iterations; where they fail, all is made ready for Newton's iteration.
+    template <class AnyFixedPoint>
+    bool iterate(AnyFixedPoint& any) {
         const bool paused = any.pause.left > 0;
         if (!any.pause.count_down()) return false;
-        if (paused) any.sweeps.recall([this](int c, int i) { return node_velocity(c, i); });
+        if (paused) any.iteration.recall([this](int c, int i) { return node_velocity(c, i); });
         real q1[n], p1[n];
         for (int k = 0; k < n; ++k) {
             q1[k] = q[k];
             p1[k] = p[k];
         }
-        any.sweeps.tolerance = this->tolerance;
-        if (any.sweeps.step(coefficients, this->time(), +q1, +p1, true)) {
+        any.iteration.tolerance = this->tolerance;
+        if (any.iteration.step(coefficients, this->time(), +q1, +p1, true)) {
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];
                 q[k] = q1[k];
                 p[k] = p1[k];
             }
-            iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
-            increment = any.sweeps.increment;
+            iterations = static_cast<std::int32_t>(any.iteration.evaluations);
+            increment = any.iteration.increment;
             any.pause.succeed();
             is_current = false;
             has_history = true;

@@ -180,7 +180,7 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
     // dL/dv = M v and dL/dq = -M W.
     void slopes(real, const real* position, const real* velocity, real* Lv, real* Lq) const {
         real W[n];
-        K::acceleration(coefficients, position, W);
+        K::minus_acceleration(coefficients, position, W);
         for (int k = 0; k < n; ++k) W[k] = -W[k];
         K::momentum(coefficients, velocity, Lv);
         K::momentum(coefficients, W, Lq);
@@ -229,38 +229,38 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
 };
 
 template <class K, class T>
-struct Lanes<K, T, Form::linear_map, Stepping::solved> {
+struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     using real = typename K::real;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
 
     const T& position(int c) const { return q[c]; }
 
-    void prepare(const Single<K>&, int) {}
+    void prepare(const ScalarFallback<K>&, int) {}
     void set_tolerance(real) {}
-    void start(const Single<K>& single, const real* momentum, int lane) {
+    void start(const ScalarFallback<K>& single, const real* momentum, int lane) {
         for (int c = 0; c < n; ++c) {
             set_lane(q[c], lane, single.q[c]);
             set_lane(p[c], lane, momentum[c]);
         }
     }
-    void momentum(const Single<K>&, int lane, real* momentum) const {
+    void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
     template <class Given>
-    Going step(const Given& k, real, Going going) {
+    ActiveMask step(const Given& k, real, ActiveMask active) {
         T q1[n], p1[n], not_finite = T(real(0));
         K::propagate(k, +q, +p, +q1, +p1);
         for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
-        going = going & (not_finite == T(real(0)));
+        active = active & (not_finite == T(real(0)));
         for (int c = 0; c < n; ++c) {
-            q[c] = select(going, q1[c], q[c]);
-            p[c] = select(going, p1[c], p[c]);
+            q[c] = select(active, q1[c], q[c]);
+            p[c] = select(active, p1[c], p[c]);
         }
-        return going;
+        return active;
     }
-    void follow(const Single<K>& single, int lane) {
+    void follow(const ScalarFallback<K>& single, int lane) {
         for (int c = 0; c < n; ++c) {
             set_lane(q[c], lane, single.q[c]);
             set_lane(p[c], lane, single.p[c]);

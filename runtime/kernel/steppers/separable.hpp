@@ -22,7 +22,7 @@ namespace lobatto {
 // The stepper
 // ---------------------------------------------------------------------------------------------------------------------
 
-// Whether sweeps have neighbouring coordinates in lanes, not nodes.
+// Whether iterations have neighbouring coordinates in lanes, not nodes.
 template <class K>
 constexpr bool along_coordinates() {
     if constexpr (K::any_number && !K::linear)
@@ -42,7 +42,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     static constexpr int room = N > 0 ? N : 1, entry_room = K::entries > 0 ? K::entries : 1;
     using Stages = StageEquations<K>;
     using Newton = NewtonIteration<K>;
-    static constexpr bool is_swept = N > 0 && K::any_number && !K::linear && !K::clean;
+    static constexpr bool has_fixed_point = N > 0 && K::any_number && !K::linear && !K::clean;
     static constexpr bool along_coordinates = lobatto::along_coordinates<K>();
 
     struct Nothing {};
@@ -50,16 +50,16 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
         real q1[n], u1[n], W1[n];  // the end of the step
     };
 
-    struct Swept {
-        typename FixedPointOf<K, along_coordinates>::type sweeps;
+    struct FixedPointState {
+        typename FixedPointOf<K, along_coordinates>::type iteration;
         Pause pause;
     };
 
     real q_before[n]{}, u_before[n]{};  // before the last step
     real W[s * n]{};                    // M^-1 grad V at the nodes of the last step; the last n at q
     bool has_history{};                 // W holds a whole step
-    bool is_current{};  // W is that of the last step; else the sweeps' memory is, of chains also q_before
-    std::conditional_t<is_swept, Swept, Nothing> swept{};
+    bool is_current{};  // W is that of the last step; else the iterations' memory is, of chains also q_before
+    std::conditional_t<has_fixed_point, FixedPointState, Nothing> fixed_point{};
     Newton newton{};
     Workspace<Arrays> workspace;
 
@@ -68,7 +68,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
         has_history = false;
         const Status status = K::prepare(parameters, h, coefficients);
         if (status != Status::ok) return status;
-        if constexpr (is_swept) swept.sweeps.prepare(coefficients, h);
+        if constexpr (has_fixed_point) fixed_point.iteration.prepare(coefficients, h);
         return newton.prepare(coefficients, h);
     }
 
@@ -82,18 +82,18 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
             sum += position[k] - position[k];
         }
         K::velocity(coefficients, momentum, u);
-        Formulas<K>::acceleration(coefficients, time, q, W + (s - 1) * n);
+        Formulas<K>::minus_acceleration(coefficients, time, q, W + (s - 1) * n);
         sum += not_finite_part(W + (s - 1) * n, n);
         if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
         is_current = true;
-        if constexpr (is_swept) begin_sweeps(swept);
+        if constexpr (has_fixed_point) begin_fixed_point(fixed_point);
         return is_finite(sum) ? Status::ok : Status::not_finite;
     }
 
     Status step() {
         if (this->time_stands_still()) return Status::time_stands_still;
-        if constexpr (is_swept) {
-            if (sweep(swept)) return Status::ok;
+        if constexpr (has_fixed_point) {
+            if (iterate(fixed_point)) return Status::ok;
         }
         return workspace.with([this](Arrays& arrays) { return step_in(arrays); });
     }
@@ -121,10 +121,11 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
             workspace.with([&](Arrays& a) {
                 const Stages stages(step_size);
                 K::velocity(coefficients, momentum, a.u1);
-                Formulas<K>::acceleration(coefficients, time, position, a.W1);
+                Formulas<K>::minus_acceleration(coefficients, time, position, a.W1);
                 stages.drift(position, a.u1, a.W1, a.v, a.base);
                 for (int i = 0; i < m; ++i)
-                    Formulas<K>::acceleration(coefficients, time + K::c[i + 1] * step_size, X + i * n, a.W + i * n);
+                    Formulas<K>::minus_acceleration(coefficients, time + K::c[i + 1] * step_size, X + i * n,
+                                                    a.W + i * n);
                 stages.residual(a.base, X, a.W, F);
             });
         }
@@ -147,27 +148,27 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     // Where the last step began.
     real position_before(int k) const {
         if constexpr (along_coordinates) {
-            if (!is_current) return swept.sweeps.q[swept.sweeps.then][k];
+            if (!is_current) return fixed_point.iteration.q[fixed_point.iteration.then][k];
         }
         return q_before[k];
     }
     real velocity_before(int k) const {
         if constexpr (along_coordinates) {
-            if (!is_current) return swept.sweeps.u[swept.sweeps.then][k];
+            if (!is_current) return fixed_point.iteration.u[fixed_point.iteration.then][k];
         }
         return u_before[k];
     }
     // W at node i of the last step; node s - 1 is where the motion is now.
-    real node_acceleration(int i, int k) const {
-        if constexpr (is_swept) {
-            if (!is_current) return swept.sweeps.acceleration(i, k);
+    real node_minus_acceleration(int i, int k) const {
+        if constexpr (has_fixed_point) {
+            if (!is_current) return fixed_point.iteration.minus_acceleration(i, k);
         }
         return W[i * n + k];
     }
     // (D12) Q_i - q of the last step's interior node i.
     real displacement_of(int i, int k) const {
-        real moved = K::c[i + 1] * (velocity_before(k) - step_size * K::b[0] * node_acceleration(0, k));
-        for (int j = 0; j < m; ++j) moved -= step_size * K::A[i * m + j] * node_acceleration(j + 1, k);
+        real moved = K::c[i + 1] * (velocity_before(k) - step_size * K::b[0] * node_minus_acceleration(0, k));
+        for (int j = 0; j < m; ++j) moved -= step_size * K::A[i * m + j] * node_minus_acceleration(j + 1, k);
         return step_size * moved;
     }
     real node_position(int i, int k) const {
@@ -224,31 +225,31 @@ protected:
     }
 
 private:
-    template <class AnySwept>
-    void begin_sweeps(AnySwept& any) {
+    template <class AnyFixedPoint>
+    void begin_fixed_point(AnyFixedPoint& any) {
         any.pause = Pause();
         if constexpr (along_coordinates)
-            any.sweeps.begin(q, u, W + (s - 1) * n);
+            any.iteration.begin(q, u, W + (s - 1) * n);
         else
-            any.sweeps.begin(q, W + (s - 1) * n);
+            any.iteration.begin(q, W + (s - 1) * n);
     }
 
-    // A step by sweeps; where they fail, all is made ready for Newton's iteration.
-    template <class AnySwept>
-    bool sweep(AnySwept& any) {
+    // A step by iterations; where they fail, all is made ready for Newton's iteration.
+    template <class AnyFixedPoint>
+    bool iterate(AnyFixedPoint& any) {
         const bool paused = any.pause.left > 0;
         if (!any.pause.count_down()) return false;
         if (paused) {
-            const auto acceleration = [this](int i, int k) { return node_acceleration(i, k); };
+            const auto minus_acceleration = [this](int i, int k) { return node_minus_acceleration(i, k); };
             if constexpr (along_coordinates)
-                any.sweeps.recall(q, u, acceleration);
+                any.iteration.recall(q, u, minus_acceleration);
             else
-                any.sweeps.recall(acceleration, [this](int i, int k) { return node_position(i, k); });
+                any.iteration.recall(minus_acceleration, [this](int i, int k) { return node_position(i, k); });
         }
-        any.sweeps.tolerance = this->tolerance;
-        if (sweeps_step(any.sweeps)) {
-            iterations = static_cast<std::int32_t>(any.sweeps.evaluations);
-            increment = any.sweeps.increment;
+        any.iteration.tolerance = this->tolerance;
+        if (fixed_point_step(any.iteration)) {
+            iterations = static_cast<std::int32_t>(any.iteration.evaluations);
+            increment = any.iteration.increment;
             any.pause.succeed();
             is_current = false;
             has_history = true;
@@ -257,10 +258,10 @@ private:
         }
         if (!is_current)
             for (int k = 0; k < n; ++k) {
-                for (int i = 0; i < s; ++i) W[i * n + k] = any.sweeps.acceleration(i, k);
+                for (int i = 0; i < s; ++i) W[i * n + k] = any.iteration.minus_acceleration(i, k);
                 if constexpr (along_coordinates) {
-                    q_before[k] = any.sweeps.q[any.sweeps.then][k];
-                    u_before[k] = any.sweeps.u[any.sweeps.then][k];
+                    q_before[k] = any.iteration.q[any.iteration.then][k];
+                    u_before[k] = any.iteration.u[any.iteration.then][k];
                 }
             }
         is_current = true;
@@ -268,21 +269,20 @@ private:
         return false;
     }
 
-    // q and u move on where the sweeps succeed, and leave their values in q_before and u_before, or in the sweeps'
-    // memory.
-    template <class AnySweeps>
-    bool sweeps_step(AnySweeps& sweeps) {
+    // q and u move on where the iterations succeed, and leave their values in q_before and u_before, or in the
+    // iterations' memory.
+    template <class AnyIteration>
+    bool fixed_point_step(AnyIteration& iteration) {
         if constexpr (along_coordinates) {
-            if (!sweeps.step(coefficients, this->time())) return false;
-            copy_lanes<n>(sweeps.q[sweeps.now], q);
-            copy_lanes<n>(sweeps.u[sweeps.now], u);
+            if (!iteration.step(coefficients, this->time())) return false;
+            iteration.state(q, u);
         } else {
             real q1[n], u1[n];
             for (int k = 0; k < n; ++k) {
                 q1[k] = q[k];
                 u1[k] = u[k];
             }
-            if (!sweeps.step(coefficients, this->time(), q1, u1)) return false;
+            if (!iteration.step(coefficients, this->time(), q1, u1)) return false;
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];
                 u_before[k] = u[k];
@@ -299,7 +299,7 @@ private:
         const Stages stages(step_size);
         const real* const W0 = W + (s - 1) * n;
         stages.arrive(a.base, a.W, a.q1);
-        Formulas<K>::acceleration(coefficients, this->next_time(), a.q1, a.W1);
+        Formulas<K>::minus_acceleration(coefficients, this->next_time(), a.q1, a.W1);
         stages.finish(a.v, a.W, a.W1, a.u1);
         real sum = real(0);
         for (int k = 0; k < n; ++k) sum += (a.q1[k] - a.q1[k]) + (a.u1[k] - a.u1[k]) + (a.W1[k] - a.W1[k]);

@@ -20,7 +20,7 @@ namespace lobatto {
 
 // The lengths of a step's kicks and drifts.
 template <class K>
-struct Turns {
+struct Composition {
     using real = typename K::real;
     static constexpr int s = K::points;
     static constexpr bool kicks_ends = K::b[0] != real(0);  // else a step begins and ends with a drift
@@ -36,24 +36,24 @@ struct Turns {
 
 // One step of q and u; W is that at their positions, before and after, where ends are kicked. T: a number or a Pack.
 template <class K, class T, class Given>
-LOBATTO_INLINE void step_in_turn(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h, T* q,
-                                 T* u, T* W) {
+LOBATTO_INLINE void kick_and_drift(const Composition<K>& composition, const Given& k, typename K::real time,
+                                   typename K::real h, T* q, T* u, T* W) {
     constexpr int n = K::coordinates, s = K::points;
     const auto kick = [&](int i) LOBATTO_FORMULA {
-        for (int c = 0; c < n; ++c) u[c] = fused(T(turns.kick[i]), W[c], u[c]);
+        for (int c = 0; c < n; ++c) u[c] = fused(T(composition.kick[i]), W[c], u[c]);
     };
     const auto drift = [&](int i) LOBATTO_FORMULA {
-        for (int c = 0; c < n; ++c) q[c] = fused(T(turns.drift[i]), u[c], q[c]);
+        for (int c = 0; c < n; ++c) q[c] = fused(T(composition.drift[i]), u[c], q[c]);
     };
-    if constexpr (Turns<K>::kicks_ends) kick(0);
+    if constexpr (Composition<K>::kicks_ends) kick(0);
     drift(0);
     for (int i = 1; i < s - 1; ++i) {
-        Formulas<K>::acceleration(k, T(time + K::c[i] * h), static_cast<const T*>(q), W);
+        Formulas<K>::minus_acceleration(k, T(time + K::c[i] * h), static_cast<const T*>(q), W);
         kick(i);
         drift(i);
     }
-    if constexpr (Turns<K>::kicks_ends) {
-        Formulas<K>::acceleration(k, T(time + h), static_cast<const T*>(q), W);
+    if constexpr (Composition<K>::kicks_ends) {
+        Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q), W);
         kick(s - 1);
     }
 }
@@ -80,21 +80,21 @@ LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& turn, int
 // One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
 // coordinates for each kick.
 template <class K, class T, class Given>
-LOBATTO_INLINE void step_in_passing(const Turns<K>& turns, const Given& k, typename K::real time, typename K::real h,
-                                    const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
+LOBATTO_INLINE void step_in_passing(const Composition<K>& composition, const Given& k, typename K::real time,
+                                    typename K::real h, const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
     constexpr int n = K::coordinates, s = K::points;
     const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
-        const KickAndDrift<K, T, Given, is_last()> turn{q1, u1, W1, T(turns.kick[i]), T(is_last ? 0 : turns.drift[i]),
-                                                        k};
+        const KickAndDrift<K, T, Given, is_last()> turn{
+            q1, u1, W1, T(composition.kick[i]), T(is_last ? 0 : composition.drift[i]), k};
         const T* const position = q1;
-        Formulas<K>::template along_rows<InPassing>(k, T(time + K::c[i] * h), position, turn);
+        Formulas<K>::template along_rows<Immediate>(k, T(time + K::c[i] * h), position, turn);
     };
     for (int c = 0; c < n; ++c) {
-        u1[c] = Turns<K>::kicks_ends ? fused(T(turns.kick[0]), W[c], u[c]) : u[c];
-        q1[c] = fused(T(turns.drift[0]), u1[c], q[c]);
+        u1[c] = Composition<K>::kicks_ends ? fused(T(composition.kick[0]), W[c], u[c]) : u[c];
+        q1[c] = fused(T(composition.drift[0]), u1[c], q[c]);
     }
     for (int i = 1; i < s - 1; ++i) pass(i, std::false_type());
-    if constexpr (Turns<K>::kicks_ends) pass(s - 1, std::true_type());
+    if constexpr (Composition<K>::kicks_ends) pass(s - 1, std::true_type());
 }
 
 // Whether positions and velocities, accelerations, and what is under way fit the 32 registers of AVX-512.
@@ -118,21 +118,21 @@ struct NeighbourTurns {
     // Positions, velocities, and where ends are kicked accelerations.
     alignas(V) real q[2][room]{}, u[2][room]{}, W[2][room]{};
 
-    void begin(const real* position, const real* velocity, const real* acceleration) {
+    void begin(const real* position, const real* velocity, const real* minus_acceleration) {
         for (int c = 0; c < n; ++c) {
             q[now][c] = position[c];
             u[now][c] = velocity[c];
-            W[now][c] = acceleration[c];
+            W[now][c] = minus_acceleration[c];
         }
     }
     // False, and nothing has moved, where the end is not finite; what was before the last step is lost then.
-    bool step(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h) {
+    bool step(const Composition<K>& composition, const typename K::Coefficients& k, real time, real h) {
         if constexpr (in_registers) {
             V position[parts], velocity[parts], slope[parts];
-            return step_in(turns, k, time, h, Registers<V, parts>{position}, Registers<V, parts>{velocity},
+            return step_in(composition, k, time, h, Registers<V, parts>{position}, Registers<V, parts>{velocity},
                            Registers<V, parts>{slope});
         } else {
-            return step_in(turns, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now]);
+            return step_in(composition, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now]);
         }
     }
 
@@ -150,30 +150,30 @@ private:
         Formulas<K>::template along_rows<How>(k, time, position, slope);
     }
     template <class Row>
-    LOBATTO_INLINE bool step_in(const Turns<K>& turns, const typename K::Coefficients& k, real time, real h,
+    LOBATTO_INLINE bool step_in(const Composition<K>& composition, const typename K::Coefficients& k, real time, real h,
                                 Row position, Row velocity, Row slope) {
         over_parts<Row>([&](int at) LOBATTO_FORMULA {
             const V start = V::load(W[now] + at);
             V first = V::load(u[now] + at);
-            if constexpr (Turns<K>::kicks_ends) first = fused(V(turns.kick[0]), start, first);
+            if constexpr (Composition<K>::kicks_ends) first = fused(V(composition.kick[0]), start, first);
             store_to(slope, at, start);
             store_to(velocity, at, first);
-            store_to(position, at, fused(V(turns.drift[0]), first, V::load(q[now] + at)));
+            store_to(position, at, fused(V(composition.drift[0]), first, V::load(q[now] + at)));
         });
         for (int i = 1; i < s - 1; ++i) {
             accelerate(k, time + K::c[i] * h, position, slope);
             over_parts<Row>([&](int at) LOBATTO_FORMULA {
-                const V moved = fused(V(turns.kick[i]), load_from<V>(slope, at), load_from<V>(velocity, at));
+                const V moved = fused(V(composition.kick[i]), load_from<V>(slope, at), load_from<V>(velocity, at));
                 store_to(velocity, at, moved);
-                store_to(position, at, fused(V(turns.drift[i]), moved, load_from<V>(position, at)));
+                store_to(position, at, fused(V(composition.drift[i]), moved, load_from<V>(position, at)));
             });
         }
-        if constexpr (Turns<K>::kicks_ends) accelerate(k, time + h, position, slope);
+        if constexpr (Composition<K>::kicks_ends) accelerate(k, time + h, position, slope);
         V not_finite = V(real(0));
         over_parts<Row>([&](int at) LOBATTO_FORMULA {
             V last = load_from<V>(velocity, at);
             const V there = load_from<V>(position, at), bent = load_from<V>(slope, at);
-            if constexpr (Turns<K>::kicks_ends) last = fused(V(turns.kick[s - 1]), bent, last);
+            if constexpr (Composition<K>::kicks_ends) last = fused(V(composition.kick[s - 1]), bent, last);
             not_finite = fused(V(real(0)), last + there, not_finite);
             there.store(q[1 - now] + at);
             last.store(u[1 - now] + at);
@@ -195,12 +195,12 @@ struct KindOfTurns<K, false> {
 };
 
 template <class K>
-struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
+struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
     using typename ConstantMass<K>::real;
     using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
         ConstantMass<K>::u;
     static constexpr int s = K::points;
-    static constexpr int nodes = s - (Turns<K>::kicks_ends ? 1 : 2);  // gradients of a step
+    static constexpr int nodes = s - (Composition<K>::kicks_ends ? 1 : 2);  // gradients of a step
     static constexpr int N = 0;
 
     // The ends of the last step, for what lies between them.
@@ -210,7 +210,7 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
     };
     using Nothing = typename KindOfTurns<K, false>::type;
 
-    Turns<K> turns{};
+    Composition<K> composition{};
     real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
     real q_before[n]{}, u_before[n]{};  // before the last step; likewise
     bool has_history{};                 // what lies between the ends of the last step is known
@@ -220,7 +220,7 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
     Status prepare(const typename K::Parameters& parameters, real h) {
         step_size = h;
         has_history = false;
-        turns.prepare(h);
+        composition.prepare(h);
         return K::prepare(parameters, h, coefficients);
     }
 
@@ -235,7 +235,7 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
             sum += position[k] - position[k];
         }
         K::velocity(coefficients, momentum, u);
-        Formulas<K>::acceleration(coefficients, time, static_cast<const real*>(q), +W);
+        Formulas<K>::minus_acceleration(coefficients, time, static_cast<const real*>(q), +W);
         sum += not_finite_part(W, n);
         if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
         if constexpr (K::neighbours) neighbours.begin(q, u, W);
@@ -278,7 +278,7 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
     }
 
     // M^-1 grad V where the motion is, of coordinate c; where ends are kicked.
-    real acceleration(int c) const {
+    real minus_acceleration(int c) const {
         if constexpr (K::neighbours)
             return neighbours.W[neighbours.now][c];
         else
@@ -304,11 +304,11 @@ struct Stepper<K, Form::separable, Stepping::in_turn> : ConstantMass<K> {
             for (int i = 0; i < s; ++i) {
                 Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +slope,
                                   +entries);
-                for (int k = 0; k < n; ++k) rate[k] = fused(turns.kick[i], slope[k], rate[k]);
-                kick_increment<K>(turns.kick[i], entries, static_cast<const real*>(nullptr), full);
+                for (int k = 0; k < n; ++k) rate[k] = fused(composition.kick[i], slope[k], rate[k]);
+                kick_increment<K>(composition.kick[i], entries, static_cast<const real*>(nullptr), full);
                 if (i == s - 1) break;
-                for (int k = 0; k < n; ++k) at[k] = fused(turns.drift[i], rate[k], at[k]);
-                drift_increment<K>(turns.drift[i], full);
+                for (int k = 0; k < n; ++k) at[k] = fused(composition.drift[i], rate[k], at[k]);
+                drift_increment<K>(composition.drift[i], full);
             }
             status = local.step();
             if (status != Status::ok) return status;
@@ -332,7 +332,7 @@ private:
             u1[k] = u[k];
             W1[k] = W[k];
         }
-        step_in_turn<K>(turns, coefficients, this->time(), step_size, q1, u1, W1);
+        kick_and_drift<K>(composition, coefficients, this->time(), step_size, q1, u1, W1);
         for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (u1[k] - u1[k]);
         if (!(sum == real(0))) return false;
         for (int k = 0; k < n; ++k) {
@@ -346,7 +346,7 @@ private:
     }
     template <class Neighbours>
     bool move(Neighbours& all) {
-        if (!all.step(turns, coefficients, this->time(), step_size)) return false;
+        if (!all.step(composition, coefficients, this->time(), step_size)) return false;
         copy_lanes<n>(all.q[all.now], q);
         copy_lanes<n>(all.u[all.now], u);
         return true;
@@ -369,40 +369,40 @@ private:
         ends.of = this->steps;
         real begin[n];
         for (int k = 0; k < n; ++k) begin[k] = position_before(k);
-        Formulas<K>::acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size,
-                                  static_cast<const real*>(begin), +ends.W[0]);
-        Formulas<K>::acceleration(coefficients, this->time(), static_cast<const real*>(q), +ends.W[1]);
+        Formulas<K>::minus_acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size,
+                                        static_cast<const real*>(begin), +ends.W[0]);
+        Formulas<K>::minus_acceleration(coefficients, this->time(), static_cast<const real*>(q), +ends.W[1]);
     }
 };
 
 template <class K, class T>
-struct Lanes<K, T, Form::separable, Stepping::in_turn> {
+struct LaneStepper<K, T, Form::separable, Stepping::composition> {
     using real = typename K::real;
-    using Going = decltype(T() < T());
+    using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
     int now{};  // the present; 1 - now: room for the next
     T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
-    Turns<K> turns;
+    Composition<K> composition;
     real h;
 
     const T& position(int c) const { return q[now][c]; }
-    void prepare(const Single<K>& single, int) {
-        turns = single.turns;
+    void prepare(const ScalarFallback<K>& single, int) {
+        composition = single.composition;
         h = single.step_size;
     }
     void set_tolerance(real) {}
-    void start(const Single<K>& single, const real*, int lane) { follow(single, lane); }
-    void momentum(const Single<K>& single, int lane, real* momentum) const {
+    void start(const ScalarFallback<K>& single, const real*, int lane) { follow(single, lane); }
+    void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
         real velocity[n];
         for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
     template <class Given>
-    Going step(const Given& k, real time, Going going) {
+    ActiveMask step(const Given& k, real time, ActiveMask active) {
         const int next = 1 - now;
         T not_finite = T(real(0));
-        if constexpr (moves_in_passing<K>()) {
-            step_in_passing<K>(turns, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+        if constexpr (moves_immediately<K>()) {
+            step_in_passing<K>(composition, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {
             T q1[n], u1[n], W1[n];
@@ -411,7 +411,7 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
                 u1[c] = u[now][c];
                 W1[c] = W[now][c];
             }
-            step_in_turn<K>(turns, k, time, h, q1, u1, W1);
+            kick_and_drift<K>(composition, k, time, h, q1, u1, W1);
             for (int c = 0; c < n; ++c) {
                 not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]);
                 q[next][c] = q1[c];
@@ -419,21 +419,21 @@ struct Lanes<K, T, Form::separable, Stepping::in_turn> {
                 W[next][c] = W1[c];
             }
         }
-        going = going & (not_finite == T(real(0)));
-        if (!all(going))
+        active = active & (not_finite == T(real(0)));
+        if (!all(active))
             for (int c = 0; c < n; ++c) {
-                q[next][c] = select(going, q[next][c], q[now][c]);
-                u[next][c] = select(going, u[next][c], u[now][c]);
-                if constexpr (Turns<K>::kicks_ends) W[next][c] = select(going, W[next][c], W[now][c]);
+                q[next][c] = select(active, q[next][c], q[now][c]);
+                u[next][c] = select(active, u[next][c], u[now][c]);
+                if constexpr (Composition<K>::kicks_ends) W[next][c] = select(active, W[next][c], W[now][c]);
             }
         now = next;
-        return going;
+        return active;
     }
-    void follow(const Single<K>& single, int lane) {
+    void follow(const ScalarFallback<K>& single, int lane) {
         for (int c = 0; c < n; ++c) {
             set_lane(q[now][c], lane, single.q[c]);
             set_lane(u[now][c], lane, single.u[c]);
-            set_lane(W[now][c], lane, single.acceleration(c));
+            set_lane(W[now][c], lane, single.minus_acceleration(c));
         }
     }
 };

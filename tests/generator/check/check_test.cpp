@@ -225,6 +225,6 @@ TEST_CASE("a wrong program fails the check of what is emitted") {
     };
     CHECK(failed_after("energy") == Claims{"emitted energy, momentum, forces"});
     CHECK(failed_after("node") == Claims{"emitted energy, momentum, forces"});
-    CHECK(failed_after("acceleration") == Claims{"emitted energy, momentum, forces"});
+    CHECK(failed_after("minus_acceleration") == Claims{"emitted energy, momentum, forces"});
     CHECK(failed_after("momentum") == Claims{"emitted energy, momentum, forces"});
 }

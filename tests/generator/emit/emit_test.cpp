@@ -126,7 +126,7 @@ TEST_CASE("Horner's scheme saves operations on a quartic") {
     REQUIRE(source.report[2].pass == "factor sums (Horner)");
     CHECK(source.report[2].after.total() < source.report[1].after.total());
     // 4 a q^3 + 3 b q^2 + 2 c q + d: three multiplications by q and three additions.
-    const std::string acceleration = body(source.header, "acceleration");
+    const std::string acceleration = body(source.header, "minus_acceleration");
     CHECK(count_of(acceleration, " * ") == 3);
     CHECK(count_of(acceleration, " + ") == 3);
 }
@@ -135,8 +135,8 @@ TEST_CASE("sine and cosine of one argument become one call, and a lone sine stay
     const KernelSource source = kernel(pendulum);
     CHECK(count_of(body(source.header, "node"), "sincos(") == 1);
     CHECK(body(source.header, "node").find("::sin(") == std::string::npos);
-    CHECK(count_of(body(source.header, "acceleration"), "::sin(") == 1);
-    CHECK(body(source.header, "acceleration").find("sincos(") == std::string::npos);
+    CHECK(count_of(body(source.header, "minus_acceleration"), "::sin(") == 1);
+    CHECK(body(source.header, "minus_acceleration").find("sincos(") == std::string::npos);
 }
 
 TEST_CASE("a stage is given sine and cosine of what moves, in packs of double, and of nothing else") {
@@ -185,7 +185,7 @@ TEST_CASE("what the stage map leaves of the forces is a function of its own, wit
     const std::string tower =
         kernel({"tower", "q'^2/2 + p'^2/2 - (q^2 + p^2)/2 - ((p + q^64)^64 + q)^64", {"q", "p"}, {}}, 6).header;
     CHECK(tower.size() < 20000);
-    // Nothing is left out of these: no quadratic part; forces for which sweeps take second derivatives.
+    // Nothing is left out of these: no quadratic part; forces for which fixed-point iterations take second derivatives.
     for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
                                     kernel({"costly", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
         CHECK(none.find("bool has_remainder = false;") != std::string::npos);
@@ -193,7 +193,7 @@ TEST_CASE("what the stage map leaves of the forces is a function of its own, wit
     }
 }
 
-TEST_CASE("what acceleration and its derivative have in common is computed once in node") {
+TEST_CASE("what the acceleration and its derivative have in common is computed once in node") {
     const std::string node = body(kernel({"shared", "q'^2/2 - exp(a*sin(q)^2)", {"q"}, {"a"}}).header, "node");
     CHECK(count_of(node, "exp(") == 1);
     CHECK(count_of(node, "sincos(") == 1);
@@ -211,10 +211,10 @@ TEST_CASE("node computes nothing that depends on parameters and step size only")
     const Hoisted hoisted(programs);
     long early = 0;
     for (const Id id : programs.graph.topological(roots)) {
-        if (programs.graph[id].stage <= Stage::step_size) continue;
+        if (programs.graph[id].phase <= Phase::step_size) continue;
         for (const Id operand : programs.graph[id].operands) {
-            const Stage stage = programs.graph[operand].stage;
-            if (stage != Stage::parameter && stage != Stage::step_size) continue;
+            const Phase stage = programs.graph[operand].phase;
+            if (stage != Phase::parameter && stage != Phase::step_size) continue;
             ++early;
             CHECK(hoisted.names.count(operand) == 1);
         }

@@ -15,8 +15,8 @@ namespace {
 
 struct Inputs {
     Graph graph;
-    Id x = graph.input({"x", "x", Stage::iterate}), y = graph.input({"y", "y", Stage::iterate}),
-       z = graph.input({"z", "z", Stage::iterate});
+    Id x = graph.input({"x", "x", Phase::iterate}), y = graph.input({"y", "y", Phase::iterate}),
+       z = graph.input({"z", "z", Phase::iterate});
     std::string text(Id id) const { return formula(graph, id, Notation::text); }
     cln::cl_R value(Id id, const cln::cl_R& at_x, const cln::cl_R& at_y = 0) const {
         return graph.evaluate({at_x, at_y, 0}, {id})[static_cast<std::size_t>(id)];
@@ -57,7 +57,7 @@ TEST_CASE("equal expressions are one node, in whatever order they were built") {
 TEST_CASE("the order of terms is that of the inputs, not of construction") {
     Graph forwards, backwards;
     const auto build = [](Graph& graph, bool reverse) {
-        const Id x = graph.input({"x", "x", Stage::iterate}), y = graph.input({"y", "y", Stage::iterate});
+        const Id x = graph.input({"x", "x", Phase::iterate}), y = graph.input({"y", "y", Phase::iterate});
         std::vector<Id> terms;
         if (reverse) {
             terms = {graph.function(Op::sin, y), graph.power(y, 3), graph.multiply({y, x}), graph.power(x, 2), x};
@@ -165,7 +165,7 @@ TEST_CASE("a product that two outputs need is computed once") {
     Programs programs =
         g.program({g.graph.multiply({g.x, g.y, g.z}), g.graph.multiply({g.x, g.y, g.graph.number(7, 3)})});
     const auto reports = optimise(programs);
-    CHECK(operations_after("group by stage", reports).multiplications == 4);
+    CHECK(operations_after("group by phase", reports).multiplications == 4);
     CHECK(operations_after("share common parts", reports).multiplications == 3);
 }
 
@@ -211,7 +211,7 @@ TEST_CASE("sines and cosines of a sum of two angles come from those of both, in 
 
 TEST_CASE("a value that is real only near the scene's start is checked there; one that is real nowhere is refused") {
     Graph graph;
-    const Id x = graph.input({"x", "x", Stage::iterate, 5});
+    const Id x = graph.input({"x", "x", Phase::iterate, 5});
     Programs programs;
     programs.programs.push_back({"all", {{"out", graph.function(Op::log, graph.add({x, graph.number(-3)}))}}});
     programs.graph = graph;

@@ -249,7 +249,7 @@ TEST_CASE("a formula without a value at zero is no wall") {
         run);
     const Derivation shortcut = derive(quotients);
     REQUIRE(shortcut.structure.neighbours);
-    CHECK_FALSE(shortcut.structure.walls.before);
+    CHECK_FALSE(shortcut.structure.fixed_ends.before);
     CHECK(distance(motion(shortcut, 50), motion(derive(quotients, true), 50)) < 1e-12);
 }
 

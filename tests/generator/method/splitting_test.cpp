@@ -358,10 +358,10 @@ TEST_CASE("a linear system is one matrix, of few coordinates or of one") {
         for (const int stages : {6, 14}) {
             const Derivation derivation = derivation_of(*motion, splitting(stages));
             CHECK(derivation.structure.form == Form::linear_map);
-            const Derivation in_turn = derivation_of(*motion, splitting(stages), "dense = 1");
-            CHECK(in_turn.structure.form == Form::separable);
+            const Derivation composition = derivation_of(*motion, splitting(stages), "dense = 1");
+            CHECK(composition.structure.form == Form::separable);
             CHECK(distance(after(compiled(derivation), *motion, 0.3, 100),
-                           after(compiled(in_turn), *motion, 0.3, 100)) < 1e-12);
+                           after(compiled(composition), *motion, 0.3, 100)) < 1e-12);
         }
 }
 
@@ -397,19 +397,19 @@ static NeighbourTurns<K, IN_REGISTERS> within;
 static NeighbourTurns<K, false> through;
 int main() {
     K::Coefficients k;
-    Turns<K> turns;
+    Composition<K> composition;
     const double h = 0.3;
     K::prepare(K::Parameters(), h, k);
-    turns.prepare(h);
+    composition.prepare(h);
     double q[K::coordinates], u[K::coordinates], W[K::coordinates], one_q[K::coordinates], one_u[K::coordinates];
     for (int i = 0; i < K::coordinates; ++i) one_q[i] = q[i] = std::sin(0.3 * i), one_u[i] = u[i] = 0.1 * std::cos(i);
-    Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
+    Formulas<K>::minus_acceleration(k, 0.0, static_cast<const double*>(q), +W);
     within.begin(q, u, W);
     through.begin(q, u, W);
     double far = 0;
     for (int i = 0; i < 60; ++i) {
-        if (!within.step(turns, k, i * h, h) || !through.step(turns, k, i * h, h)) std::printf("step %d fails\n", i);
-        step_in_turn<K>(turns, k, i * h, h, +one_q, +one_u, +W);
+        if (!within.step(composition, k, i * h, h) || !through.step(composition, k, i * h, h)) std::printf("step %d fails\n", i);
+        kick_and_drift<K>(composition, k, i * h, h, +one_q, +one_u, +W);
         if (std::memcmp(within.q[within.now], through.q[through.now], sizeof q) != 0 ||
             std::memcmp(within.u[within.now], through.u[through.now], sizeof u) != 0)
             std::printf("step %d differs\n", i);
@@ -454,7 +454,7 @@ TEST_CASE("chains side by side move as each does alone, to the same bits, and on
 using namespace lobatto;
 using K = kernels::motion;
 constexpr int n = K::coordinates, lanes = 4, steps = 60;
-static_assert(K::in_passing == IN_PASSING);
+static_assert(K::immediate == IN_PASSING);
 static_assert(ensemble_lanes<K>(8) == (IN_PASSING ? native_lanes<double> : 0) && ensemble_lanes<K>(1) == 0);
 static Ensemble<K, lanes> together;
 static Stepper<K> alone[lanes];
@@ -528,12 +528,12 @@ int main() {
     hung.body = replaced(hung.body, "- x[17]^2/2 - 0.3*x[17]^4/4", "");
     free.body = replaced(replaced(free.body, "- x[19]^2/2 - 0.3*x[19]^4/4", ""), "- x[1]^2/2 - 0.3*x[1]^4/4", "");
     ring.body = replaced(ring.body, "- x[1]^2/2 - 0.3*x[1]^4/4", "- (x[1] - x[24])^4");
-    for (const auto& [motion, in_passing] : {std::pair{driven, true}, {hung, true}, {free, true}, {ring, false}})
+    for (const auto& [motion, immediate] : {std::pair{driven, true}, {hung, true}, {free, true}, {ring, false}})
         for (const int stages : {6, 14}) {
             const Derivation derivation = derivation_of(motion, splitting(stages), "energy = false\ntangent = false");
             REQUIRE(derivation.structure.neighbours);
             write_text(folder / "motion.hpp", emit(derivation).header);
-            const std::string passing = in_passing ? "-DIN_PASSING=true" : "-DIN_PASSING=false";
+            const std::string passing = immediate ? "-DIN_PASSING=true" : "-DIN_PASSING=false";
             const auto check = [&](const std::vector<std::string>& target) {
                 const std::optional<Finished> side = built_and_run(folder, "side", target);
                 REQUIRE(side);
@@ -563,7 +563,7 @@ TEST_CASE("a sweep of a chain has lanes, and the same table for any number of th
 
 TEST_CASE("scenes may bear the names of what chains alone have") {
     const TemporaryFolder folder;
-    for (const std::string name : {"row_reach", "unit_masses", "in_passing"}) {
+    for (const std::string name : {"row_reach", "unit_masses", "immediate"}) {
         write_text(folder / (name + ".toml"), "title = \"Chain\"\n" + fput(12).body + "[method]\n" + splitting(6) +
                                                   "\n[run]\nstep = 0.25\nuntil = 5\n");
         const Finished result =

@@ -27,12 +27,12 @@ const Translation answer{"answer",
                          "extern \"C\" __attribute__((visibility(\"default\"))) int answer() { return 42; }\n"};
 
 // A cache of its own and a compiler that writes a line to `runs` each time before it does its work.
-struct Workshop {
+struct KernelBuilder {
     TemporaryFolder folder;
     EnvironmentVariable cache{"LOBATTO_CACHE_DIR", (folder / "cache").string()};
     EnvironmentVariable compiler{"CXX", (folder / "compiler").string()};
 
-    explicit Workshop(const std::string& before = "") { set_compiler(before + "exec g++ \"$@\"\n"); }
+    explicit KernelBuilder(const std::string& before = "") { set_compiler(before + "exec g++ \"$@\"\n"); }
     void set_compiler(const std::string& body) const {
         write_script(folder / "compiler", "echo run >> " + (folder / "runs").string() + "\n" + body);
     }
@@ -100,7 +100,7 @@ TEST_CASE("SHA-256 has the values of the standard") {
 }
 
 TEST_CASE("the second compilation of a text is a hit and runs no compiler") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const Compiled first = compile(answer);
     CHECK_FALSE(first.from_cache);
     CHECK(first.seconds > 0);
@@ -109,23 +109,23 @@ TEST_CASE("the second compilation of a text is a hit and runs no compiler") {
     CHECK(second.seconds == 0);
     CHECK(second.object == first.object);
     CHECK(second.command == first.command);
-    CHECK(workshop.runs() == 1);
-    CHECK(workshop.endings() == one_entry);
+    CHECK(kernel_builder.runs() == 1);
+    CHECK(kernel_builder.endings() == one_entry);
 }
 
 TEST_CASE("another text, another compiler and another precision are misses") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     compile(answer);
     CHECK_FALSE(compile({answer.name, answer.text + "\n"}).from_cache);
     CHECK_FALSE(compile({answer.name, answer.text, true}).from_cache);
-    workshop.set_compiler("# a newer version\nexec g++ \"$@\"\n");
+    kernel_builder.set_compiler("# a newer version\nexec g++ \"$@\"\n");
     CHECK_FALSE(compile(answer).from_cache);
-    CHECK(workshop.runs() == 4);
+    CHECK(kernel_builder.runs() == 4);
 }
 
 TEST_CASE("the command names the compiler that CXX names and all flags, and fuses no products") {
-    const Workshop workshop;
-    const std::string compiler = (workshop.folder / "compiler").string();
+    const KernelBuilder kernel_builder;
+    const std::string compiler = (kernel_builder.folder / "compiler").string();
     CHECK(compile(answer).command ==
           compiler +
               " -O2 -fpeel-loops -march=native -fno-math-errno -ffp-contract=off -fPIC -shared "
@@ -138,7 +138,7 @@ TEST_CASE("the command names the compiler that CXX names and all flags, and fuse
 }
 
 TEST_CASE("a product is rounded before it is added to, on every processor") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const Compiled compiled =
         compile({"sum",
                  "extern \"C\" __attribute__((visibility(\"default\"))) double sum(double a, double b, double c) "
@@ -152,29 +152,29 @@ TEST_CASE("a product is rounded before it is added to, on every processor") {
 }
 
 TEST_CASE("an entry whose key text is forged is built again") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const std::string object = compile(answer).object;
-    const std::string key = read_file(workshop.key_file());
+    const std::string key = read_file(kernel_builder.key_file());
     // The seal of the object stays right: only the text differs.
     std::string forged = key;
     forged.replace(forged.find("return 42"), 9, "return 43");
-    write_text(workshop.key_file(), forged);
+    write_text(kernel_builder.key_file(), forged);
     CHECK_FALSE(compile(answer).from_cache);
-    CHECK(read_file(workshop.key_file()) == key);
+    CHECK(read_file(kernel_builder.key_file()) == key);
     CHECK(compile(answer).from_cache);
 }
 
 TEST_CASE(
     "an altered, a shortened, a missing and a shared object are built again, which is told of all but a missing one") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const std::string object = compile(answer).object;
     const std::string good = read_file(object);
     std::string altered = good;
     altered[good.size() / 2] ^= 1;
-    long runs = workshop.runs();
+    long runs = kernel_builder.runs();
     const auto is_rebuilt = [&](bool told) {
         const Compiled again = compile(answer);
-        return !again.from_cache && again.was_altered == told && workshop.runs() == ++runs &&
+        return !again.from_cache && again.was_altered == told && kernel_builder.runs() == ++runs &&
                compile(answer).from_cache;
     };
     write_text(object, altered);
@@ -183,7 +183,7 @@ TEST_CASE(
     CHECK(is_rebuilt(true));
     fs::remove(object);
     CHECK(is_rebuilt(false));
-    fs::remove(workshop.key_file());
+    fs::remove(kernel_builder.key_file());
     CHECK(is_rebuilt(false));
     fs::permissions(object, fs::perms::group_write, fs::perm_options::add);
     CHECK(is_rebuilt(true));
@@ -193,7 +193,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a permissive umask does not spoil the entries") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const pid_t pid = start_process([] {
         ::umask(0);
         compile(answer);
@@ -203,27 +203,27 @@ TEST_CASE("a permissive umask does not spoil the entries") {
 }
 
 TEST_CASE("eight processes that want the same kernel compile it once") {
-    const Workshop workshop("sleep 0.3\n");
+    const KernelBuilder kernel_builder("sleep 0.3\n");
     std::vector<pid_t> processes;
     for (int i = 0; i < 8; ++i) processes.push_back(start_process([] { return fs::exists(compile(answer).object); }));
     for (const pid_t pid : processes) CHECK(exit_code_of(pid) == 0);
-    CHECK(workshop.runs() == 1);
-    CHECK(workshop.endings() == one_entry);
+    CHECK(kernel_builder.runs() == 1);
+    CHECK(kernel_builder.endings() == one_entry);
 }
 
 TEST_CASE("eight threads that want the same kernel compile it once") {
-    const Workshop workshop("sleep 0.3\n");
+    const KernelBuilder kernel_builder("sleep 0.3\n");
     std::vector<std::thread> threads;
     for (int i = 0; i < 8; ++i) threads.emplace_back([] { compile(answer); });
     for (std::thread& thread : threads) thread.join();
-    CHECK(workshop.runs() == 1);
-    CHECK(workshop.endings() == one_entry);
+    CHECK(kernel_builder.runs() == 1);
+    CHECK(kernel_builder.endings() == one_entry);
 }
 
 TEST_CASE("a process killed at any time of a compilation leaves nothing broken") {
     for (const int milliseconds : {5, 40, 80, 120, 160, 300}) {
         CAPTURE(milliseconds);
-        const Workshop workshop("sleep 0.05\n");
+        const KernelBuilder kernel_builder("sleep 0.05\n");
         const pid_t pid = start_process([] { return !compile(answer).from_cache; });
         std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
         ::kill(pid, SIGKILL);
@@ -235,32 +235,32 @@ TEST_CASE("a process killed at any time of a compilation leaves nothing broken")
         CHECK(compile(answer).from_cache);
         // What is left goes as soon as something is built after the last part of the killed compiler has ended.
         const auto is_rest = [](const std::string& ending) { return ending != ".so" && ending != ".key"; };
-        for (int i = 0; i < 50 && std::ranges::count_if(workshop.endings(), is_rest) > 0; ++i) {
+        for (int i = 0; i < 50 && std::ranges::count_if(kernel_builder.endings(), is_rest) > 0; ++i) {
             std::this_thread::sleep_for(std::chrono::milliseconds(20));
             compile({"other", answer.text + std::string(i, '\n')});
         }
-        CHECK(std::ranges::count_if(workshop.endings(), is_rest) == 0);
+        CHECK(std::ranges::count_if(kernel_builder.endings(), is_rest) == 0);
     }
 }
 
 TEST_CASE("what a killed process left of an entry is removed when another entry is built") {
-    const Workshop workshop("echo $$ > $(dirname $0)/pid\nsleep 5\n");
+    const KernelBuilder kernel_builder("echo $$ > $(dirname $0)/pid\nsleep 5\n");
     const pid_t pid = start_process([] { return !compile(answer).from_cache; });
-    while (!fs::exists(workshop.folder / "pid")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (!fs::exists(kernel_builder.folder / "pid")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     ::kill(pid, SIGKILL);
     exit_code_of(pid);
-    CHECK(workshop.endings() == std::vector<std::string>{".building", ".lock"});
-    workshop.set_compiler("exec g++ \"$@\"\n");
+    CHECK(kernel_builder.endings() == std::vector<std::string>{".building", ".lock"});
+    kernel_builder.set_compiler("exec g++ \"$@\"\n");
     compile({"other", answer.text});
-    CHECK(workshop.endings() == one_entry);
+    CHECK(kernel_builder.endings() == one_entry);
 }
 
 TEST_CASE("a compiler does not outlive the process that started it") {
-    const Workshop workshop(
+    const KernelBuilder kernel_builder(
         "echo $$ > $(dirname $0)/pid.new; mv $(dirname $0)/pid.new $(dirname $0)/pid\nexec sleep 30\n");
     const pid_t pid = start_process([] { return !compile(answer).from_cache; });
-    while (!fs::exists(workshop.folder / "pid")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    const pid_t compiler = std::stoi(read_file(workshop.folder / "pid"));
+    while (!fs::exists(kernel_builder.folder / "pid")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const pid_t compiler = std::stoi(read_file(kernel_builder.folder / "pid"));
     ::kill(pid, SIGKILL);
     exit_code_of(pid);
     CHECK_FALSE(is_running(compiler));
@@ -401,12 +401,12 @@ TEST_CASE("a folder without permission to write is named with the reason, but wh
 }
 
 TEST_CASE("a compiler that fails is quoted, and source, command and output are kept") {
-    const Workshop workshop;
-    workshop.set_compiler("echo \"$0: fatal error: no room on the couch\" >&2\nseq 100\nexit 3\n");
-    const std::string compiler = (workshop.folder / "compiler").string();
+    const KernelBuilder kernel_builder;
+    kernel_builder.set_compiler("echo \"$0: fatal error: no room on the couch\" >&2\nseq 100\nexit 3\n");
+    const std::string compiler = (kernel_builder.folder / "compiler").string();
     const std::string message = message_of<MachineError>([] { compile(answer); });
     fs::path kept;
-    for (const auto& file : fs::directory_iterator(workshop.folder / "cache")) kept = file.path();
+    for (const auto& file : fs::directory_iterator(kernel_builder.folder / "cache")) kept = file.path();
     std::string lines;
     for (int i = 1; i < 40; ++i) lines += std::to_string(i) + "\n";
     const std::string command =
@@ -416,33 +416,33 @@ TEST_CASE("a compiler that fails is quoted, and source, command and output are k
     CHECK(message == "the C++ compiler failed with exit code 3.\nCommand: " + command + "\nIts output:\n" + compiler +
                          ": fatal error: no room on the couch\n" + lines +
                          "[...]\nSource, command and whole output are kept in " + kept.string());
-    CHECK(workshop.endings() == std::vector<std::string>{".failed"});
+    CHECK(kernel_builder.endings() == std::vector<std::string>{".failed"});
     CHECK(read_file(kept / "answer.cpp") == answer.text);
     CHECK(read_file(kept / "command") == command + "\n");
     CHECK(read_file(kept / "output").ends_with("\n99\n100\n"));
 }
 
 TEST_CASE("a compiler that writes nothing and calls it success is named") {
-    const Workshop workshop;
-    workshop.set_compiler("exit 0\n");
+    const KernelBuilder kernel_builder;
+    kernel_builder.set_compiler("exit 0\n");
     CHECK(message_of<MachineError>([] { compile(answer); })
-              .starts_with("the C++ compiler " + (workshop.folder / "compiler").string() +
+              .starts_with("the C++ compiler " + (kernel_builder.folder / "compiler").string() +
                            " ended well but wrote no answer.so; correct the environment variable CXX, or unset it to "
                            "use g++ or clang++.\nCommand: "));
-    CHECK(workshop.endings() == std::vector<std::string>{".failed"});
+    CHECK(kernel_builder.endings() == std::vector<std::string>{".failed"});
 }
 
 TEST_CASE("what is kept of a failure goes when the same compilation succeeds") {
-    const Workshop workshop("test -e $(dirname $0)/memory || exit 1\n");
+    const KernelBuilder kernel_builder("test -e $(dirname $0)/memory || exit 1\n");
     CHECK(message_of<MachineError>([] { compile(answer); }) != "");
-    CHECK(workshop.endings() == std::vector<std::string>{".failed"});
-    write_text(workshop.folder / "memory", "");
+    CHECK(kernel_builder.endings() == std::vector<std::string>{".failed"});
+    write_text(kernel_builder.folder / "memory", "");
     compile(answer);
-    CHECK(workshop.endings() == one_entry);
+    CHECK(kernel_builder.endings() == one_entry);
 }
 
 TEST_CASE("a compiler that a signal ended is told apart from one that failed") {
-    const Workshop workshop("kill -9 $$\n");
+    const KernelBuilder kernel_builder("kill -9 $$\n");
     CHECK(message_of<MachineError>([] { compile(answer); })
               .starts_with(
                   "the C++ compiler was ended by signal 9 (Killed); a common cause is too little memory.\nCommand: "));
@@ -471,7 +471,7 @@ TEST_CASE("a program's output is taken up to its limit and not waited for when a
 }
 
 TEST_CASE("the words of the real compiler reach the reader") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const std::string message = message_of<MachineError>([] {
         compile({"wrong", "int answer() { return forty_two; }\n"});
     });
@@ -504,8 +504,8 @@ TEST_CASE("without a compiler people are told what was looked for and what to do
 }
 
 TEST_CASE("a compiler that cannot be started is named with the reason") {
-    const Workshop workshop;
-    const fs::path compiler = workshop.folder / "compiler";
+    const KernelBuilder kernel_builder;
+    const fs::path compiler = kernel_builder.folder / "compiler";
     write_text(compiler, "#!/no/such/interpreter\n");
     CHECK(message_of<MachineError>([] { compile(answer); }) ==
           "cannot run " + compiler.string() + ": exec: No such file or directory");

@@ -15,7 +15,7 @@ using namespace lobatto::test;
 namespace {
 
 // Compiled in a cache of its own; the headers are found in the source tree.
-struct Workshop {
+struct KernelBuilder {
     TemporaryFolder folder;
     EnvironmentVariable cache{"LOBATTO_CACHE_DIR", folder.string()};
     EnvironmentVariable headers{"CPATH", LOBATTO_SOURCE_DIR};
@@ -59,8 +59,8 @@ std::string refusal(const std::string& object, const std::string& expected_diges
     return message.substr(begin.size(), message.size() - begin.size() - end.size());
 }
 
-LoadedStepper<double> pendulum_stepper(const Workshop& workshop, double h) {
-    LoadedStepper<double> stepper(Kernel::load(workshop.build_pendulum(), digest));
+LoadedStepper<double> pendulum_stepper(const KernelBuilder& kernel_builder, double h) {
+    LoadedStepper<double> stepper(Kernel::load(kernel_builder.build_pendulum(), digest));
     REQUIRE(stepper.prepare({2.0, 3.0}, h) == LOBATTO_OK);
     return stepper;
 }
@@ -68,8 +68,8 @@ LoadedStepper<double> pendulum_stepper(const Workshop& workshop, double h) {
 }  // namespace
 
 TEST_CASE("a loaded kernel says what it is") {
-    const Workshop workshop;
-    const Kernel kernel = Kernel::load(workshop.build_pendulum(), digest);
+    const KernelBuilder kernel_builder;
+    const Kernel kernel = Kernel::load(kernel_builder.build_pendulum(), digest);
     CHECK(std::string(kernel->name) == "handwritten_pendulum");
     CHECK(kernel->real_kind == LOBATTO_DOUBLE);
     CHECK(kernel->real_bytes == 8);
@@ -87,26 +87,26 @@ TEST_CASE("a loaded kernel says what it is") {
 }
 
 TEST_CASE("a file that is not a kernel, or not the expected one, is refused with the reason") {
-    const Workshop workshop;
-    const std::string missing = (workshop.folder / "missing.so").string();
+    const KernelBuilder kernel_builder;
+    const std::string missing = (kernel_builder.folder / "missing.so").string();
     CHECK(refusal(missing) == missing + ": cannot open shared object file: No such file or directory");
-    const std::string text = (workshop.folder / "text.so").string();
+    const std::string text = (kernel_builder.folder / "text.so").string();
     write_text(
         text, "not an object, but long enough to be read as the header of one, had it begun with the right four bytes");
     CHECK(refusal(text) == text + ": invalid ELF header");
-    CHECK(refusal(workshop.build("library", "int nothing;\n")) ==
+    CHECK(refusal(kernel_builder.build("library", "int nothing;\n")) ==
           "it has no function lobatto_kernel_table, so it is not a kernel");
-    CHECK(refusal(workshop.build_stub("3", "sizeof(lobatto_kernel)")) ==
+    CHECK(refusal(kernel_builder.build_stub("3", "sizeof(lobatto_kernel)")) ==
           "it speaks version 3 of the kernel interface, this program version 4");
-    CHECK(refusal(workshop.build_stub("LOBATTO_ABI_VERSION", "8")) ==
+    CHECK(refusal(kernel_builder.build_stub("LOBATTO_ABI_VERSION", "8")) ==
           "its function table has 8 bytes instead of " + std::to_string(sizeof(lobatto_kernel)));
-    CHECK(refusal(workshop.build_pendulum(), "fedcba9876543210") ==
+    CHECK(refusal(kernel_builder.build_pendulum(), "fedcba9876543210") ==
           "its formulas have the digest 0123456789abcdef instead of fedcba9876543210");
 }
 
 TEST_CASE("a kernel computes in its own number type only") {
-    const Workshop workshop;
-    const Kernel kernel = Kernel::load(workshop.build_pendulum(), digest);
+    const KernelBuilder kernel_builder;
+    const Kernel kernel = Kernel::load(kernel_builder.build_pendulum(), digest);
     const auto message = [&](auto zero) {
         return message_of<MachineError>([&] { LoadedStepper<decltype(zero)>{kernel}; });
     };
@@ -118,9 +118,9 @@ TEST_CASE("a kernel computes in its own number type only") {
 }
 
 TEST_CASE("the wrapper passes every function of the kernel through") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const double m = 2, omega2 = 9, h = 0.1, q = 0.7, p = 0.4, xi = 0.5 - std::sqrt(0.05);
-    LoadedStepper<double> stepper = pendulum_stepper(workshop, h);
+    LoadedStepper<double> stepper = pendulum_stepper(kernel_builder, h);
     double energy = 0;
     REQUIRE(stepper.energy(0, {q}, {p}, energy) == LOBATTO_OK);
     CHECK(energy == doctest::Approx(p * p / (2 * m) + m * omega2 * (1 - std::cos(q))).epsilon(1e-15));
@@ -146,8 +146,8 @@ TEST_CASE("the wrapper passes every function of the kernel through") {
 }
 
 TEST_CASE("advance records every k-th state, stops when the room is full, and state agrees with the last record") {
-    const Workshop workshop;
-    LoadedStepper<double> stepper = pendulum_stepper(workshop, 0.125);
+    const KernelBuilder kernel_builder;
+    LoadedStepper<double> stepper = pendulum_stepper(kernel_builder, 0.125);
     REQUIRE(stepper.start(1.0, {0.7}, {0.4}) == LOBATTO_OK);
     std::vector<double> records(3 * 4);
     lobatto_advance call{};
@@ -171,8 +171,8 @@ TEST_CASE("advance records every k-th state, stops when the room is full, and st
 }
 
 TEST_CASE("a copied stepper goes its own way, and the way of the original") {
-    const Workshop workshop;
-    LoadedStepper<double> original = pendulum_stepper(workshop, 0.1);
+    const KernelBuilder kernel_builder;
+    LoadedStepper<double> original = pendulum_stepper(kernel_builder, 0.1);
     REQUIRE(original.start(0.0, {2.0}, {0.0}) == LOBATTO_OK);
     lobatto_advance call{};
     call.steps = 10;
@@ -196,8 +196,8 @@ TEST_CASE("a copied stepper goes its own way, and the way of the original") {
 }
 
 TEST_CASE("a kernel stays loaded as long as a stepper uses it") {
-    const Workshop workshop;
-    auto stepper = std::make_unique<LoadedStepper<double>>(Kernel::load(workshop.build_pendulum(), digest));
+    const KernelBuilder kernel_builder;
+    auto stepper = std::make_unique<LoadedStepper<double>>(Kernel::load(kernel_builder.build_pendulum(), digest));
     LoadedStepper<double> moved = std::move(*stepper);
     stepper.reset();
     REQUIRE(moved.prepare({1.0, 1.0}, 0.1) == LOBATTO_OK);
@@ -205,8 +205,8 @@ TEST_CASE("a kernel stays loaded as long as a stepper uses it") {
 }
 
 TEST_CASE("the tangent map of the pendulum's step agrees with differences, and is symplectic") {
-    const Workshop workshop;
-    const LoadedStepper<double> stepper = pendulum_stepper(workshop, 0.2);
+    const KernelBuilder kernel_builder;
+    const LoadedStepper<double> stepper = pendulum_stepper(kernel_builder, 0.2);
     const double q = 1.3, p = -0.8, d = 1e-5;
     std::vector<double> q1, p1, T, q_plus, p_plus, q_minus, p_minus, unused;
     REQUIRE(stepper.tangent(0, {q}, {p}, q1, p1, T) == LOBATTO_OK);
@@ -223,10 +223,10 @@ TEST_CASE("the tangent map of the pendulum's step agrees with differences, and i
 }
 
 TEST_CASE("a kernel of the general form says what it is, and computes in every number type") {
-    const Workshop workshop;
+    const KernelBuilder kernel_builder;
     const auto check = [&]<class real>(const std::string& number, real rounding) {
         INFO(number);
-        const Kernel kernel = Kernel::load(workshop.build_double_pendulum(number), digest);
+        const Kernel kernel = Kernel::load(kernel_builder.build_double_pendulum(number), digest);
         CHECK(kernel->form == LOBATTO_GENERAL);
         CHECK(kernel->nodes == 4);
         CHECK(kernel->unknowns == 6);

@@ -16,7 +16,7 @@ namespace {
 using Quad = __float128;
 
 template <class number, class Tables>
-using Rule = CleanSweeps<HandwrittenChain<number, Tables, 1, Chain::newton>>;
+using Rule = CleanFixedPoint<HandwrittenChain<number, Tables, 1, Chain::newton>>;
 
 // The largest |eta_ij - eta_ji - (gamma_i - gamma_j)| and |beta_i + gamma_i - h| of a rule's coefficients at a step;
 // and of these rounded one by one.

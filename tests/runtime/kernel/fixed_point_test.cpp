@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Steps by sweeps are the steps of Newton's iteration, to rounding; where sweeps cannot contract Newton takes over.
+// Steps by fixed-point iterations are the steps of Newton's iteration, to rounding; where fixed-point iterations cannot
+// contract Newton takes over.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -59,11 +60,11 @@ const char* const plain = "tangent = false";  // the output of kernels that seve
 template <class real>
 double compared(const Motion& motion, const std::string& method, Precision precision, std::int64_t steps) {
     const Derivation derivation = derivation_of(motion, method, plain);
-    const auto swept = path<real>(kernel_in_own_cache(derivation, precision), motion, motion.step, steps);
+    const auto has_fixed_point = path<real>(kernel_in_own_cache(derivation, precision), motion, motion.step, steps);
     const auto newton = path<real>(newton_kernel(derivation, precision), motion, motion.step, steps);
-    CHECK(swept.call.iterations >= steps);
-    CHECK(distance(swept, newton) > 0);  // they did not go the same way
-    return distance(swept, newton);
+    CHECK(has_fixed_point.call.iterations >= steps);
+    CHECK(distance(has_fixed_point, newton) > 0);  // they did not go the same way
+    return distance(has_fixed_point, newton);
 }
 
 const char* const lobatto_4 = "points = 4";
@@ -146,32 +147,32 @@ TEST_SUITE_BEGIN("slow");
 
 // Bounds are in units of epsilon, relative to the largest position or momentum; what was measured is beside each. Where
 // a motion makes more of its rounding (the pendulums) the measured figures are larger.
-TEST_CASE("steps by sweeps are those of Newton's iteration, in double") {
+TEST_CASE("steps by fixed-point iteration are those of Newton's iteration, in double") {
     struct Compared {
         const Motion& motion;
         const char* method;
         double bound;
     };
     const Motion twelve = chain(), ring = lattice();
-    for (const Compared& c :
-         {Compared{pendulum, lobatto_4, 800},             // 102
-          Compared{pendulum, lobatto_9, 400},             // 27
-          Compared{pendulum, gauss_3, 400},               // 57
-          Compared{henon_heiles, lobatto_4, 200},         // 11; its diagonal part is absorbed
-          Compared{kepler, "points = 5", 800},            // 97
-          Compared{double_pendulum, lobatto_4, 1500},     // 174
-          Compared{double_pendulum, lobatto_8, 1500},     // 142
-          Compared{spherical_pendulum, lobatto_4, 4000},  // 546; against long double 37 by sweeps, 509 by Newton
-          Compared{spherical_pendulum, gauss_3, 500},     // 53
-          Compared{driven_pendulum, lobatto_4, 200},      // 21
-          Compared{twelve, lobatto_4, 800},               // 90
-          Compared{ring, "points = 5", 800}, Compared{ring, gauss_3, 800}}) {
+    for (const Compared& c : {Compared{pendulum, lobatto_4, 800},          // 102
+                              Compared{pendulum, lobatto_9, 400},          // 27
+                              Compared{pendulum, gauss_3, 400},            // 57
+                              Compared{henon_heiles, lobatto_4, 200},      // 11; its diagonal part is absorbed
+                              Compared{kepler, "points = 5", 800},         // 97
+                              Compared{double_pendulum, lobatto_4, 1500},  // 174
+                              Compared{double_pendulum, lobatto_8, 1500},  // 142
+                              Compared{spherical_pendulum, lobatto_4,
+                                       4000},  // 546; against long double 37 by fixed-point iterations, 509 by Newton
+                              Compared{spherical_pendulum, gauss_3, 500},  // 53
+                              Compared{driven_pendulum, lobatto_4, 200},   // 21
+                              Compared{twelve, lobatto_4, 800},            // 90
+                              Compared{ring, "points = 5", 800}, Compared{ring, gauss_3, 800}}) {
         INFO(c.motion.body << c.method);
         CHECK(compared<double>(c.motion, c.method, Precision::double_, 200) < c.bound);
     }
 }
 
-TEST_CASE("steps by sweeps are those of Newton's iteration, in float and long double") {
+TEST_CASE("steps by fixed-point iteration are those of Newton's iteration, in float and long double") {
     const Motion ring = lattice();
     for (const Motion* motion : {&pendulum, &double_pendulum, &ring}) {
         INFO(motion->body);
@@ -183,7 +184,7 @@ TEST_CASE("steps by sweeps are those of Newton's iteration, in float and long do
     }
 }
 
-TEST_CASE("steps by sweeps are those of the general path") {
+TEST_CASE("steps by fixed-point iteration are those of the general path") {
     for (const Motion* motion : {&pendulum, &kepler}) {
         const Derivation derivation = derivation_of(*motion, lobatto_4, plain),
                          general = derivation_of(*motion, lobatto_4, plain, true);
@@ -196,7 +197,7 @@ TEST_CASE("steps by sweeps are those of the general path") {
 }
 
 // Five steps, so that all but the first start from the step before.
-TEST_CASE("the map of steps by sweeps is symplectic to rounding, and with a tolerance it is not") {
+TEST_CASE("the map of steps by fixed-point iteration is symplectic to rounding, and with a tolerance it is not") {
     for (const Motion* motion : {&pendulum, &kepler}) {
         const Kernel kernel = kernel_in_own_cache(derivation_of(*motion, lobatto_4), Precision::extended);
         CHECK(map_defect(kernel, *motion, 5, 0) < 1e-13);     // 4e-17 and 7e-15, what the differences leave
@@ -204,7 +205,7 @@ TEST_CASE("the map of steps by sweeps is symplectic to rounding, and with a tole
     }
 }
 
-TEST_CASE("energy does not drift in 100000 steps by sweeps, and with a tolerance it does") {
+TEST_CASE("energy does not drift in 100000 steps by fixed-point iteration, and with a tolerance it does") {
     const Kernel six = kernel_in_own_cache(derivation_of(pendulum, "points = 6"), Precision::double_);
     CHECK(energy_drift(six, pendulum, 100000, 0) < 1e-12);    // 1e-13: rounding, added up
     CHECK(energy_drift(six, pendulum, 100000, 1e-6) > 1e-7);  // 1.2e-6
@@ -243,7 +244,7 @@ TEST_CASE("formulas go along neighbouring coordinates where these stand in rows,
     CHECK_FALSE(claims(scattered));
 }
 
-TEST_CASE("where sweeps cannot contract Newton's iteration takes the step") {
+TEST_CASE("where the fixed-point iteration cannot contract Newton's iteration takes the step") {
     struct Stiff {
         const Motion& motion;
         double step;
@@ -251,10 +252,11 @@ TEST_CASE("where sweeps cannot contract Newton's iteration takes the step") {
         double bound;
     };
     const Motion twelve = chain();
-    for (const Stiff& stiff : {Stiff{pendulum, 2.9 / 1.5, 1, 0},       // h omega = 2.9
-                               Stiff{pendulum, 2.9 / 1.5, 20, 20000},  // 1978: some steps by sweeps, errors grow
-                               Stiff{twelve, 2.5, 50, 0},              // h omega = 5
-                               Stiff{double_pendulum, 0.9, 1, 10}, Stiff{double_pendulum, 0.9, 20, 200}}) {  // 17
+    for (const Stiff& stiff :
+         {Stiff{pendulum, 2.9 / 1.5, 1, 0},       // h omega = 2.9
+          Stiff{pendulum, 2.9 / 1.5, 20, 20000},  // 1978: some steps by fixed-point iterations, errors grow
+          Stiff{twelve, 2.5, 50, 0},              // h omega = 5
+          Stiff{double_pendulum, 0.9, 1, 10}, Stiff{double_pendulum, 0.9, 20, 200}}) {  // 17
         INFO(stiff.motion.body << stiff.steps);
         const Derivation derivation = derivation_of(stiff.motion, lobatto_4, plain);
         const auto with =
@@ -268,7 +270,7 @@ TEST_CASE("where sweeps cannot contract Newton's iteration takes the step") {
     }
 }
 
-TEST_CASE("dense output, events and the tangent map after steps by sweeps are those after Newton's") {
+TEST_CASE("dense output, events and the tangent map after steps by fixed-point iteration are those after Newton's") {
     struct Watched {
         const Motion& motion;
         std::string event;
@@ -306,16 +308,16 @@ TEST_CASE("dense output, events and the tangent map after steps by sweeps are th
             CHECK(stepper.tangent(time, q, p, q1, p1, seen.tangent) == LOBATTO_OK);
             return seen;
         };
-        const Seen swept = look(kernel_in_own_cache(derivation, Precision::double_)),
+        const Seen has_fixed_point = look(kernel_in_own_cache(derivation, Precision::double_)),
                    newton = look(newton_kernel(derivation, Precision::double_));
         INFO(watched.motion.body);
-        CHECK(distance(swept.events, newton.events) < 400);    // 1.1, 0.5, 2.1, 50 epsilon
-        CHECK(distance(swept.between, newton.between) < 400);  // 10.8, 6.1, 6.9, 43
-        CHECK(distance(swept.tangent, newton.tangent) < 300);  // 1.0, 0.2, 0.5, 33
+        CHECK(distance(has_fixed_point.events, newton.events) < 400);    // 1.1, 0.5, 2.1, 50 epsilon
+        CHECK(distance(has_fixed_point.between, newton.between) < 400);  // 10.8, 6.1, 6.9, 43
+        CHECK(distance(has_fixed_point.tangent, newton.tangent) < 300);  // 1.0, 0.2, 0.5, 33
     }
 }
 
-TEST_CASE("steps back in time are taken by sweeps too") {
+TEST_CASE("steps back in time are taken by fixed-point iteration too") {
     for (const Motion* motion : {&pendulum, &double_pendulum}) {
         const Derivation derivation = derivation_of(*motion, lobatto_4, "tangent = false");
         const Kernel kernel = kernel_in_own_cache(derivation, Precision::double_),

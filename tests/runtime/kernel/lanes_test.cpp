@@ -227,8 +227,8 @@ TEST_CASE("the bits of a lane do not depend on its neighbours, nor on which lane
 }
 
 // Stiff in x, so that its quadratic part is taken into the stage map; neighbours of very different amplitude need other
-// numbers of sweeps.
-TEST_CASE("the bits of a lane do not depend on how long its neighbours are swept") {
+// numbers of fixed-point iterations.
+TEST_CASE("the bits of a lane do not depend on how many iterations its neighbours take") {
     const TestMotion stiff{
         "lagrangian = \"x'^2/2 + z'^2/2 - 150*x^2 - 20*(1 - cos(x)) - z^2*x/5 - z^2/2 - 20*z^4\"\n"
         "[coordinates]\nx = { position = 1, velocity = 0 }\nz = { position = 0.3, velocity = 0 }\n",
@@ -324,7 +324,8 @@ TEST_CASE("a trajectory whose step cannot be solved stops alone, with its last g
     for (const double x : kept[4].last) CHECK(std::isfinite(x));
 }
 
-TEST_CASE("a lane whose sweeps cannot contract is led on by Newton's iteration, the others unchanged") {
+TEST_CASE(
+    "a lane whose fixed-point iteration cannot contract is continued by Newton's iteration, the others unchanged") {
     // A force without a function is swept without second derivatives.
     const TestMotion quartic{
         "lagrangian = \"q'^2/2 - k*q^4/4\"\n[coordinates]\nq = { position = 1, velocity = 0.25 }\n"
@@ -353,7 +354,7 @@ TEST_CASE("a lane whose sweeps cannot contract is led on by Newton's iteration, 
     CHECK(distance(stiff[3].last, alone(kernel_alone(quartic, "points = 4"), quartic, 20, first)) < 5000);
 }
 
-TEST_CASE("with second derivatives a lane is swept where one trajectory's sweeps no longer contract") {
+TEST_CASE("with second derivatives a lane is solved where one trajectory's fixed-point iteration no longer contracts") {
     const Kernel& kernel = kernel_for(all[0]);
     TestMotion wide = pendulum;
     wide.step = 0.5;
@@ -401,7 +402,7 @@ TEST_CASE("a lane whose nodes are far from the angles at the start of the step l
     CHECK(distance(mixed[3].last, alone(newton, double_pendulum, 20, start)) < 5000);
 }
 
-TEST_CASE("a pendulum whose nodes move far in a sweep takes the steps of Newton's iteration") {
+TEST_CASE("a pendulum whose nodes move far in an iteration takes the steps of Newton's iteration") {
     TestMotion wide = pendulum;
     wide.step = 1.2;
     const Derivation derivation = derivation_of(pendulum, "points = 9");
@@ -419,8 +420,9 @@ TEST_CASE("a pendulum whose nodes move far in a sweep takes the steps of Newton'
     }
 }
 
-TEST_CASE("a lane that is swept once more from the start of its step leaves the bits of the others") {
-    // Some steps of lane 3 are not solved by sweeps that begin with the step before; sweeps that begin anew solve most.
+TEST_CASE("a lane that is iterated once more from the start of its step leaves the bits of the others") {
+    // Some steps of lane 3 are not solved by fixed-point iterations that begin with the step before; fixed-point
+    // iterations that begin anew solve most.
     TestMotion coarse = double_pendulum;
     coarse.step = 0.2;
     const Kernel& kernel = kernel_for(all[2]);
@@ -457,7 +459,7 @@ template <int width> void print() {
         std::int64_t done[width], iterations[width];
         for (int l = 0; l < width; ++l) {
             parameters[2 * l] = 1 + 0.125 * (first + l);
-            parameters[2 * l + 1] = first + l == 11 ? 14 : 1 + 0.0625 * (first + l);  // 11: beyond what sweeps solve
+            parameters[2 * l + 1] = first + l == 11 ? 14 : 1 + 0.0625 * (first + l);  // 11: beyond what fixed-point iterations solve
             q[l] = first + l == 5 ? 0.0 / 0.0 : 0.25 * (first + l) - 2;
             p[l] = 0.5;
         }

@@ -191,9 +191,9 @@ namespace {
 
 // Rows of neighbours with as many walls as there can be, against their formula by hand. The second variable is the
 // lower one where rows are `reversed`.
-template <int count, int walls, const auto& ends, const auto& runs, bool reversed>
-void check_walls() {
-    INFO("walls " << walls << " of " << count << (reversed ? ", reversed" : ""));
+template <int count, int fixed_ends, const auto& ends, const auto& runs, bool reversed>
+void check_fixed_ends() {
+    INFO("fixed_ends " << fixed_ends << " of " << count << (reversed ? ", reversed" : ""));
     const auto springs = [](auto& rows) {
         const auto d = rows.x[reversed ? 0 : 1] - rows.x[reversed ? 1 : 0];
         const auto force = d + 0.5 * (d * d * d);
@@ -205,7 +205,7 @@ void check_walls() {
     for (int i = 0; i < count; ++i) q[i] = i % 3 - 0.25 * i;
     const auto tension = [&](double d) { return d + 0.5 * (d * d * d); };
     for (int i = 0; i <= count; ++i) {
-        if ((i == 0 && (walls & wall_before) == 0) || (i == count && (walls & wall_behind) == 0)) continue;
+        if ((i == 0 && (fixed_ends & fixed_before) == 0) || (i == count && (fixed_ends & fixed_behind) == 0)) continue;
         const double pull = tension((i < count ? q[i] : 0) - (i > 0 ? q[i - 1] : 0));
         if (i < count) exact[i] += pull;
         if (i > 0) exact[i - 1] -= pull;
@@ -214,11 +214,11 @@ void check_walls() {
         double one_by_one[room]{}, side_by_side[room]{};
         for (int i = 0; adds && i < count; ++i) one_by_one[i] = side_by_side[i] = i;
         if (adds) {
-            OneByOne::add_rows<count, 2, ends, runs, walls>(q, one_by_one, springs);
-            SideBySide::add_rows<count, 2, ends, runs, walls>(q, side_by_side, springs);
+            OneByOne::add_rows<count, 2, ends, runs, fixed_ends>(q, one_by_one, springs);
+            SideBySide::add_rows<count, 2, ends, runs, fixed_ends>(q, side_by_side, springs);
         } else {
-            OneByOne::set_rows<count, 2, ends, runs, walls>(q, one_by_one, springs);
-            SideBySide::set_rows<count, 2, ends, runs, walls>(q, side_by_side, springs);
+            OneByOne::set_rows<count, 2, ends, runs, fixed_ends>(q, one_by_one, springs);
+            SideBySide::set_rows<count, 2, ends, runs, fixed_ends>(q, side_by_side, springs);
         }
         for (int i = 0; i < room; ++i) {
             const double expected = exact[i] + (adds && i < count ? i : 0);
@@ -228,18 +228,18 @@ void check_walls() {
     }
 }
 template <const auto& ends, const auto& runs, int count, bool reversed>
-void check_all_walls() {
-    check_walls<count, no_wall, ends, runs, reversed>();
-    check_walls<count, wall_before, ends, runs, reversed>();
-    check_walls<count, wall_behind, ends, runs, reversed>();
-    check_walls<count, wall_before | wall_behind, ends, runs, reversed>();
+void check_all_fixed_ends() {
+    check_fixed_ends<count, free_ends, ends, runs, reversed>();
+    check_fixed_ends<count, fixed_before, ends, runs, reversed>();
+    check_fixed_ends<count, fixed_behind, ends, runs, reversed>();
+    check_fixed_ends<count, fixed_before | fixed_behind, ends, runs, reversed>();
 }
 constexpr int eleven_reversed[20] = {1, 0, 2, 1, 3, 2, 4, 3, 5, 4, 6, 5, 7, 6, 8, 7, 9, 8, 10, 9};
 constexpr int ten_runs[2] = {0, 10};
 
 }  // namespace
 
-TEST_CASE("a chain on walls: their rows go along with the others") {
-    check_all_walls<spring_ends, spring_runs, 12, false>();
-    check_all_walls<eleven_reversed, ten_runs, 11, true>();
+TEST_CASE("a chain with fixed ends: their rows go along with the others") {
+    check_all_fixed_ends<spring_ends, spring_runs, 12, false>();
+    check_all_fixed_ends<eleven_reversed, ten_runs, 11, true>();
 }

@@ -23,23 +23,23 @@ const char* const program = R"(
 #include "motion.hpp"
 using namespace lobatto;
 using K = kernels::motion;
-static NeighbourSweeps<K, IN_REGISTERS> within;
-static NeighbourSweeps<K, false> through;
-template <class Sweeps> void begin(Sweeps& sweeps, const K::Coefficients& k, double h, double tolerance,
+static NeighbourFixedPoint<K, IN_REGISTERS> within;
+static NeighbourFixedPoint<K, false> through;
+template <class FixedPoint> void begin(FixedPoint& fixed_point, const K::Coefficients& k, double h, double tolerance,
                                    bool prepares = true) {
     double q[K::coordinates], u[K::coordinates], W[K::coordinates];
     for (int i = 0; i < K::coordinates; ++i) q[i] = std::sin(0.3 * i), u[i] = 0.1 * std::cos(i);
-    Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
-    if (prepares) sweeps.prepare(k, h);
-    sweeps.tolerance = tolerance;
-    sweeps.begin(q, u, W);
+    Formulas<K>::minus_acceleration(k, 0.0, static_cast<const double*>(q), +W);
+    if (prepares) fixed_point.prepare(k, h);
+    fixed_point.tolerance = tolerance;
+    fixed_point.begin(q, u, W);
 }
 // W in three ways against W beside the second derivatives, which is computed row by row without any of these.
 template <class How, class Position, class Slope> void accelerate(const K::Coefficients& k, Position q, Slope W) {
     if constexpr (K::autonomous)
-        K::acceleration<How>(k, q, W);
+        K::minus_acceleration<How>(k, q, W);
     else
-        K::acceleration<How>(k, 0.25, q, W);
+        K::minus_acceleration<How>(k, 0.25, q, W);
 }
 static void compare_formulas() {
     constexpr int n = K::coordinates, width = native_lanes<double>, parts = (n + width - 1) / width;
@@ -76,31 +76,31 @@ static void begin_again() {
     if (!same(end[0], end[1])) std::printf("a second run differs\n");
 }
 // A blow that runs into a chain at rest: each step against the same step iterated to rounding with a look at every
-// sweep, in units of the largest displacement. What the first hundred steps, to 1e-2, have measured must not serve.
+// iteration, in units of the largest displacement. What the first hundred steps, to 1e-2, have measured must not serve.
 static void follow_a_blow(double h, double tolerance, double bound) {
-    static NeighbourSweeps<K, IN_REGISTERS> sweeps, looking;
+    static NeighbourFixedPoint<K, IN_REGISTERS> fixed_point, looking;
     double q[K::coordinates] = {}, u[K::coordinates] = {}, W[K::coordinates];
     u[3] = 1.5;
     K::Coefficients k;
     K::prepare(K::Parameters(), h, k);
-    Formulas<K>::acceleration(k, 0.0, static_cast<const double*>(q), +W);
-    sweeps.prepare(k, h);
-    sweeps.begin(q, u, W);
+    Formulas<K>::minus_acceleration(k, 0.0, static_cast<const double*>(q), +W);
+    fixed_point.prepare(k, h);
+    fixed_point.begin(q, u, W);
     double worst = 0;
     int quick = 0;
     const int loose = 100, count = 500;
     for (int i = 0; i < count; ++i) {
-        sweeps.tolerance = i < loose ? 1e-2 : tolerance;
-        looking = sweeps;
+        fixed_point.tolerance = i < loose ? 1e-2 : tolerance;
+        looking = fixed_point;
         looking.tolerance = 0;
         looking.expected = 0;
-        const int before = sweeps.until_measured;
-        if (!looking.step(k, i * h) || !sweeps.step(k, i * h)) std::printf("step %d of a blow failed\n", i);
-        if (sweeps.until_measured == before - 1) ++quick;
+        const int before = fixed_point.until_measured;
+        if (!looking.step(k, i * h) || !fixed_point.step(k, i * h)) std::printf("step %d of a blow failed\n", i);
+        if (fixed_point.until_measured == before - 1) ++quick;
         double difference = 0, displacement = 0;
         for (int c = 0; c < K::coordinates; ++c) {
-            difference = std::fmax(difference, std::fabs(sweeps.q[sweeps.now][c] - looking.q[looking.now][c]));
-            difference = std::fmax(difference, h * std::fabs(sweeps.u[sweeps.now][c] - looking.u[looking.now][c]));
+            difference = std::fmax(difference, std::fabs(fixed_point.q[fixed_point.now][c] - looking.q[looking.now][c]));
+            difference = std::fmax(difference, h * std::fabs(fixed_point.u[fixed_point.now][c] - looking.u[looking.now][c]));
             displacement = std::fmax(displacement, std::fabs(looking.q[looking.now][c] - looking.q[looking.then][c]));
         }
         if (i >= loose) worst = std::fmax(worst, difference / displacement);
@@ -133,7 +133,7 @@ int main() {
                 if (!same(within.u[within.now], through.u[through.now])) std::printf("u differs in step %d\n", i);
                 for (int node = 0; node < K::points; ++node)
                     for (int c = 0; c < K::coordinates; ++c)
-                        if (within.acceleration(node, c) != through.acceleration(node, c))
+                        if (within.minus_acceleration(node, c) != through.minus_acceleration(node, c))
                             std::printf("W differs in step %d\n", i);
                 ++steps;
                 evaluations += within.evaluations;
@@ -182,7 +182,7 @@ TEST_CASE("a step along neighbours has the same bits in registers and in memory,
                 derivation_of(Motion{body, {}, {}, {}, 0.1}, method, "energy = false\ntangent = false");
             REQUIRE(derivation.structure.neighbours);
             const std::string header = emit(derivation).header;
-            CHECK((header.find("_run, lobatto::wall_") != std::string::npos) ==
+            CHECK((header.find("_run, lobatto::fixed_") != std::string::npos) ==
                   (body == hung_chain || body == half_hung_chain));
             write_text(folder / "motion.hpp", header);
             const auto check = [&](const std::vector<std::string>& target, bool runs_here) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "analysis/tradeoff/laboratory.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 
 #include <fmt/format.h>
 
@@ -36,8 +36,9 @@ Member reference_member(const Scene& scene, double wanted) {
 }
 
 // What is measured and on what machine: another text, other measurements.
-std::string subject_of(const Scene& scene, const Workshop& workshop, const Member& reference, double until) {
-    std::string text = measurements_version + workshop.digest(reference) + processor_identity() + exact_text(until);
+std::string subject_of(const Scene& scene, const KernelBuilder& kernel_builder, const Member& reference, double until) {
+    std::string text =
+        measurements_version + kernel_builder.digest(reference) + processor_identity() + exact_text(until);
     for (const auto* values : {&scene.initial_position, &scene.initial_rate})
         for (const GiNaC::ex& value : *values)
             text += " " + exact_text(scene.evaluate(value, "an initial value").to_double());
@@ -57,19 +58,19 @@ double end_of(const Scene& scene) {
     return until;
 }
 
-Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequest request)
+Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequest request)
     : began_(std::chrono::steady_clock::now()),
       scene_(scene),
       request_(std::move(request)),
       start_(scene),
-      workshop_(std::move(derivation)),
-      conserves_(workshop_.derivation().system.autonomous && !workshop_.derivation().system.has_forces()) {
+      kernels_(std::move(derivation)),
+      conserves_(kernels_.derivation().system.autonomous && !kernels_.derivation().system.has_forces()) {
     Member reference = reference_member(scene, request_.wanted);
     const double until = end_of(scene);
-    workshop_.order(reference);
-    for (const Member& member : request_.first) workshop_.order(member);
-    if (!request_.notebook.empty())
-        notebook_ = Notebook(request_.notebook, subject_of(scene_, workshop_, reference, until));
+    kernels_.order(reference);
+    for (const Member& member : request_.first) kernels_.order(member);
+    if (!request_.store.empty())
+        store_ = MeasurementStore(request_.store, subject_of(scene_, kernels_, reference, until));
     ReferenceRequest wish;
     wish.until = until;
     wish.wanted = request_.wanted;
@@ -77,7 +78,7 @@ Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequ
     wish.interrupted = request_.interrupted;
     const auto compute = [&] {
         request_.say("compiling the reference in " + precision_name(reference.precision));
-        const Kernel exact = workshop_.kernel(reference);
+        const Kernel exact = kernels_.kernel(reference);
         request_.say("computing the reference in " + precision_name(reference.precision));
         wish.seconds_limit = reference_share * std::max(left(), request_.seconds / 4);
         reference_ = compute_reference(exact, start_, wish);
@@ -92,50 +93,50 @@ Laboratory::Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequ
     }
 }
 
-double Laboratory::figure(const Measurement& measurement) const {
+double Experiment::figure(const Measurement& measurement) const {
     if (!is_chaotic()) return measurement.error;
     return std::isfinite(measurement.energy_error) ? measurement.energy_error : 1 / measurement.reaches;
 }
 
-double Laboratory::fewest_steps() const {
+double Experiment::fewest_steps() const {
     return std::max(1.0, until() * reference_.frequency / longest_radians);
 }
 
-double Laboratory::elapsed() const {
+double Experiment::elapsed() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
 }
 
-void Laboratory::check_interruption() const {
+void Experiment::check_interruption() const {
     if (request_.interrupted != nullptr && *request_.interrupted != 0) throw Interrupted();
 }
 
-Measurement Laboratory::measure(const Candidate& candidate, bool all) {
+Measurement Experiment::measure(const Candidate& candidate, bool all) {
     check_interruption();
-    const Measurement* const known = notebook_.find(candidate);
+    const Measurement* const known = store_.find(candidate);
     if (known != nullptr && !(all && knows_errors_only(*known))) return *known;
     if (!knows_symmetries_ && candidate.member.precision == Precision::double_) {
         knows_symmetries_ = true;
-        const Kernel kernel = workshop_.kernel(candidate.member);
+        const Kernel kernel = kernels_.kernel(candidate.member);
         const double step = reference_.until / static_cast<double>(candidate.steps);
         const StartIn<double> start = start_in<double>(start_, kernel, step);
         std::vector<std::string> names;
         for (const Coordinate& coordinate : scene_.coordinates) names.push_back(coordinate.name);
         measurer_->know_symmetries(find_symmetries(kernel, start.parameters, start.q, step, names));
     }
-    Measurement measurement = measurer_->measure(workshop_.kernel(candidate.member), candidate, all);
-    measurement.compile_seconds = workshop_.compile_seconds(candidate.member);
-    return notebook_.add(measurement);
+    Measurement measurement = measurer_->measure(kernels_.kernel(candidate.member), candidate, all);
+    measurement.compile_seconds = kernels_.compile_seconds(candidate.member);
+    return store_.add(measurement);
 }
 
-Measurement Laboratory::time_again(const Measurement& measurement, int repetitions) {
+Measurement Experiment::time_again(const Measurement& measurement, int repetitions) {
     Measurement better = measurement;
     for (int i = 0; i < repetitions; ++i) {
         check_interruption();
         const Timing timing =
-            measurer_->time_once(workshop_.kernel(measurement.candidate.member), measurement.candidate);
+            measurer_->time_once(kernels_.kernel(measurement.candidate.member), measurement.candidate);
         if (timing.complete) better.seconds = std::min(better.seconds, timing.seconds);
     }
-    return notebook_.add(better);
+    return store_.add(better);
 }
 
 }  // namespace lobatto

@@ -18,12 +18,12 @@
 namespace lobatto {
 
 // For one thread; the compilers have their own.
-class Workshop {
+class KernelBuilder {
 public:
-    explicit Workshop(Derivation derivation);
-    ~Workshop();  // waits for the compilers at work, a few seconds at most
-    Workshop(const Workshop&) = delete;
-    Workshop& operator=(const Workshop&) = delete;
+    explicit KernelBuilder(Derivation derivation);
+    ~KernelBuilder();  // waits for the compilers at work, a few seconds at most
+    KernelBuilder(const KernelBuilder&) = delete;
+    KernelBuilder& operator=(const KernelBuilder&) = delete;
 
     const Derivation& derivation() const { return derivation_; }
     unsigned threads() const { return static_cast<unsigned>(workers_.size()); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "analysis/tradeoff/workshop.hpp"
+#include "analysis/tradeoff/kernel_builder.hpp"
 
 #include <algorithm>
 
@@ -8,12 +8,12 @@
 
 namespace lobatto {
 
-Workshop::Workshop(Derivation derivation) : derivation_(std::move(derivation)) {
+KernelBuilder::KernelBuilder(Derivation derivation) : derivation_(std::move(derivation)) {
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
         workers_.emplace_back([this] { work(); });
 }
 
-Workshop::~Workshop() {
+KernelBuilder::~KernelBuilder() {
     cancel();
     {
         const std::lock_guard lock(mutex_);
@@ -23,7 +23,7 @@ Workshop::~Workshop() {
     for (std::thread& worker : workers_) worker.join();
 }
 
-void Workshop::cancel() {
+void KernelBuilder::cancel() {
     const std::lock_guard lock(mutex_);
     for (Item* item : queue_) item->cancelled = true;
     queue_.clear();
@@ -31,7 +31,7 @@ void Workshop::cancel() {
         item = item->second.cancelled ? items_.erase(item) : std::next(item);
 }
 
-void Workshop::order(const Member& member) {
+void KernelBuilder::order(const Member& member) {
     if (is_ordered(member)) return;
     EmitOptions options;
     options.precision = member.precision;
@@ -46,19 +46,19 @@ void Workshop::order(const Member& member) {
     ordered_.notify_one();
 }
 
-bool Workshop::is_ready(const Member& member) const {
+bool KernelBuilder::is_ready(const Member& member) const {
     const auto item = items_.find(member);
     const std::lock_guard lock(mutex_);
     return item != items_.end() && item->second.ready;
 }
 
-std::size_t Workshop::waiting() const {
+std::size_t KernelBuilder::waiting() const {
     const std::lock_guard lock(mutex_);
     return static_cast<std::size_t>(
         std::count_if(items_.begin(), items_.end(), [](const auto& item) { return !item.second.ready; }));
 }
 
-Kernel Workshop::kernel(const Member& member) {
+Kernel KernelBuilder::kernel(const Member& member) {
     order(member);
     Item& item = items_.at(member);
     {
@@ -70,13 +70,13 @@ Kernel Workshop::kernel(const Member& member) {
     return *item.kernel;
 }
 
-double Workshop::compile_seconds(const Member& member) const {
+double KernelBuilder::compile_seconds(const Member& member) const {
     const std::lock_guard lock(mutex_);
     const Item& item = items_.at(member);
     return item.compiled ? item.compiled->seconds : 0;
 }
 
-void Workshop::work() {
+void KernelBuilder::work() {
     while (true) {
         Item* item = nullptr;
         {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "analysis/tradeoff/notebook.hpp"
+#include "analysis/tradeoff/measurement_store.hpp"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 
 namespace lobatto {
 
-Notebook::Notebook(const std::string& path, const std::string& subject) : path_(path) {
+MeasurementStore::MeasurementStore(const std::string& path, const std::string& subject) : path_(path) {
     std::string kept = "# " + subject + '\n';
     std::uintmax_t size = 0;
     {
@@ -43,12 +43,12 @@ Notebook::Notebook(const std::string& path, const std::string& subject) : path_(
     if (!file_) throw MachineError(fmt::format("cannot write {}; choose another folder with -o", path));
 }
 
-const Measurement* Notebook::find(const Candidate& candidate) const {
+const Measurement* MeasurementStore::find(const Candidate& candidate) const {
     const auto place = measurements_.find(candidate.key());
     return place == measurements_.end() ? nullptr : &place->second;
 }
 
-const Measurement& Notebook::add(const Measurement& measurement) {
+const Measurement& MeasurementStore::add(const Measurement& measurement) {
     if (file_.is_open()) {
         file_ << json_of(measurement).dump() << '\n' << std::flush;
         if (!file_) throw MachineError(fmt::format("cannot write {}; is the disk full?", path_));

@@ -10,15 +10,15 @@
 
 namespace lobatto {
 
-class Notebook {
+class MeasurementStore {
 public:
     using Key = decltype(std::declval<Candidate>().key());
 
     // Only in memory.
-    Notebook() = default;
+    MeasurementStore() = default;
     // Reads what the file holds when its first line has the same `subject`: what is measured, and on what machine. Else
     // it is begun anew; a torn last line is left out. MachineError when it cannot be written.
-    Notebook(const std::string& path, const std::string& subject);
+    MeasurementStore(const std::string& path, const std::string& subject);
 
     const Measurement* find(const Candidate& candidate) const;
     const Measurement& add(const Measurement& measurement);  // in place of an earlier one of the same candidate

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// All that measuring a scene needs, brought together: its kernels, its reference, a notebook, a clock.
+// All that measuring a scene needs, brought together: its kernels, its reference, a store, a clock.
 #pragma once
 
 #include <chrono>
@@ -8,38 +8,38 @@
 #include <optional>
 #include <string>
 
+#include "analysis/tradeoff/kernel_builder.hpp"
+#include "analysis/tradeoff/measurement_store.hpp"
 #include "analysis/tradeoff/measuring.hpp"
-#include "analysis/tradeoff/notebook.hpp"
-#include "analysis/tradeoff/workshop.hpp"
 
 namespace lobatto {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double most_steps = 1e9;  // of a candidate to the end
 
-struct LaboratoryRequest {
+struct ExperimentRequest {
     double seconds = 20;        // of wall time
     double wanted = 1e-18;      // the disagreement of the two references that is good enough
-    std::string notebook;       // its file; empty: none
+    std::string store;          // its file; empty: none
     std::vector<Member> first;  // kernels that will be needed whatever is found
     const volatile int* interrupted = nullptr;
     std::function<void(const std::string&)> say = [](const std::string&) {};  // what is being done
 };
 
-class Laboratory {
+class Experiment {
 public:
     // `derivation` of the scene as written, which one kernel serves; `scene` with what the command line replaces.
     // Computes the reference. Throws as its parts do; InputError when there is no time to integrate over.
-    Laboratory(Derivation derivation, const Scene& scene, LaboratoryRequest request);
+    Experiment(Derivation derivation, const Scene& scene, ExperimentRequest request);
 
     const Scene& scene() const { return scene_; }
     const Reference& reference() const { return reference_; }
-    Workshop& workshop() { return workshop_; }
-    const Derivation& derivation() const { return workshop_.derivation(); }
+    KernelBuilder& kernel_builder() { return kernels_; }
+    const Derivation& derivation() const { return kernels_.derivation(); }
     const Measurer& measurer() const { return *measurer_; }
-    const Notebook& notebook() const { return notebook_; }
+    const MeasurementStore& store() const { return store_; }
     bool conserves() const { return conserves_; }
-    const LaboratoryRequest& request() const { return request_; }
+    const ExperimentRequest& request() const { return request_; }
 
     // Whether the two references differ by more than the errors that are of interest.
     bool is_chaotic() const { return reference_.disagreement.back() > trusted; }
@@ -57,7 +57,7 @@ public:
     // Throws Interrupted when the flag is raised.
     void check_interruption() const;
 
-    // From the notebook, or measured now, everything or error and time only.
+    // From the store, or measured now, everything or error and time only.
     Measurement measure(const Candidate& candidate, bool all = true);
     // Times it again, `repetitions` times, and keeps the least.
     Measurement time_again(const Measurement& measurement, int repetitions);
@@ -65,13 +65,13 @@ public:
 private:
     std::chrono::steady_clock::time_point began_;
     Scene scene_;
-    LaboratoryRequest request_;
+    ExperimentRequest request_;
     ExactStart start_;
-    Workshop workshop_;
+    KernelBuilder kernels_;
     bool conserves_;
     Reference reference_;
     std::optional<Measurer> measurer_;
-    Notebook notebook_;
+    MeasurementStore store_;
     bool knows_symmetries_ = false;
 };
 
