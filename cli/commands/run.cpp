@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/accuracy/step_judge.hpp"
@@ -136,7 +137,18 @@ std::string event_path(const RunOptions& options, const Scene& scene) {
     return path + ".events.csv";
 }
 
-void run(const RunOptions& options) {
+// A scene, ready to run: its kernel compiled, its start in numbers.
+struct Prepared {
+    Scene scene;
+    Derivation derivation;
+    KernelSource source;
+    Compiled compiled;
+    Kernel kernel;
+    Steps steps;
+    double derivation_seconds;
+};
+
+Prepared prepare(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
@@ -148,37 +160,179 @@ void run(const RunOptions& options) {
     const Steps steps = steps_of(scene, options.overrides);
     Compiled compiled;
     const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
-    LoadedStepper<double> stepper(kernel);
-    TrajectoryRequest request = request_of(scene, steps.count, stepper);
-    const std::string path = output_path(options.output, scene.name + ".csv");
-    const std::size_t event_kinds = scene.outputs.events.size();
-    keep_scene(scene.path, path);
-    if (event_kinds > 0) keep_scene(scene.path, event_path(options, scene));
-    if (!options.quiet) {
-        fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, source.digest, derivation_seconds,
-                   compiled.from_cache ? "found compiled in the cache"
-                                       : fmt::format("compiled in {:.2f} s", compiled.seconds));
+    return {scene, derivation, source, compiled, kernel, steps, derivation_seconds};
+}
+
+// All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
+class Observers {
+public:
+    static inline const std::vector<std::string> names = {"counts", "watch", "step judge", "energy watch"};
+
+    Observers(const Prepared& run, const LoadedStepper<double>& stepper, const std::vector<double>& velocity)
+        : watch(run.scene, run.derivation.structure, stepper, velocity),
+          judge(run.scene),
+          energy(run.derivation, run.kernel),
+          counts(1 + run.scene.outputs.events.size(), 0) {}
+
+    void observe(const Records& records) {
+        watch.observe(records);
+        judge.observe(records);
+        energy.observe(records);
+        counts[0] += static_cast<double>(records.count);
+    }
+    void observe(const EventRecords& records) {
+        for (std::int64_t i = 0; i < records.count; ++i)
+            ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
     }
 
-    const TrajectoryHeader header = header_of(scene, source, request);
-    const std::string run = identity_of(request, header, compiled.object);
+    std::map<std::string, std::vector<double>> save() const {
+        return {
+            {"counts", counts}, {"watch", watch.save()}, {"step judge", judge.save()}, {"energy watch", energy.save()}};
+    }
+    void restore(const std::map<std::string, std::vector<double>>& saved) {
+        counts = saved.at("counts");
+        watch.restore(saved.at("watch"));
+        judge.restore(saved.at("step judge"));
+        energy.restore(saved.at("energy watch"));
+    }
+
+    Watch watch;
+    StepJudge judge;
+    EnergyWatch energy;
+    std::vector<double> counts;  // of the states, and of each kind of event
+};
+
+// The files of a run: its trajectory, its events, and while it goes on its checkpoint.
+class Files {
+public:
+    Files(const RunOptions& options, const Prepared& run, const TrajectoryHeader& header,
+          const std::optional<Checkpoint>& from)
+        : path_(output_path(options.output, run.scene.name + ".csv")),
+          trajectory_(path_, header, from ? from->files[0] : Written()) {
+        if (!run.scene.outputs.events.empty()) {
+            event_path_ = event_path(options, run.scene);
+            events_.emplace(event_path_, event_header_of(run.scene, header), from ? from->files[1] : Written());
+        }
+        if (keeps_checkpoints() && !from) remove_checkpoint(path_);  // of a run that has just lost its files
+    }
+
+    bool keeps_checkpoints() const { return trajectory_.is_regular() && (!events_ || events_->is_regular()); }
+    const std::string& path() const { return path_; }
+    const std::string& events_path() const { return event_path_; }
+
+    void write(const Records& records) { trajectory_.write(records); }
+    void write(const EventRecords& records) { events_->write(records); }
+    void checkpoint(const std::string& run, const Halfway& halfway, const Observers& observers) {
+        Checkpoint checkpoint{run, halfway, {trajectory_.written()}, observers.save()};
+        trajectory_.sync();
+        if (events_) {
+            events_->sync();
+            checkpoint.files.push_back(events_->written());
+        }
+        write_checkpoint(checkpoint_path(path_), checkpoint);
+    }
+    void finish(bool interrupted) {
+        trajectory_.finish();
+        if (events_) events_->finish();
+        if (keeps_checkpoints() && !interrupted) remove_checkpoint(path_);
+    }
+
+private:
+    std::string path_, event_path_;
+    TrajectoryFile trajectory_;
+    std::optional<TrajectoryFile> events_;
+};
+
+// Takes the steps: records go to the files and the observers.
+TrajectoryResult integrate_into(Files& files, Observers& observers, const std::string& identity, const Prepared& run,
+                                TrajectoryRequest& request, bool quiet) {
+    request.sink = [&](const Records& records) {
+        files.write(records);
+        observers.observe(records);
+    };
+    if (!run.scene.outputs.events.empty())
+        request.events = [&](const EventRecords& records) {
+            files.write(records);
+            observers.observe(records);
+        };
+    if (files.keeps_checkpoints())
+        request.checkpoint = [&](const Halfway& halfway) { files.checkpoint(identity, halfway, observers); };
+    Progress progress(request.steps);
+    if (!quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
+    const Interruption interruption;
+    request.interrupted = interruption.flag();
+    const TrajectoryResult result = integrate(run.kernel, request);
+    observers.watch.look_at_end(result);
+    files.finish(result.interrupted);
+    return result;
+}
+
+// Of a run beyond stability whose energy could not tell: that its motion is lost. Empty: it is not.
+std::string loss_of(const Prepared& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                    const std::optional<StepJudge::Judgement>& judgement) {
+    const bool is_lost = judgement && judgement->is_lost() && !result.interrupted && !run.derivation.system.linear &&
+                         !EnergyWatch::can_watch(run.derivation);
+    return is_lost ? StepJudge::loss(*judgement, request, result) : "";
+}
+
+// That a run which went to its end has left the motion of its Lagrangian. Empty: it has not.
+std::string departure_of(const Prepared& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                         const Observers& observers) {
+    if (result.status != LOBATTO_OK || result.interrupted) return "";
+    const std::string departure = observers.energy.departure(run.derivation, run.kernel, request);
+    return departure.empty() ? linear_departure(run.derivation, run.scene, run.kernel, request, result) : departure;
+}
+
+// Ends the command with the error that the run deserves, if any.
+void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, const TrajectoryResult& result,
+                          const std::string& departure, const Files& files) {
+    if (result.status != LOBATTO_OK)
+        throw ComputationError(
+            fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), files.path()));
+    if (!departure.empty())
+        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, files.path()));
+    if (scene.outputs.energy && !std::isfinite(result.energy_error_largest))
+        throw ComputationError(
+            std::isfinite(result.energy_start)
+                ? fmt::format("{}: the energy became infinite or not a number: the motion grows without bound, or has "
+                              "gone where the Lagrangian is not real. Try a smaller step, such as h = {:.6g}, an "
+                              "earlier end, or start elsewhere. What was computed is in {}.",
+                              scene.path, request.step / 2, files.path())
+                : fmt::format("{}: the energy of the start is too large for a number, though the motion is not. Try "
+                              "other units, or energy = false under [output]. What was computed is in {}.",
+                              scene.path, files.path()));
+    if (result.interrupted) {
+        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time,
+                   files.path(),
+                   files.keeps_checkpoints() ? " The same command with --resume goes on from there." : "");
+        throw ExitCode{interrupted_exit};
+    }
+}
+
+void run(const RunOptions& options) {
+    const Prepared run = prepare(options);
+    const Scene& scene = run.scene;
+    LoadedStepper<double> stepper(run.kernel);
+    TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
+    const std::string path = output_path(options.output, scene.name + ".csv");
+    const bool has_events = !scene.outputs.events.empty();
+    keep_scene(scene.path, path);
+    if (has_events) keep_scene(scene.path, event_path(options, scene));
+    if (!options.quiet)
+        fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, run.source.digest, run.derivation_seconds,
+                   run.compiled.from_cache ? "found compiled in the cache"
+                                           : fmt::format("compiled in {:.2f} s", run.compiled.seconds));
+
+    const TrajectoryHeader header = header_of(scene, run.source, request);
+    const std::string identity = identity_of(request, header, run.compiled.object);
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
-    Watch watch(scene, derivation.structure, stepper, velocity);
-    StepJudge judge(scene);
-    EnergyWatch energy_watch(derivation, kernel);
-    std::vector<double> counts(1 + event_kinds, 0);  // of the states and of each kind of event
+    Observers observers(run, stepper, velocity);
     std::optional<Checkpoint> from;
     if (options.resume) {
-        from = checkpoint_of(path, run, kernel, event_kinds > 0 ? 2 : 1, counts.size() + watch.save().size() + 1);
+        from = checkpoint_of(path, identity, run.kernel, has_events ? 2 : 1, Observers::names);
         if (from) {
-            const auto by_watch = from->watched.begin() + std::ssize(counts),
-                       by_energy = by_watch + std::ssize(watch.save()) + 1,
-                       by_judge = by_energy + std::llround(*(by_energy - 1));
-            std::copy(from->watched.begin(), by_watch, counts.begin());
-            watch.restore({by_watch, by_energy - 1});
-            energy_watch.restore({by_energy, by_judge});
-            judge.restore({by_judge, from->watched.end()});
+            observers.restore(from->observers);
             request.from = &from->halfway;
         }
         if (!options.quiet)
@@ -186,97 +340,27 @@ void run(const RunOptions& options) {
                                                     from->halfway.result.steps_done)
                                       : "nothing was left: from the start");
     }
-    TrajectoryFile file(path, header, from ? from->files[0] : Written());
-    std::optional<TrajectoryFile> event_file;
-    if (event_kinds > 0) {
-        event_file.emplace(event_path(options, scene), event_header_of(scene, header),
-                           from ? from->files[1] : Written());
-        request.events = [&](const EventRecords& records) {
-            event_file->write(records);
-            for (std::int64_t i = 0; i < records.count; ++i)
-                ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
-        };
-    }
-    const bool keeps_checkpoints = file.is_regular() && (!event_file || event_file->is_regular());
-    if (keeps_checkpoints) {
-        if (!from) remove_checkpoint(path);  // of a run that has just lost its files
-        request.checkpoint = [&](const Halfway& halfway) {
-            Checkpoint checkpoint{run, halfway, {file.written()}, counts};
-            file.sync();
-            if (event_file) {
-                event_file->sync();
-                checkpoint.files.push_back(event_file->written());
-            }
-            const std::vector<double> by_energy = energy_watch.save();
-            for (const std::vector<double>& seen :
-                 {watch.save(), {static_cast<double>(by_energy.size())}, by_energy, judge.save()})
-                checkpoint.watched.insert(checkpoint.watched.end(), seen.begin(), seen.end());
-            write_checkpoint(checkpoint_path(path), checkpoint);
-        };
-    }
-    request.sink = [&](const Records& records) {
-        file.write(records);
-        watch.observe(records);
-        judge.observe(records);
-        energy_watch.observe(records);
-        counts[0] += static_cast<double>(records.count);
-    };
-    TrajectoryResult result;
-    {
-        Progress progress(request.steps);
-        if (!options.quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
-        const Interruption interruption;
-        request.interrupted = interruption.flag();
-        result = integrate(kernel, request);
-    }
-    watch.look_at_end(result);
-    file.finish();
-    if (event_file) event_file->finish();
-    if (keeps_checkpoints && !result.interrupted) remove_checkpoint(path);
+    Files files(options, run, header, from);
+    const TrajectoryResult result = integrate_into(files, observers, identity, run, request, options.quiet);
 
     std::optional<StepJudge::Judgement> judgement;
-    std::string departure;
-    if (result.status == LOBATTO_OK && result.steps_done > 1) {
-        judgement = judge.judge(derivation, kernel, request, result);
-        if (!result.interrupted && judgement->is_lost() && !derivation.system.linear &&
-            !EnergyWatch::can_watch(derivation))
-            departure = StepJudge::loss(*judgement, request, result);
+    if (result.status == LOBATTO_OK && result.steps_done > 1)
+        judgement = observers.judge.judge(run.derivation, run.kernel, request, result);
+    const std::string loss = loss_of(run, request, result, judgement);
+    if (judgement && loss.empty())
         for (const std::string& warning : StepJudge::warnings(*judgement, scene.run.error))
-            if (departure.empty()) fmt::print(stderr, "lobatto: warning: {}.\n", warning);
-    }
+            fmt::print(stderr, "lobatto: warning: {}.\n", warning);
     if (!options.quiet) {
-        print_table(derivation, scene, stepper, request, result, watch);
+        print_table(run.derivation, scene, stepper, request, result, observers.watch);
         if (judgement) print_row("estimated error", judgement->text());
-        print_events(scene.outputs.events, counts, event_file ? event_path(options, scene) : "");
-        print_row("trajectory", fmt::format("{}, {} {}", path, counts[0], counts[0] == 1 ? "state" : "states"));
-        if (!steps.reaches_end)
+        print_events(scene.outputs.events, observers.counts, files.events_path());
+        const double states = observers.counts[0];
+        print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
+        if (!run.steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
-    if (result.status != LOBATTO_OK) {
-        throw ComputationError(
-            fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), path));
-    }
-    if (!result.interrupted && departure.empty()) departure = energy_watch.departure(derivation, kernel, request);
-    if (!result.interrupted && departure.empty())
-        departure = linear_departure(derivation, scene, kernel, request, result);
-    if (!departure.empty())
-        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, path));
-    if (scene.outputs.energy && !std::isfinite(result.energy_error_largest)) {
-        throw ComputationError(
-            std::isfinite(result.energy_start)
-                ? fmt::format("{}: the energy became infinite or not a number: the motion grows without bound, or has "
-                              "gone where the Lagrangian is not real. Try a smaller step, such as h = {:.6g}, an "
-                              "earlier end, or start elsewhere. What was computed is in {}.",
-                              scene.path, request.step / 2, path)
-                : fmt::format("{}: the energy of the start is too large for a number, though the motion is not. Try "
-                              "other units, or energy = false under [output]. What was computed is in {}.",
-                              scene.path, path));
-    }
-    if (result.interrupted) {
-        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, path,
-                   keeps_checkpoints ? " The same command with --resume goes on from there." : "");
-        throw ExitCode{interrupted_exit};
-    }
+    fail_where_it_failed(scene, request, result, loss.empty() ? departure_of(run, request, result, observers) : loss,
+                         files);
 }
 
 }  // namespace

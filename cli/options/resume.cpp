@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "generator/formula/source.hpp"
@@ -34,7 +35,7 @@ void remove_checkpoint(const std::string& trajectory) {
 }
 
 std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std::string& run, const Kernel& kernel,
-                                        std::size_t files, std::size_t watched) {
+                                        std::size_t files, const std::vector<std::string>& observers) {
     const std::string path = checkpoint_path(trajectory);
     std::optional<Checkpoint> found = read_checkpoint(path);
     if (!found) return found;
@@ -44,8 +45,10 @@ std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std
                         path, what));
     const auto n = static_cast<std::size_t>(kernel->coordinates);
     const TrajectoryResult& result = found->halfway.result;
-    if (found->files.size() != files || found->watched.size() < watched ||
-        std::ssize(found->halfway.stepper) != kernel->stepper_bytes || result.q.size() != n || result.p.size() != n)
+    const bool has_all = std::all_of(observers.begin(), observers.end(),
+                                     [&](const std::string& name) { return found->observers.contains(name); });
+    if (found->files.size() != files || !has_all || std::ssize(found->halfway.stepper) != kernel->stepper_bytes ||
+        result.q.size() != n || result.p.size() != n)
         throw MachineError(
             fmt::format("cannot go on from {}: it is damaged. Run without --resume to begin anew", path));
     return found;

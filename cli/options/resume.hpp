@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "runtime/build/library.hpp"
 #include "runtime/run/checkpoint.hpp"
@@ -20,8 +21,8 @@ inline std::string checkpoint_path(const std::string& trajectory) {
 void remove_checkpoint(const std::string& trajectory);
 
 // The checkpoint beside the trajectory; nothing when there is none. InputError when it is another run's, MachineError
-// when it cannot be used. `files`, `watched`: how many files and, at least, other numbers the run has.
+// when it cannot be used. `files`, `observers`: how many files the run has, and which observers.
 std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std::string& run, const Kernel& kernel,
-                                        std::size_t files, std::size_t watched);
+                                        std::size_t files, const std::vector<std::string>& observers);
 
 }  // namespace lobatto

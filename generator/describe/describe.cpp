@@ -26,9 +26,10 @@ unsigned at(std::size_t index) {
     return static_cast<unsigned>(index);
 }
 
-class Describer {
+// The description as it is written: its symbols under names that people know, its formulas in sections.
+class DescriptionWriter {
 public:
-    explicit Describer(const Derivation& derivation)
+    explicit DescriptionWriter(const Derivation& derivation)
         : d_(derivation),
           n_(static_cast<std::size_t>(derivation.system.n)),
           s_(static_cast<std::size_t>(derivation.quadrature.points)),
@@ -62,32 +63,7 @@ public:
                 for (std::size_t k = 0; k < n_; ++k) rename(disc.Y[i][k], fmt::format("{}_stage_{}", name(k), i));
     }
 
-    Description run() {
-        result_.name = d_.scene.name;
-        result_.title = d_.scene.title;
-        result_.findings = d_.structure.findings;
-        facts();
-        quadrature();
-        if (general_)
-            general_system();
-        else
-            separable_system();
-        if (written_out_ && !general_) discrete_equations();
-        if (general_) {
-            if (written_out_) general_equations();
-            if (!d_.structure.routhian.cyclic.empty()) routhian();
-            general_step();
-        } else if (written_out_) {
-            if (lobatto_) full_system();
-            if (d_.structure.form == Form::linear_map && n_ == 1)
-                propagation_of_one();
-            else
-                reduced_system();
-        }
-        return std::move(result_);
-    }
-
-private:
+protected:
     std::string name(std::size_t k) const { return d_.scene.coordinates[k].name; }
 
     // A symbol of the derivation under a name that no other symbol has.
@@ -153,6 +129,30 @@ private:
         for (ex& value : formula.values) value = shown(value);
         result_.sections.back().formulas.push_back(std::move(formula));
     }
+
+    GiNaC::symbol momentum_symbol(std::size_t k) {
+        while (p_.size() <= k) {
+            p_.emplace_back("p");
+            std::string wish = by_coordinate("p")[p_.size() - 1];
+            rename(p_.back(), wish);
+        }
+        return p_[k];
+    }
+
+    const Derivation& d_;
+    std::size_t n_, s_, controls_;
+    bool lobatto_, general_, written_out_, is_paper_scheme_;
+    std::set<std::string> taken_;
+    GiNaC::exmap display_;
+    std::map<ex, std::string, GiNaC::ex_is_less> names_;
+    std::vector<GiNaC::symbol> p_;
+    Description result_;
+};
+
+// The system and its quadrature.
+class SystemDescriber : protected DescriptionWriter {
+protected:
+    using DescriptionWriter::DescriptionWriter;
 
     void facts() {
         auto& facts = result_.facts;
@@ -400,15 +400,39 @@ private:
         vector("arrival_momentum", "D30", "", "arrival, explicit: the momentum after the step", {"p_1"},
                {slope(controls_ - 1)});
     }
-    GiNaC::symbol momentum_symbol(std::size_t k) {
-        while (p_.size() <= k) {
-            p_.emplace_back("p");
-            std::string wish = by_coordinate("p")[p_.size() - 1];
-            rename(p_.back(), wish);
+};
+
+// The equations of a step.
+class Describer : SystemDescriber {
+public:
+    using SystemDescriber::SystemDescriber;
+
+    Description run() {
+        result_.name = d_.scene.name;
+        result_.title = d_.scene.title;
+        result_.findings = d_.structure.findings;
+        facts();
+        quadrature();
+        if (general_)
+            general_system();
+        else
+            separable_system();
+        if (written_out_ && !general_) discrete_equations();
+        if (general_) {
+            if (written_out_) general_equations();
+            if (!d_.structure.routhian.cyclic.empty()) routhian();
+            general_step();
+        } else if (written_out_) {
+            if (lobatto_) full_system();
+            if (d_.structure.form == Form::linear_map && n_ == 1)
+                propagation_of_one();
+            else
+                reduced_system();
         }
-        return p_[k];
+        return std::move(result_);
     }
 
+private:
     void discrete_equations() {
         const Discretisation& disc = d_.discretisation();
         const bool linear = d_.structure.linear;
@@ -571,15 +595,6 @@ private:
                 (force.is_zero() ? ex(0) : 2 * h * force * symbol("e_p") * disc.Q[0][0])) /
                    (2 * symbol("delta")));
     }
-
-    const Derivation& d_;
-    std::size_t n_, s_, controls_;
-    bool lobatto_, general_, written_out_, is_paper_scheme_;
-    std::set<std::string> taken_;
-    GiNaC::exmap display_;
-    std::map<ex, std::string, GiNaC::ex_is_less> names_;
-    std::vector<GiNaC::symbol> p_;
-    Description result_;
 };
 
 }  // namespace

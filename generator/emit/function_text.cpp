@@ -85,149 +85,175 @@ Hoisted::Hoisted(const Programs& programs) {
     }
 }
 
-FunctionText::FunctionText(const Programs& programs, const std::vector<Output>& statements, const Naming& external,
-                           const FunctionStyle& style) {
-    const Graph& graph = programs.graph;
-    const char* const type = style.any_number ? "auto" : "real";
-    std::vector<Id> roots;
-    for (const Output& statement : statements) roots.push_back(statement.value);
+namespace {
+
+constexpr const char* deeper = "            ";  // of continuation lines
+
+// One body under way: what it computes, under which names, and its lines so far.
+class BodyWriter {
+public:
+    BodyWriter(const Programs& programs, const std::vector<Output>& statements, const Naming& external,
+               const FunctionStyle& style)
+        : graph_(programs.graph), statements_(statements), external_(external), style_(style) {
+        for (const Output& statement : statements) collect(statement.value);
+        for (const Id id : computed_)
+            if (graph_[id].op == Op::pair_sine || graph_[id].op == Op::pair_cosine)
+                pairs_[graph_[id].operands[0]].push_back(id);
+        for (const auto& [id, name] : programs.names) suggested_.emplace(id, name);
+        reserve_names();
+        name_inputs();
+    }
+
+    std::string text() {
+        for (const Output& statement : statements_) {
+            // The root itself is printed in its assignment, unless others use it too.
+            if (is_field(statement) && !local_.contains(statement.value)) {
+                for (const Id operand : graph_[statement.value].operands) compute(operand);
+                emitted_.insert(statement.value);
+            } else {
+                compute(statement.value);
+            }
+            assign(statement);
+        }
+        return aliases_ + text_;
+    }
+
+private:
+    const char* type() const { return style_.any_number ? "auto" : "real"; }
+    static bool is_field(const Output& statement) { return statement.target.starts_with("k."); }
+
     // What this function computes: everything below the roots that is not given.
-    std::vector<Id> computed;
-    std::set<Id> here;
-    std::map<Id, int> uses;
-    {
-        std::set<Id> seen;
-        const std::function<void(Id)> visit = [&](Id id) {
-            ++uses[id];
-            if (!seen.insert(id).second) return;
-            if (graph.is_constant(id) || graph[id].op == Op::input ||
-                (graph[id].phase <= style.given && !external(id).empty()))
-                return;
-            for (const Id operand : graph[id].operands) visit(operand);
-            computed.push_back(id);
-            here.insert(id);
-        };
-        for (const Id root : roots) visit(root);
+    void collect(Id id) {
+        ++uses_[id];
+        if (!seen_.insert(id).second) return;
+        if (graph_.is_constant(id) || graph_[id].op == Op::input ||
+            (graph_[id].phase <= style_.given && !external_(id).empty()))
+            return;
+        for (const Id operand : graph_[id].operands) collect(operand);
+        computed_.push_back(id);
+        here_.insert(id);
     }
-    std::map<Id, std::vector<Id>> pairs;
-    for (const Id id : computed)
-        if (graph[id].op == Op::pair_sine || graph[id].op == Op::pair_cosine)
-            pairs[graph[id].operands[0]].push_back(id);
 
-    // Local names: scene names for inputs such as q[0], then temporaries.
-    std::set<std::string> taken;
-    for (const Input& input : graph.inputs()) taken.insert(input.code.substr(0, input.code.find('[')));
-    for (const char* name :
-         {"k",     "p",    "h",   "q",  "u",        "v",    "W",     "S",        "Q",          "F",     "J", "W0",
-          "W1",    "q1",   "p1",  "u1", "W_before", "base", "delta", "velocity", "z",          "g",     "R", "H",
-          "value", "rows", "how", "Lv", "Lq",       "M",    "S0",    "time",     "not_finite", "Status"})
-        taken.insert(name);
-    if (!style.angles.empty()) taken.insert("angle");
-    const auto take = [&taken](const std::string& name) {  // false when it has another meaning
-        return !is_member_name(name) && taken.insert(name).second;
-    };
-    std::map<Id, std::string> local;
-    std::string aliases;
-    for (const auto& [id, count] : uses) {
-        if (graph[id].op != Op::input || graph[id].phase <= Phase::step_size) continue;
-        const Input& input = graph.input_of(id);
-        if (input.name == input.code || !is_identifier(input.name)) continue;
-        const std::string name = identifier(input.name);
-        if (!take(name)) continue;
-        local[id] = name;
-        aliases += fmt::format("        const {} {} = {};\n", type, name, input.code);
+    // Names that have a meaning in the function already: its inputs, the parameters of all functions, and what
+    // prepare() and the loops call their own.
+    void reserve_names() {
+        for (const Input& input : graph_.inputs()) taken_.insert(input.code.substr(0, input.code.find('[')));
+        for (const Form form : {Form::separable, Form::general})
+            for (const Declaration& declaration : declarations(form))
+                for (const auto& [type, name] : declaration.parameters) taken_.insert(name);
+        taken_.insert({"k", "p", "h", "time", "rows", "how", "Status"});
+        if (!style_.angles.empty()) taken_.insert("angle");
     }
-    std::map<Id, std::string> suggested;
-    for (const auto& [id, name] : programs.names) suggested.emplace(id, name);
-    int counter = 0;
-    const auto fresh = [&](const std::string& wish) {
+    bool take(const std::string& name) {  // false when it has another meaning
+        return !is_member_name(name) && taken_.insert(name).second;
+    }
+    std::string fresh(const std::string& wish) {
         std::string name = wish;
-        while (name.empty() || !take(name)) name = fmt::format("t{}", ++counter);
+        while (name.empty() || !take(name)) name = fmt::format("t{}", ++counter_);
         return name;
-    };
-    const Naming naming = [&](Id id) -> std::string {
-        if (const auto known = local.find(id); known != local.end()) return known->second;
-        return graph.is_constant(id) ? "" : external(id);
-    };
-    const auto print = [&](Id id) { return formula(graph, id, style.notation, naming, style.precision, style.fuses); };
-    const auto text_of = [&](Id id) {
-        const std::string name = naming(id);
-        return name.empty() ? print(id) : name;
-    };
+    }
+    // Inputs such as q[0] under the names of the scene.
+    void name_inputs() {
+        for (const auto& [id, count] : uses_) {
+            if (graph_[id].op != Op::input || graph_[id].phase <= Phase::step_size) continue;
+            const Input& input = graph_.input_of(id);
+            if (input.name == input.code || !is_identifier(input.name)) continue;
+            const std::string name = identifier(input.name);
+            if (!take(name)) continue;
+            local_[id] = name;
+            aliases_ += fmt::format("        const {} {} = {};\n", type(), name, input.code);
+        }
+    }
 
-    const auto assign = [&](const Output& statement) {
+    std::string name_of(Id id) const {
+        if (const auto known = local_.find(id); known != local_.end()) return known->second;
+        return graph_.is_constant(id) ? "" : external_(id);
+    }
+    std::string print(Id id) const {
+        return formula(
+            graph_, id, style_.notation, [this](Id other) { return name_of(other); }, style_.precision, style_.fuses);
+    }
+    std::string text_of(Id id) const {
+        const std::string name = name_of(id);
+        return name.empty() ? print(id) : name;
+    }
+    void line(const std::string& statement) { text_ += wrapped("        " + statement, deeper); }
+
+    void assign(const Output& statement) {
         static const std::map<Effect, const char*> forms = {{Effect::assign, "{} = {};"},
                                                             {Effect::add, "{} += {};"},
                                                             {Effect::subtract, "{} -= {};"},
                                                             {Effect::declare, "const real {} = {};"},
                                                             {Effect::give_back, "{}return {};"}};
-        text_ += wrapped("        " + fmt::format(fmt::runtime(forms.at(statement.effect)), statement.target,
-                                                  text_of(statement.value)),
-                         "            ");
-        // A field of k or a local constant may serve as the value's name from here on.
-        if (statement.target.rfind("k.", 0) == 0 && !local.contains(statement.value) &&
-            graph[statement.value].op != Op::input)
-            local[statement.value] = statement.target;
-    };
-    std::set<Id> emitted;
-    const std::function<void(Id)> compute = [&](Id id) {
-        if (!emitted.insert(id).second || !here.contains(id)) return;
-        if (local.contains(id)) return;
-        for (const Id operand : graph[id].operands) compute(operand);
-        const Node& node = graph[id];
-        if (node.op == Op::pair_sine || node.op == Op::pair_cosine) {
-            const auto& both = pairs[node.operands[0]];
-            if (both.size() == 2) {
-                if (local.contains(id)) return;
-                const Id argument = graph[node.operands[0]].operands[0];
-                const std::string text = text_of(argument);
-                const std::string suffix = is_identifier(text)               ? text
-                                           : graph[argument].op == Op::input ? graph.input_of(argument).name
-                                                                             : "";
-                for (const Id half : both) {
-                    const bool sine = graph[half].op == Op::pair_sine;
-                    local[half] = fresh(is_identifier(suffix) ? (sine ? "sin_" : "cos_") + suffix : "");
-                }
-                const Id sine = graph[both[0]].op == Op::pair_sine ? both[0] : both[1];
-                const Id cosine = graph[both[0]].op == Op::pair_sine ? both[1] : both[0];
-                if (style.notation == Notation::plain) {
-                    for (const Id half : {sine, cosine})
-                        text_ += wrapped(fmt::format("        const real {} = std::{}({});", local[half],
-                                                     half == sine ? "sin" : "cos", text),
-                                         "            ");
-                    return;
-                }
-                text_ += fmt::format("        {} {}, {};\n", style.any_number ? "number" : "real", local[sine],
-                                     local[cosine]);
-                const auto angle = style.angles.find(node.operands[0]);
-                const std::string function =
-                    angle == style.angles.end() ? "lobatto::sincos(" : fmt::format("angle.sincos({}, ", angle->second);
-                text_ += wrapped(fmt::format("        {}{}, {}, {});", function, text, local[sine], local[cosine]),
-                                 "            ");
-                return;
-            }
-        }
-        if (node.op == Op::sincos_pair) return;
-        if (uses[id] > 1) {
-            const auto wish = suggested.find(id);
-            const std::string name = fresh(wish == suggested.end() ? "" : wish->second);
-            text_ += wrapped(fmt::format("        const {} {} = {};", type, name, print(id)), "            ");
-            local[id] = name;
-        }
-    };
-    for (const Output& statement : statements) {
-        // The root itself is printed in its assignment, unless others use it too.
-        const bool is_field = statement.target.rfind("k.", 0) == 0;
-        if (is_field && !local.contains(statement.value)) {
-            for (const Id operand : graph[statement.value].operands) compute(operand);
-            emitted.insert(statement.value);
-        } else {
-            compute(statement.value);
-        }
-        assign(statement);
+        line(fmt::format(fmt::runtime(forms.at(statement.effect)), statement.target, text_of(statement.value)));
+        // A field of k may serve as the value's name from here on.
+        if (is_field(statement) && !local_.contains(statement.value) && graph_[statement.value].op != Op::input)
+            local_[statement.value] = statement.target;
     }
-    text_ = aliases + text_;
-}
+
+    // The lines of a value and of what it is computed from, where they are used more than once.
+    void compute(Id id) {
+        if (!emitted_.insert(id).second || !here_.contains(id) || local_.contains(id)) return;
+        for (const Id operand : graph_[id].operands) compute(operand);
+        const Node& node = graph_[id];
+        const bool is_half = node.op == Op::pair_sine || node.op == Op::pair_cosine;
+        if (is_half && pairs_[node.operands[0]].size() == 2) {
+            if (!local_.contains(id)) compute_pair(node.operands[0]);
+            return;
+        }
+        if (node.op == Op::sincos_pair || uses_[id] <= 1) return;
+        const auto wish = suggested_.find(id);
+        const std::string name = fresh(wish == suggested_.end() ? "" : wish->second);
+        line(fmt::format("const {} {} = {};", type(), name, print(id)));
+        local_[id] = name;
+    }
+
+    // Sine and cosine of one argument together.
+    void compute_pair(Id pair) {
+        const std::vector<Id>& both = pairs_[pair];
+        const Id argument = graph_[pair].operands[0];
+        const std::string text = text_of(argument);
+        const std::string suffix = is_identifier(text)                ? text
+                                   : graph_[argument].op == Op::input ? graph_.input_of(argument).name
+                                                                      : "";
+        for (const Id half : both) {
+            const bool sine = graph_[half].op == Op::pair_sine;
+            local_[half] = fresh(is_identifier(suffix) ? (sine ? "sin_" : "cos_") + suffix : "");
+        }
+        const bool sine_first = graph_[both[0]].op == Op::pair_sine;
+        const std::string &sine = local_[both[sine_first ? 0 : 1]], &cosine = local_[both[sine_first ? 1 : 0]];
+        if (style_.notation == Notation::plain) {
+            line(fmt::format("const real {} = std::sin({});", sine, text));
+            line(fmt::format("const real {} = std::cos({});", cosine, text));
+            return;
+        }
+        line(fmt::format("{} {}, {};", style_.any_number ? "number" : "real", sine, cosine));
+        const auto angle = style_.angles.find(pair);
+        line(fmt::format(
+            "{}{}, {}, {});",
+            angle == style_.angles.end() ? "lobatto::sincos(" : fmt::format("angle.sincos({}, ", angle->second), text,
+            sine, cosine));
+    }
+
+    const Graph& graph_;
+    const std::vector<Output>& statements_;
+    const Naming& external_;
+    const FunctionStyle& style_;
+    std::vector<Id> computed_;            // operands before users
+    std::set<Id> seen_, here_, emitted_;  // visited; computed here; printed
+    std::map<Id, int> uses_;
+    std::map<Id, std::vector<Id>> pairs_;  // of sine and cosine, by their pair
+    std::map<Id, std::string> suggested_, local_;
+    std::set<std::string> taken_;
+    int counter_ = 0;
+    std::string aliases_, text_;
+};
+
+}  // namespace
+
+FunctionText::FunctionText(const Programs& programs, const std::vector<Output>& statements, const Naming& external,
+                           const FunctionStyle& style)
+    : text_(BodyWriter(programs, statements, external, style).text()) {}
 
 std::string wrapped(const std::string& line, const std::string& indent) {
     constexpr std::size_t limit = 120;

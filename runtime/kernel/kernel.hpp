@@ -17,6 +17,8 @@
 #include "iteration/ensemble_fixed_point.hpp"
 #include "iteration/fixed_point.hpp"
 #include "iteration/galerkin.hpp"
+#include "iteration/galerkin_equations.hpp"
+#include "iteration/galerkin_newton.hpp"
 #include "iteration/neighbours.hpp"
 #include "iteration/newton.hpp"
 #include "iteration/stage_equations.hpp"

@@ -100,7 +100,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
     const std::string& memory = checkpoint.halfway.stepper;
     const Json whole = {checkpoint.run, packed(checkpoint.halfway.result),
                         Json::binary(std::vector<std::uint8_t>(memory.begin(), memory.end())), packed(checkpoint.files),
-                        checkpoint.watched};
+                        checkpoint.observers};
     std::string bytes;
     Json::to_cbor(whole, bytes);
     write_whole(path, "the checkpoint", sha256(bytes) + '\n' + bytes);
@@ -117,7 +117,7 @@ std::optional<Checkpoint> read_checkpoint(const std::string& path) {
         return Checkpoint{whole.at(0).get<std::string>(),
                           {unpacked(whole.at(1)), std::string(memory.begin(), memory.end())},
                           files_of(whole.at(3)),
-                          whole.at(4).get<std::vector<double>>()};
+                          whole.at(4).get<std::map<std::string, std::vector<double>>>()};
     } catch (const Json::exception&) {
         fail(path, "it was written by another version of Lobatto");
     }

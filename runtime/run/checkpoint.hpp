@@ -2,6 +2,7 @@
 // A run that was stopped, in a file beside its trajectory, so that it can go on as if it never had been.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,8 +15,8 @@ namespace lobatto {
 struct Checkpoint {
     std::string run;  // which run it is, in lines "what: value"; a run with other lines cannot go on from here
     Halfway halfway;
-    std::vector<Written> files;   // the run's files at that moment
-    std::vector<double> watched;  // what else was measured so far, in an order of the caller's
+    std::vector<Written> files;  // the run's files at that moment
+    std::map<std::string, std::vector<double>> observers;  // what each had saved, by its name
 };
 
 // Appears whole or not at all, and is on the disk before the one of before goes. MachineError as PartialFile.
