@@ -261,7 +261,7 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
     if (!quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
     const Interruption interruption;
     request.interrupted = interruption.flag();
-    const TrajectoryResult result = integrate(run.kernel, request);
+    TrajectoryResult result = integrate(run.kernel, request);
     observers.watch.look_at_end(result);
     files.finish(result.interrupted);
     return result;

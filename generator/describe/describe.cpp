@@ -239,9 +239,9 @@ protected:
         };
         std::vector<ex> nodes, kicks, drifts;
         for (std::size_t i = 0; i < s_; ++i) {
-            nodes.push_back(decimal_of(q.c[i]));
-            kicks.push_back(decimal_of(q.b[i]));
-            if (i + 1 < s_) drifts.push_back(decimal_of(q.c[i + 1] - q.c[i]));
+            nodes.emplace_back(decimal_of(q.c[i]));
+            kicks.emplace_back(decimal_of(q.b[i]));
+            if (i + 1 < s_) drifts.emplace_back(decimal_of(q.c[i + 1] - q.c[i]));
         }
         section("The path, straight from node to node");
         vector("nodes", "D40", "", "nodes", numbered("c", s_), nodes);

@@ -19,7 +19,7 @@ struct LongReal {
     LongReal() = default;
     LongReal(const GiNaC::numeric& rational) : value(to_float(cln::the<cln::cl_R>(rational.to_cl_N()))) {}
     LongReal(int integer) : value(to_float(integer)) {}
-    explicit LongReal(cln::cl_F real) : value(std::move(real)) {}
+    explicit LongReal(const cln::cl_F& real) : value(real) {}
 
     static constexpr bool exact = false;
     bool is_zero() const { return is_noise(value); }

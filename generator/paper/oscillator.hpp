@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "generator/paper/paper.hpp"
+#include "generator/paper/symbols.hpp"
 
 namespace lobatto::paper {
 

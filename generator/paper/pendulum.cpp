@@ -9,7 +9,6 @@ namespace lobatto::paper {
 
 using GiNaC::ex;
 using GiNaC::exmap;
-using GiNaC::numeric;
 using GiNaC::pow;
 
 namespace {

@@ -16,8 +16,6 @@
 
 #include "runtime/error.hpp"
 
-extern char** environ;
-
 namespace lobatto {
 namespace {
 
