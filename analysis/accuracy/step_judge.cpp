@@ -206,8 +206,8 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
 
 std::string StepJudge::Judgement::text() const {
     if (error >= 1) return "as large as the motion itself";
-    const char* const supposed = neighbours == Neighbours::unknown        ? ", if neighbouring motions stay near"
-                                 : neighbours == Neighbours::part_quickly ? "; neighbouring motions part quickly"
+    const char* const supposed = neighbours == Neighbours::unknown        ? ", if nearby trajectories stay near"
+                                 : neighbours == Neighbours::part_quickly ? "; nearby trajectories diverge quickly"
                                                                           : "";
     return fmt::format("{:.1g} of the amplitude at the end{}", error, supposed);
 }
@@ -232,7 +232,7 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
             judgement.radians, judgement.limit, judgement.limit / judgement.radians));
     if (judgement.unresolved)
         texts.push_back(fmt::format(
-            "in step {}, from t = {:.6g} on, the motion is not resolved: half the step would take it elsewhere, or the "
+            "in step {}, from t = {:.6g} on, the motion is not resolved: half the step leads to another place, or the "
             "step jumps over a singularity. Take a shorter step, or coordinates without a singularity there",
             judgement.unresolved->step, judgement.unresolved->time));
     if (wanted_error > 0 && judgement.error > far * wanted_error)

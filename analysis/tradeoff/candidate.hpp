@@ -66,7 +66,7 @@ struct Measurement {
     double error = 0;            // the largest at the times that are compared
     double reaches = 0;          // until when its error was below 0.01
     double energy_error = 0;     // the largest; not a number where energy is not conserved
-    double drift = 0;            // the slope of a straight line through it, a unit of time
+    double drift = 0;            // the slope of a straight line through it, per unit of time
     double momentum_error = 0;   // the largest change of a conserved momentum; not a number where none is known
     double defect = 0;           // symplectic, of the first step; not a number where it is not promised or left out
     double jump = 0;             // between the polynomials of neighbouring steps (Evidence); 0: none

@@ -72,7 +72,7 @@ std::string stability_text(const Choice& choice) {
 std::string with_choice(const std::string& text, const Choice& choice, double error, bool until) {
     std::vector<std::string> method = method_lines(choice);
     method.front() +=
-        fmt::format(" # lobatto tune --error {:.2g}: {:.1g} to t = {:.6g}, {:.3g} ns a unit of time", error,
+        fmt::format(" # lobatto tune --error {:.2g}: {:.1g} to t = {:.6g}, {:.3g} ns per unit of time", error,
                     choice.measurement.error, choice.until, choice.measurement.seconds / choice.until * 1e9);
     std::string result;
     bool has_method = false;

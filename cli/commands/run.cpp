@@ -304,7 +304,7 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, 
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time,
                    files.path(),
-                   files.keeps_checkpoints() ? " The same command with --resume goes on from there." : "");
+                   files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");
         throw ExitCode{interrupted_exit};
     }
 }
@@ -377,8 +377,9 @@ void add_run(CommandLine& program) {
     add_until_option(command, options->overrides);
     command.option("--every", options->overrides.every, "Keep every EVERY-th state");
     add_set_option(command, options->overrides);
-    command.flag("--resume", options->resume,
-                 "go on where the same run was interrupted or killed; its files get the bytes they would have had");
+    command.flag(
+        "--resume", options->resume,
+        "continue the same run where it was interrupted or killed; its files are then the same, byte for byte");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
     command.does([options] { run(*options); });

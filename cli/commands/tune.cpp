@@ -46,7 +46,7 @@ void print(const Choice& choice, const Scene& scene, double error) {
                error, choice.until, method_text(choice));
     print_row("predicted error", fmt::format("{:.2g}: measured against {}, which is known to {:.1g}", m.error,
                                              choice.reference, choice.uncertainty));
-    print_row("cost", fmt::format("{} to the end, {:.3g} ns and {:.3g} gradients a unit of time", duration(m.seconds),
+    print_row("cost", fmt::format("{} to the end, {:.3g} ns and {:.3g} gradients per unit of time", duration(m.seconds),
                                   m.seconds / choice.until * 1e9, m.gradients / choice.until));
     print_row("stability", stability_text(choice));
     if (std::isfinite(m.energy_error))

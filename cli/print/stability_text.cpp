@@ -88,7 +88,7 @@ std::string mode_text(const Stability& member, const Mode& mode) {
                            mode.free ? "free: moves on steadily" : "the linear part says nothing here");
     const double x = std::sqrt(std::fabs(mode.z));
     if (mode.squared_frequency < 0)
-        return fmt::format("  omega^2 = {:<12.6g} runs away itself, by {:.5g} in a time h; the step by {}",
+        return fmt::format("  omega^2 = {:<12.6g} unstable motion: grows by {:.5g} in a time h, in a step by {}",
                            mode.squared_frequency, std::exp(x), growth_text(mode.rate));
     std::string text = fmt::format("  omega = {:<14.6g} h*omega = {:<12.6g} ", std::sqrt(mode.squared_frequency), x);
     if (mode.at_limit) return text + "AT a limit, to rounding: grows in proportion to the number of steps";

@@ -127,7 +127,7 @@ std::string report_page(const Experiment& experiment, const std::string& folder,
 <p>To t = {until:.6g}. Errors of states are relative to the amplitude of the motion, errors of energy to the largest energy of motion.</p>
 <p{note}>{reference}</p>
 <h2>The best ways</h2>
-<table><thead><tr><th>error</th><th>ns a unit of time</th><th class="text">method</th><th>step</th><th class="text">number type</th><th>iterated to</th>
+<table><thead><tr><th>error</th><th>ns per unit of time</th><th class="text">method</th><th>step</th><th class="text">number type</th><th>iterated to</th>
 <th>iterations per step</th><th>gradients per unit</th><th>energy error</th><th>drift</th><th>symplectic defect</th><th>followed until</th></tr></thead>
 <tbody>
 {front}</tbody></table>

@@ -82,7 +82,7 @@ void draw_work_precision(const Experiment& experiment, const std::string& folder
     draw(folder, "work_precision",
          fmt::format("{}set logscale xy\nset xrange [*:*] reverse\nset format \"10^{{%T}}\"\n"
                      "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
-                     "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds a unit of time\"\n{}\n",
+                     "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds per unit of time\"\n{}\n",
                      data, gnuplot_text(experiment.scene().title), figure_name(experiment), curves),
          960, 560);
 }

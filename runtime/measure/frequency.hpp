@@ -8,7 +8,7 @@
 
 namespace lobatto {
 
-// The largest |eigenvalue| of the derivative of Hamilton's equations at a state, radians a unit of time: of a stable
+// The largest |eigenvalue| of the derivative of Hamilton's equations at a state, radians per unit of time: of a stable
 // motion its largest frequency, else the fastest growth may be it. By power iteration on the squared derivative,
 // whose leading eigenvalue is -omega^2, with central differences: some per cent too small where several frequencies
 // are near. `stepper` is prepared. scale: how far each position and momentum moves, 2n, positive: differences are small

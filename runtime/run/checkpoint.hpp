@@ -15,7 +15,7 @@ namespace lobatto {
 struct Checkpoint {
     std::string run;  // which run it is, in lines "what: value"; a run with other lines cannot go on from here
     Halfway halfway;
-    std::vector<Written> files;  // the run's files at that moment
+    std::vector<Written> files;                            // the run's files at that moment
     std::map<std::string, std::vector<double>> observers;  // what each had saved, by its name
 };
 

@@ -213,7 +213,7 @@ TEST_CASE("and so it is after 200 kills" * doctest::test_suite("slow") * doctest
 TEST_CASE("an interrupted run keeps its file under its name, and goes on from there") {
     const Interrupted stopped;
     CHECK(stopped.ended.exit_code == 130);
-    CHECK(contains(stopped.ended.err, " The same command with --resume goes on from there.\n"));
+    CHECK(contains(stopped.ended.err, " The same command with --resume continues from there.\n"));
     CHECK(std::filesystem::exists(stopped.out));
     const std::size_t before = read_trajectory(stopped.out).rows.size();
     const Finished done = stopped.resume();

@@ -299,7 +299,7 @@ TEST_CASE("an interrupted run keeps what was computed, says so and returns 130")
         CHECK(run.exit_code == 130);
         CHECK(run.err.starts_with("lobatto: interrupted at t = "));
         CHECK(run.err.ends_with("; what was computed is in " + place.file() +
-                                ". The same command with --resume goes on from there.\n"));
+                                ". The same command with --resume continues from there.\n"));
         const TrajectoryTable table = read_trajectory(place.file());
         CHECK(table.rows.size() > 100);
         CHECK(!std::filesystem::exists(place.file() + ".partial"));

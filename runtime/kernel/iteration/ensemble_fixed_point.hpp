@@ -8,7 +8,7 @@
 // elsewhere delta = d. X moves by delta and is evaluated again until delta is small.
 //
 // No lane sees its neighbours: one that is solved stands still while others go on, and what is computed of it again
-// has the same bits. What the tests ask for does not lie on the chain of operations that a step waits for.
+// has the same bits. A step need not wait for its tests of convergence: what they need is computed beside it.
 #ifndef LOBATTO_KERNEL_ENSEMBLE_FIXED_POINT_HPP
 #define LOBATTO_KERNEL_ENSEMBLE_FIXED_POINT_HPP
 

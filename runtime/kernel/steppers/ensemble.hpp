@@ -2,8 +2,8 @@
 // Trajectories side by side: each in its lane, with its own parameters and state, one step size and time for all.
 //
 // What a lane computes depends on no other lane. Where the iterations of one fail, a Stepper of its own takes that step
-// by Newton's iteration, in the general form after iterations that begin anew; a lane that no way leads on keeps its
-// last good state and its status.
+// by Newton's iteration, in the general form after iterations that begin anew; a lane that none of these solves keeps
+// its last good state and its status.
 #ifndef LOBATTO_KERNEL_ENSEMBLE_HPP
 #define LOBATTO_KERNEL_ENSEMBLE_HPP
 
