@@ -132,7 +132,7 @@ and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
     int32_t ensemble_alignment;
     void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);
     void (*ensemble_start)(void* ensemble, const void* time, const void* q, const void* p, int32_t* status);
-    /* steps_done and iterations (fixed_point): one a lane, of this call. A lane that fails keeps its last good state. */
+    /* steps_done and iterations (fixed_point): one a lane, of this call. A failed lane keeps its last good state. */
     void (*ensemble_advance)(void* ensemble, int64_t steps, double tolerance, int32_t* status, int64_t* steps_done,
                              int64_t* iterations);
     void (*ensemble_state)(const void* ensemble, void* q, void* p);
