@@ -227,6 +227,30 @@ void refuse_too_much(const Grid& grid, const Kernel& kernel, const EnsembleReque
             memory / 1e9));
 }
 
+// Which parameters that vary decide the step or the end time: those of the scene count, for all trajectories.
+void print_fixed_times(const Scene& scene, const Grid& grid) {
+    for (const Axis& axis : grid.axes()) {
+        if (axis.role != Axis::Role::parameter) continue;
+        const Parameter& parameter = scene.parameters[axis.index];
+        if (scene.run.step.has(parameter.symbol) || scene.run.until.has(parameter.symbol))
+            fmt::print("The step and the end time are those of {} = {:.6g} for all trajectories.\n", parameter.written,
+                       scene.evaluate(parameter.value, parameter.name).to_double());
+    }
+}
+
+EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, const Grid& grid, const Steps& steps) {
+    EnsembleRequest request;
+    request.count = grid.count();
+    request.start = [&](std::int64_t index, EnsembleStart& start) { grid.start(index, start); };
+    request.from_velocities = scene.start == Start::velocity;
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = steps.count;
+    request.tolerance = scene.method.tolerance;
+    request.every = options.overrides.every.value_or(0);
+    request.threads = options.threads;
+    return request;
+}
+
 void sweep(const SweepOptions& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
@@ -239,15 +263,7 @@ void sweep(const SweepOptions& options) {
     Derivation derivation = derive(as_written);
     if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const KernelSource source = emit(derivation);
-    EnsembleRequest request;
-    request.count = grid.count();
-    request.start = [&](std::int64_t index, EnsembleStart& start) { grid.start(index, start); };
-    request.from_velocities = scene.start == Start::velocity;
-    request.step = scene.evaluate(scene.run.step, "the step").to_double();
-    request.steps = steps.count;
-    request.tolerance = scene.method.tolerance;
-    request.every = options.overrides.every.value_or(0);
-    request.threads = options.threads;
+    EnsembleRequest request = request_of(options, scene, grid, steps);
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
     // number of them changes what a trajectory becomes.
     const std::int64_t together = scene.coordinates.size() > 2 ? std::min<std::int64_t>(request.count, 8)
@@ -291,13 +307,7 @@ void sweep(const SweepOptions& options) {
         print_row("table", fmt::format("{}, {}", path, counted(table.rows(), "row", "rows")));
         if (!steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
-        for (const Axis& axis : grid.axes()) {
-            if (axis.role != Axis::Role::parameter) continue;
-            const Parameter& parameter = scene.parameters[axis.index];
-            if (scene.run.step.has(parameter.symbol) || scene.run.until.has(parameter.symbol))
-                fmt::print("The step and the end time are those of {} = {:.6g} for all trajectories.\n",
-                           parameter.written, scene.evaluate(parameter.value, parameter.name).to_double());
-        }
+        print_fixed_times(scene, grid);
     }
     const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || departures > 0;
     if (result.interrupted) {

@@ -2,6 +2,7 @@
 // One step of any system in numbers of 60 digits: the node's formulas and the sums over the nodes against differences
 // of the action itself (D25 ... D30).
 #include <algorithm>
+#include <functional>
 
 #include "generator/check/check.hpp"
 #include "generator/check/discrete_action.hpp"
@@ -11,9 +12,11 @@ namespace lobatto {
 
 namespace {
 
-class Step : DiscreteAction {
+// A step near the start of the scene, and what was measured of it.
+class StepNearStart : protected DiscreteAction {
 public:
-    Step(const Derivation& derivation, int attempt) : DiscreteAction(derivation), start_(derivation.scene, attempt) {
+    StepNearStart(const Derivation& derivation, int attempt)
+        : DiscreteAction(derivation), start_(derivation.scene, attempt) {
         start_.set_all(formulas_);
         begin(formulas_.get(system_.t),
               start_.near(float_of(derivation.scene.evaluate(derivation.scene.run.step, "the step"))));
@@ -21,19 +24,7 @@ public:
         v_ = values_of(system_.v);
     }
 
-    void run(std::vector<std::pair<Check, double>>& measured) {
-        measured_ = &measured;
-        slopes_of_L();
-        second_derivatives();
-        slopes_of_the_action();
-        if (derivation_.structure.form == Form::general) {
-            routhian();
-        } else {
-            stage_equations();
-        }
-    }
-
-private:
+protected:
     void compare(const std::string& claim, double bound, const std::string& meaning, const Numbers& one,
                  const Numbers& other) {
         measured_->push_back({{claim, false, false, 0, bound, meaning}, relative_difference(one, other)});
@@ -50,6 +41,44 @@ private:
         return x;
     }
 
+    static Numbers part(const Numbers& all, const std::vector<int>& which) {
+        Numbers result;
+        for (const int k : which) result.push_back(all[static_cast<std::size_t>(k)]);
+        return result;
+    }
+
+    // A path through the start, velocities near the start's.
+    Path path(const Numbers& q, const Numbers& v) {
+        Path X;
+        for (const cln::cl_R& x : control_) {
+            X.emplace_back();
+            for (std::size_t k = 0; k < q.size(); ++k) X.back().push_back(q[k] + h_ * x * start_.near(v[k]));
+        }
+        return X;
+    }
+
+    NearStart start_;
+    Numbers q_, v_;
+    std::vector<std::pair<Check, double>>* measured_ = nullptr;
+};
+
+class Step : StepNearStart {
+public:
+    using StepNearStart::StepNearStart;
+
+    void run(std::vector<std::pair<Check, double>>& measured) {
+        measured_ = &measured;
+        slopes_of_L();
+        second_derivatives();
+        slopes_of_the_action();
+        if (derivation_.structure.form == Form::general) {
+            routhian();
+        } else {
+            stage_equations();
+        }
+    }
+
+private:
     // (D25) p = dL/dv, f = dL/dq + F, along directions in (v, q).
     void slopes_of_L() {
         Symbols z = system_.v;
@@ -119,15 +148,6 @@ private:
         set(z, here);
     }
 
-    // A path through the start, velocities near the start's.
-    Path path(const Numbers& q, const Numbers& v) {
-        Path X;
-        for (const cln::cl_R& x : control_) {
-            X.emplace_back();
-            for (std::size_t k = 0; k < q.size(); ++k) X.back().push_back(q[k] + h_ * x * start_.near(v[k]));
-        }
-        return X;
-    }
     void slopes_of_the_action() {
         const Path X = path(q_, v_);
         const Path with_work = slopes(X), work = slopes(X, true);
@@ -172,63 +192,78 @@ private:
         set(routhian.P, P0_);
     }
 
-    // The reduced system's residual against the whole system's: with P_i = P0 + kappa pi(c_i) and kappa as the
-    // condition wants it, the cyclic coordinates move on polynomials, their slopes are those of constant momenta, and
-    // the active slopes are the same (D29). And its Jacobian (D30) along a direction.
+    // The reduced system's residual against the whole system's, and its Jacobian against differences of it.
     void routhian() {
         const Routhian& routhian = derivation_.structure.routhian;
-        const std::size_t active = routhian.active.size(), cyclic = routhian.cyclic.size(), controls = control_.size(),
-                          r = nodes_.size();
-        const auto of = [](const Numbers& all, const std::vector<int>& which) {
-            Numbers part;
-            for (const int k : which) part.push_back(all[static_cast<std::size_t>(k)]);
-            return part;
-        };
-        const Path X = path(of(q_, routhian.active), of(v_, routhian.active));
-        const Symbols v(routhian.z.begin(), routhian.z.begin() + static_cast<std::ptrdiff_t>(active)),
-            q(routhian.z.begin() + static_cast<std::ptrdiff_t>(active),
-              routhian.z.begin() + static_cast<std::ptrdiff_t>(2 * active));
+        const Path X = path(part(q_, routhian.active), part(v_, routhian.active));
         set_cyclic_momenta();
         const std::vector<Id> gradient = formulas_.convert(routhian.gradient);
-        const auto at_node = [&](std::size_t i, const Path& path, const Numbers& kappa) {
+        const Reduced reduced = [&](std::size_t i, const Path& path, const Numbers& kappa) {
+            const std::size_t active = routhian.active.size();
+            const Symbols v(routhian.z.begin(), routhian.z.begin() + static_cast<std::ptrdiff_t>(active)),
+                q(routhian.z.begin() + static_cast<std::ptrdiff_t>(active),
+                  routhian.z.begin() + static_cast<std::ptrdiff_t>(2 * active));
             set_node(i, path, q, v);
-            for (std::size_t c = 0; c < cyclic; ++c) formulas_.set(routhian.P[c], P0_[c] + kappa[c] * legendre_[i]);
+            for (std::size_t c = 0; c < kappa.size(); ++c)
+                formulas_.set(routhian.P[c], P0_[c] + kappa[c] * legendre_[i]);
             return formulas_.evaluate(gradient);
         };
-        // Residuals of all control points and of kappa.
-        const auto residual = [&](const Path& path, const Numbers& kappa) {
-            Numbers sums(controls * active + cyclic, cln::cl_R(0));
-            for (std::size_t i = 0; i < r; ++i) {
-                const Numbers g = at_node(i, path, kappa);
-                const cln::cl_R b = weights_[i];
-                for (std::size_t j = 0; j < controls; ++j)
-                    for (std::size_t a = 0; a < active; ++a)
-                        sums[j * active + a] =
-                            sums[j * active + a] + b * (D(i, j) * g[a] + h_ * B(i, j) * g[active + a]);
-                for (std::size_t c = 0; c < cyclic; ++c)
-                    sums[controls * active + c] =
-                        sums[controls * active + c] + h_ * b * legendre_[i] * g[2 * active + c];
-            }
-            return sums;
-        };
-        // The condition is linear in kappa.
-        Numbers kappa(cyclic, cln::cl_R(0));
-        const bool multiplier = cyclic > 0 && derivation_.quadrature.method.family == Family::lobatto;
-        if (multiplier) {
-            const auto tail = [&](const Numbers& values) {
-                return Numbers(values.end() - static_cast<std::ptrdiff_t>(cyclic), values.end());
-            };
-            const Numbers at_zero = tail(residual(X, kappa));
-            Numbers matrix(cyclic * cyclic, cln::cl_R(0)), right;
-            for (std::size_t c = 0; c < cyclic; ++c) {
-                Numbers unit(cyclic, cln::cl_R(0));
-                unit[c] = 1;
-                const Numbers there = tail(residual(X, unit));
-                for (std::size_t row = 0; row < cyclic; ++row) matrix[row * cyclic + c] = there[row] - at_zero[row];
-                right.push_back(-at_zero[c]);
-            }
-            kappa = solve(matrix, right);
+        Numbers kappa(routhian.cyclic.size(), cln::cl_R(0));
+        if (has_multiplier()) kappa = multiplier(X, reduced);
+        if (!routhian.cyclic.empty()) cyclic_from_momenta(X, kappa, reduced);
+        reduced_jacobian(X, kappa, reduced);
+    }
+
+    // Lobatto's formulas determine kappa by a condition of their own; with the others it is zero.
+    bool has_multiplier() const {
+        return !derivation_.structure.routhian.cyclic.empty() &&
+               derivation_.quadrature.method.family == Family::lobatto;
+    }
+
+    // The slopes of the Routhian at node i of a path, with P_i = P0 + kappa pi(c_i).
+    using Reduced = std::function<Numbers(std::size_t, const Path&, const Numbers&)>;
+
+    // Residuals of all control points and of kappa.
+    Numbers reduced_residual(const Path& path, const Numbers& kappa, const Reduced& reduced) const {
+        const std::size_t active = derivation_.structure.routhian.active.size(), cyclic = kappa.size(),
+                          controls = control_.size();
+        Numbers sums(controls * active + cyclic, cln::cl_R(0));
+        for (std::size_t i = 0; i < nodes_.size(); ++i) {
+            const Numbers g = reduced(i, path, kappa);
+            const cln::cl_R b = weights_[i];
+            for (std::size_t j = 0; j < controls; ++j)
+                for (std::size_t a = 0; a < active; ++a)
+                    sums[j * active + a] = sums[j * active + a] + b * (D(i, j) * g[a] + h_ * B(i, j) * g[active + a]);
+            for (std::size_t c = 0; c < cyclic; ++c)
+                sums[controls * active + c] = sums[controls * active + c] + h_ * b * legendre_[i] * g[2 * active + c];
         }
+        return sums;
+    }
+
+    // kappa, in which its condition is linear.
+    Numbers multiplier(const Path& X, const Reduced& reduced) const {
+        const std::size_t cyclic = derivation_.structure.routhian.cyclic.size();
+        const auto condition = [&](const Numbers& kappa) {
+            const Numbers values = reduced_residual(X, kappa, reduced);
+            return Numbers(values.end() - static_cast<std::ptrdiff_t>(cyclic), values.end());
+        };
+        const Numbers at_zero = condition(Numbers(cyclic, cln::cl_R(0)));
+        Numbers matrix(cyclic * cyclic, cln::cl_R(0)), right;
+        for (std::size_t c = 0; c < cyclic; ++c) {
+            Numbers unit(cyclic, cln::cl_R(0));
+            unit[c] = 1;
+            const Numbers there = condition(unit);
+            for (std::size_t row = 0; row < cyclic; ++row) matrix[row * cyclic + c] = there[row] - at_zero[row];
+            right.push_back(-at_zero[c]);
+        }
+        return solve(matrix, right);
+    }
+
+    // With P_i = P0 + kappa pi(c_i) and kappa as the condition wants it, the cyclic coordinates move on polynomials,
+    // their slopes are those of constant momenta, and the active slopes are the same (D29).
+    void cyclic_from_momenta(const Path& X, const Numbers& kappa, const Reduced& reduced) {
+        const Routhian& routhian = derivation_.structure.routhian;
+        const std::size_t active = routhian.active.size(), cyclic = kappa.size(), controls = control_.size();
         // The whole path: the cyclic coordinates from their velocities at the nodes, with m = controls - 1 of them.
         const std::size_t m = controls - 1;
         Path whole(controls, Numbers(n_, cln::cl_R(0)));
@@ -239,17 +274,17 @@ private:
             for (std::size_t j = 1; j <= m; ++j) slope_matrix.push_back(D(i, j));
         for (std::size_t c = 0; c < cyclic; ++c) {
             Numbers rises;
-            for (std::size_t i = 0; i < m; ++i) rises.push_back(-h_ * at_node(i, X, kappa)[2 * active + c]);
+            for (std::size_t i = 0; i < m; ++i) rises.push_back(-h_ * reduced(i, X, kappa)[2 * active + c]);
             const auto k = static_cast<std::size_t>(routhian.cyclic[c]);
             const Numbers positions = solve(slope_matrix, rises);
             for (std::size_t j = 0; j < controls; ++j) whole[j][k] = q_[k] + (j == 0 ? cln::cl_R(0) : positions[j - 1]);
         }
-        const Numbers reduced = residual(X, kappa);
+        const Numbers residual = reduced_residual(X, kappa, reduced);
         const Path all = slopes(whole);
         Numbers one, other;
         for (std::size_t j = 0; j < controls; ++j) {
             for (std::size_t a = 0; a < active; ++a) {
-                one.push_back(reduced[j * active + a]);
+                one.push_back(residual[j * active + a]);
                 other.push_back(all[j][static_cast<std::size_t>(routhian.active[a])]);
             }
             for (std::size_t c = 0; c < cyclic; ++c) {
@@ -257,10 +292,14 @@ private:
                 other.push_back(all[j][static_cast<std::size_t>(routhian.cyclic[c])]);
             }
         }
-        if (cyclic > 0)
-            compare("cyclic coordinates follow from momenta", identity_bound,
-                    "the system without its cyclic coordinates is not the same system", one, other);
+        compare("cyclic coordinates follow from momenta", identity_bound,
+                "the system without its cyclic coordinates is not the same system", one, other);
+    }
 
+    // (D30) along one direction of all unknowns.
+    void reduced_jacobian(const Path& X, const Numbers& kappa, const Reduced& reduced) {
+        const Routhian& routhian = derivation_.structure.routhian;
+        const std::size_t active = routhian.active.size(), cyclic = kappa.size(), controls = control_.size();
         Numbers flat, d;
         Noise noise(9);
         for (const Numbers& positions : X) flat = joined(flat, positions);
@@ -270,26 +309,25 @@ private:
         }
         flat = joined(flat, kappa);
         for (std::size_t c = 0; c < cyclic; ++c)
-            d.push_back(multiplier ? noise.next() * (cln::zerop(P0_[c]) ? cln::cl_R(1) : cln::abs(P0_[c]))
-                                   : cln::cl_R(0));
+            d.push_back(has_multiplier() ? noise.next() * (cln::zerop(P0_[c]) ? cln::cl_R(1) : cln::abs(P0_[c]))
+                                         : cln::cl_R(0));
         const auto parts_of = [&](const Numbers& x) {
             Path moved(controls, Numbers(active));
             for (std::size_t e = 0; e < controls * active; ++e) moved[e / active][e % active] = x[e];
             return std::pair{moved, Numbers(x.end() - static_cast<std::ptrdiff_t>(cyclic), x.end())};
         };
         compare_with_differences("Jacobian of the step against differences", "an entry of the Jacobian is wrong",
-                                 jacobian_times(X, kappa, parts_of(d), at_node), [&](const cln::cl_R& e) {
+                                 jacobian_times(X, kappa, parts_of(d), reduced), [&](const cln::cl_R& e) {
                                      return central_difference(flat, d, e, [&](const Numbers& x) {
                                          const auto [moved, multipliers] = parts_of(x);
-                                         return residual(moved, multipliers);
+                                         return reduced_residual(moved, multipliers, reduced);
                                      });
                                  });
     }
 
     // (D30) sum_i h b_i T_i^T H_i T_i d with T_i d = (D d/h, B d, kappa pi).
-    template <class AtNode>
     Numbers jacobian_times(const Path& X, const Numbers& kappa, const std::pair<Path, Numbers>& direction,
-                           const AtNode& at_node) {
+                           const Reduced& reduced) {
         const Routhian& routhian = derivation_.structure.routhian;
         const std::size_t active = routhian.active.size(), cyclic = routhian.cyclic.size(), controls = X.size();
         std::vector<GiNaC::ex> entries;
@@ -297,7 +335,7 @@ private:
         const std::vector<Id> roots = formulas_.convert(entries);
         Numbers sums(controls * active + cyclic, cln::cl_R(0));
         for (std::size_t i = 0; i < nodes_.size(); ++i) {
-            at_node(i, X, kappa);
+            reduced(i, X, kappa);
             const Numbers H = formulas_.evaluate(roots);
             Numbers dz(2 * active + cyclic, cln::cl_R(0)), w = dz;
             for (std::size_t a = 0; a < active; ++a)
@@ -392,9 +430,7 @@ private:
                 "what the kernel solves does not follow from the discrete action", one, other);
     }
 
-    NearStart start_;
-    Numbers q_, v_, P0_;
-    std::vector<std::pair<Check, double>>* measured_ = nullptr;
+    Numbers P0_;  // of the cyclic coordinates
 };
 
 }  // namespace

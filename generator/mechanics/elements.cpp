@@ -153,21 +153,17 @@ private:
     std::vector<int> meanings_;  // variable number, coefficient or time, by input
 };
 
-}  // namespace
+// Sorts terms by their formula into families, and makes an element of each family that has enough rows.
+class Families {
+public:
+    Families(const System& system, const std::vector<GiNaC::symbol>& variables)
+        : shapes_(system, variables), velocities_(static_cast<int>(variables.size()) - system.n) {}
 
-Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables, const std::vector<ex>& terms,
-                       const std::vector<std::pair<int, ex>>& forces) {
-    struct Row {
-        Id root;
-        Leaves leaves;
-        std::size_t source;  // in terms, then forces
-    };
-    Shapes shapes(system, variables);
-    const int velocities = static_cast<int>(variables.size()) - system.n;
-    std::map<std::string, std::pair<int, std::vector<Row>>> families;  // by formula: target slot, rows
-    const auto sort_in = [&](const ex& term, int acted_on, std::size_t source) {
-        const Id root = shapes.convert(term);
-        Leaves leaves = shapes.leaves(root);
+    // acted_on: the coordinate of a force, -1 for a term of the Lagrangian. source: its number, terms first, then
+    // forces.
+    void add(const ex& term, int acted_on, std::size_t source) {
+        const Id root = shapes_.convert(term);
+        Leaves leaves = shapes_.leaves(root);
         int target = -1;
         if (acted_on >= 0) {
             target = 0;
@@ -177,53 +173,81 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
         }
         // Velocities, the first of the variables where there are any, are another family: they count in the energy.
         std::string key = std::to_string(target) + ":";
-        for (const int variable : leaves.variables) key += variable < velocities ? 'v' : 'q';
+        for (const int variable : leaves.variables) key += variable < velocities_ ? 'v' : 'q';
         key += ":" + leaves.shape;
-        const auto place = families.emplace(key, std::make_pair(target, std::vector<Row>())).first;
-        place->second.second.push_back({root, std::move(leaves), source});
-    };
-    for (std::size_t i = 0; i < terms.size(); ++i) sort_in(terms[i], -1, i);
-    for (std::size_t i = 0; i < forces.size(); ++i) sort_in(forces[i].second, forces[i].first, terms.size() + i);
+        Family& family = families_[key];
+        family.target = target;
+        family.rows.push_back({root, std::move(leaves), source});
+    }
 
-    // How far the variables of a row are from its first. Rows of the same distances stand together, most of them first,
-    // so that runs of neighbours are long: those of a ring are one run and the row that closes it.
-    const auto distances = [](const Row& row) {
+    Elements elements(const std::vector<ex>& terms, const std::vector<std::pair<int, ex>>& forces) {
+        Elements result;
+        for (auto& [key, family] : families_) {
+            sort(family.rows);
+            if (family.rows.size() < fewest_rows) {
+                for (const Row& row : family.rows) {
+                    if (row.source < terms.size())
+                        result.others.push_back(terms[row.source]);
+                    else
+                        result.other_forces.push_back(forces[row.source - terms.size()]);
+                }
+                continue;
+            }
+            Element element = element_of(family);
+            // Two formulas of the same variables, row by row, are one.
+            const auto twin = std::find_if(result.repeated.begin(), result.repeated.end(), [&](const Element& other) {
+                return element.target < 0 && other.target < 0 && other.rows == element.rows;
+            });
+            if (twin == result.repeated.end())
+                result.repeated.push_back(std::move(element));
+            else
+                add_to(*twin, element);
+        }
+        return result;
+    }
+
+private:
+    struct Row {
+        Id root;
+        Leaves leaves;
+        std::size_t source;  // in terms, then forces
+    };
+    struct Family {
+        int target = -1;  // which variable of a row the force acts on
+        std::vector<Row> rows;
+    };
+
+    // How far the variables of a row are from its first.
+    static std::vector<int> distances(const Row& row) {
         std::vector<int> result;
         for (const int variable : row.leaves.variables) result.push_back(variable - row.leaves.variables.front());
         return result;
-    };
-    std::map<std::vector<int>, std::size_t> as_far;  // rows of one family, by distances
-    // NOTE: the order of a sum's terms changes from process to process; that of variables and of values does not.
-    const auto comes_before = [&](const Row& a, const Row& b) {
-        const std::vector<int> far_a = distances(a), far_b = distances(b);
-        if (far_a != far_b) {
-            const std::size_t many_a = as_far.at(far_a), many_b = as_far.at(far_b);
-            return many_a != many_b ? many_a > many_b : far_a < far_b;
-        }
-        if (a.leaves.variables != b.leaves.variables) return a.leaves.variables < b.leaves.variables;
-        return std::lexicographical_compare(a.leaves.coefficients.begin(), a.leaves.coefficients.end(),
-                                            b.leaves.coefficients.begin(), b.leaves.coefficients.end(),
-                                            [&](Id left, Id right) { return shapes.precedes(left, right); });
-    };
+    }
 
-    Elements result;
-    for (auto& [key, family] : families) {
-        const int target = family.first;
-        std::vector<Row>& rows = family.second;
-        as_far.clear();
+    // Rows of the same distances stand together, most of them first, so that runs of neighbours are long: those of a
+    // ring are one run and the row that closes it.
+    // NOTE: the order of a sum's terms changes from process to process; that of variables and of values does not.
+    void sort(std::vector<Row>& rows) {
+        std::map<std::vector<int>, std::size_t> as_far;  // rows, by distances
         for (const Row& row : rows) ++as_far[distances(row)];
-        std::stable_sort(rows.begin(), rows.end(), comes_before);
-        if (rows.size() < fewest_rows) {
-            for (const Row& row : rows) {
-                if (row.source < terms.size())
-                    result.others.push_back(terms[row.source]);
-                else
-                    result.other_forces.push_back(forces[row.source - terms.size()]);
+        std::stable_sort(rows.begin(), rows.end(), [&](const Row& a, const Row& b) {
+            const std::vector<int> far_a = distances(a), far_b = distances(b);
+            if (far_a != far_b) {
+                const std::size_t many_a = as_far.at(far_a), many_b = as_far.at(far_b);
+                return many_a != many_b ? many_a > many_b : far_a < far_b;
             }
-            continue;
-        }
+            if (a.leaves.variables != b.leaves.variables) return a.leaves.variables < b.leaves.variables;
+            return std::lexicographical_compare(a.leaves.coefficients.begin(), a.leaves.coefficients.end(),
+                                                b.leaves.coefficients.begin(), b.leaves.coefficients.end(),
+                                                [&](Id left, Id right) { return shapes_.precedes(left, right); });
+        });
+    }
+
+    // Coefficients that are the same in all rows are part of the formula; the others are its a0, a1, ...
+    Element element_of(const Family& family) {
+        const std::vector<Row>& rows = family.rows;
         Element element;
-        element.target = target;
+        element.target = family.target;
         const Leaves& first = rows.front().leaves;
         for (std::size_t j = 0; j < first.variables.size(); ++j) element.x.emplace_back("x" + std::to_string(j));
         std::vector<ex> coefficients;
@@ -232,40 +256,49 @@ Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& v
             bool same = true;
             for (const Row& row : rows) same = same && row.leaves.coefficients[j] == first.coefficients[j];
             if (same) {
-                coefficients.push_back(shapes.leaf(first.coefficients[j]));
+                coefficients.push_back(shapes_.leaf(first.coefficients[j]));
             } else {
                 element.a.emplace_back("a" + std::to_string(element.a.size()));
                 coefficients.push_back(element.a.back());
                 varying.push_back(j);
             }
         }
-        element.term = shapes.formula(rows.front().root, element.x, coefficients);
+        element.term = shapes_.formula(rows.front().root, element.x, coefficients);
         for (const Row& row : rows) {
             element.rows.push_back(row.leaves.variables);
             element.coefficients.emplace_back();
             for (const std::size_t j : varying)
-                element.coefficients.back().push_back(shapes.leaf(row.leaves.coefficients[j]));
+                element.coefficients.back().push_back(shapes_.leaf(row.leaves.coefficients[j]));
         }
-        // Two formulas of the same variables, row by row, are one.
-        const auto twin = std::find_if(result.repeated.begin(), result.repeated.end(), [&](const Element& other) {
-            return target < 0 && other.target < 0 && other.rows == element.rows;
-        });
-        if (twin == result.repeated.end()) {
-            result.repeated.push_back(std::move(element));
-            continue;
-        }
-        GiNaC::exmap renamed;
-        for (std::size_t j = 0; j < element.x.size(); ++j) renamed[element.x[j]] = twin->x[j];
-        for (const auto& symbol : element.a) {
-            twin->a.emplace_back("a" + std::to_string(twin->a.size()));
-            renamed[symbol] = twin->a.back();
-        }
-        twin->term += element.term.subs(renamed, GiNaC::subs_options::no_pattern);
-        for (std::size_t r = 0; r < element.rows.size(); ++r)
-            twin->coefficients[r].insert(twin->coefficients[r].end(), element.coefficients[r].begin(),
-                                         element.coefficients[r].end());
+        return element;
     }
-    return result;
+
+    static void add_to(Element& twin, const Element& element) {
+        GiNaC::exmap renamed;
+        for (std::size_t j = 0; j < element.x.size(); ++j) renamed[element.x[j]] = twin.x[j];
+        for (const auto& symbol : element.a) {
+            twin.a.emplace_back("a" + std::to_string(twin.a.size()));
+            renamed[symbol] = twin.a.back();
+        }
+        twin.term += element.term.subs(renamed, GiNaC::subs_options::no_pattern);
+        for (std::size_t r = 0; r < element.rows.size(); ++r)
+            twin.coefficients[r].insert(twin.coefficients[r].end(), element.coefficients[r].begin(),
+                                        element.coefficients[r].end());
+    }
+
+    Shapes shapes_;
+    int velocities_;                          // how many of the variables
+    std::map<std::string, Family> families_;  // by formula
+};
+
+}  // namespace
+
+Elements find_elements(const System& system, const std::vector<GiNaC::symbol>& variables, const std::vector<ex>& terms,
+                       const std::vector<std::pair<int, ex>>& forces) {
+    Families families(system, variables);
+    for (std::size_t i = 0; i < terms.size(); ++i) families.add(terms[i], -1, i);
+    for (std::size_t i = 0; i < forces.size(); ++i) families.add(forces[i].second, forces[i].first, terms.size() + i);
+    return families.elements(terms, forces);
 }
 
 std::vector<RowRun> runs_of(const Element& element) {

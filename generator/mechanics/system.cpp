@@ -272,6 +272,153 @@ Scene without_time(const Scene& scene) {
     return result;
 }
 
+// Builds a System in the order of its parts; what a part finds against the separable form is kept as the reason.
+class SystemBuilder {
+public:
+    explicit SystemBuilder(const Scene& scene) : scene_(scene) {}
+
+    System build() {
+        differentiate_once();
+        const std::array<SparseMatrix, 4> derived = {
+            derivative_of(system_.momentum, system_.v), derivative_of(system_.momentum, system_.q),
+            derivative_of(system_.force, system_.v), derivative_of(system_.force, system_.q)};
+        // Derivatives and first-order quantities together, each with what it depends on.
+        std::vector<ex> looked_at = system_.momentum;
+        looked_at.insert(looked_at.end(), system_.force.begin(), system_.force.end());
+        const std::size_t first_order = looked_at.size();
+        for (const SparseMatrix& matrix : derived)
+            for (const auto& [place, value] : matrix.entries()) looked_at.push_back(value);
+        const Dependence dependence(scene_, system_, motion_);
+        const std::vector<Dependence::Kind> kinds = dependence.of(looked_at);
+
+        keep_second_order(derived, {kinds.begin() + static_cast<std::ptrdiff_t>(first_order), kinds.end()});
+        keep_first_order(kinds, dependence);
+        for (const Event& event : scene_.outputs.events)
+            if (event.value.has(system_.t)) system_.autonomous = false;  // events are given the time, as all else is
+        if (system_.autonomous && mentions(system_, system_.t)) return build_system(without_time(scene_));
+        check_mass(scene_, system_);
+        if (system_.separable) look_at_rest(dependence);
+        if (system_.separable) keep_separable_parts();
+        return system_;
+    }
+
+private:
+    void differentiate_once() {
+        system_.n = static_cast<int>(scene_.coordinates.size());
+        system_.t = scene_.time;
+        for (const Coordinate& coordinate : scene_.coordinates) {
+            system_.q.push_back(coordinate.position);
+            system_.v.push_back(coordinate.velocity);
+            system_.outer_force.push_back(coordinate.force);
+        }
+        for (const Parameter& parameter : scene_.parameters) system_.parameters.push_back(parameter.symbol);
+        system_.lagrangian = scene_.lagrangian;
+        motion_ = system_.q;
+        motion_.insert(motion_.end(), system_.v.begin(), system_.v.end());
+        motion_.push_back(system_.t);
+        system_.terms = terms_of(system_.lagrangian, motion_);
+        system_.momentum = gradient_of(system_.terms, system_.v);
+        system_.force = gradient_of(system_.terms, system_.q);
+        for (std::size_t k = 0; k < system_.force.size(); ++k) system_.force[k] += system_.outer_force[k];
+        system_.linear = true;
+        system_.separable = true;
+    }
+
+    // dp/dv, dp/dq, df/dv, df/dq, whose entries are of these kinds, one after another.
+    void keep_second_order(const std::array<SparseMatrix, 4>& derived, const std::vector<Dependence::Kind>& kinds) {
+        const std::array<SparseMatrix*, 4> kept = {&system_.momentum_v, &system_.momentum_q, &system_.force_v,
+                                                   &system_.force_q};
+        const Occurrences of_motion(motion_);
+        std::size_t next = 0;
+        for (std::size_t block = 0; block < derived.size(); ++block) {
+            *kept[block] = SparseMatrix(system_.n, system_.n);
+            for (const auto& [place, value] : derived[block].entries()) {
+                const Dependence::Kind& kind = kinds[next++];
+                if (kind.zero) continue;
+                const bool constant = !kind.on_q && !kind.on_v && !kind.on_t;
+                const ex kept_value = constant ? constant_form(value, of_motion) : value;
+                kept[block]->put(place.first, place.second, kept_value);
+                system_.linear = system_.linear && constant;
+                if (system_.separable) look_at_second_order(block, place, kept_value, kind, constant);
+            }
+        }
+    }
+
+    // A value that does not depend on what its formula mentions is written without it.
+    ex constant_form(const ex& value, const Occurrences& of_motion) const {
+        try {
+            return at(value, motion_, of_motion, 0);
+        } catch (const std::exception&) {  // a pole at the origin: one away from it
+            return at(value, motion_, of_motion, GiNaC::numeric(1, 2));
+        }
+    }
+
+    void look_at_second_order(std::size_t block, const std::pair<int, int>& place, const ex& value,
+                              const Dependence::Kind& kind, bool constant) {
+        const std::string of = (block < 2 ? "p_" : "f_") + coordinate_of(static_cast<std::size_t>(place.first));
+        const GiNaC::symbol& by =
+            (block == 0 || block == 2 ? system_.v : system_.q)[static_cast<std::size_t>(place.second)];
+        const auto text = [&] { return slope_text(of, by, value); };
+        if (block == 0 && !constant)
+            refuse_separable(text() + (kind.on_v   ? " depends on the velocity"
+                                       : kind.on_q ? " depends on the position"
+                                                   : " depends on the time"));
+        if (block == 1) refuse_separable(text() + ": the momentum depends on the position");
+        if (block == 2) refuse_separable(text() + ": the force depends on the velocity");
+    }
+
+    // Momenta, then forces, of these kinds.
+    void keep_first_order(const std::vector<Dependence::Kind>& kinds, const Dependence& dependence) {
+        const std::size_t n = system_.momentum.size();
+        for (std::size_t i = 0; i < n + system_.force.size(); ++i) {
+            ex& value = i < n ? system_.momentum[i] : system_.force[i - n];
+            if (kinds[i].zero) value = 0;
+            if (kinds[i].on_t) system_.autonomous = false;
+            if (!dependence.is_broken(value)) continue;
+            system_.linear = false;
+            if (kinds[i].on_v && i >= n)
+                refuse_separable("f_" + coordinate_of(i - n) + ": the force depends on the velocity");
+        }
+    }
+
+    // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
+    void look_at_rest(const Dependence& dependence) {
+        std::vector<ex> at_zero;
+        try {
+            at_zero = all_at(system_.momentum, system_.v, 0);
+            all_at({system_.lagrangian}, system_.v, 0);
+        } catch (const std::domain_error&) {  // however small, a term that is infinite at rest, or 0^0
+            refuse_separable("the Lagrangian has no value at rest");
+            return;
+        }
+        const std::vector<Dependence::Kind> rest = dependence.of(at_zero);
+        for (std::size_t k = 0; k < rest.size(); ++k)
+            if (!rest[k].zero && system_.separable)
+                refuse_separable("p_" + coordinate_of(k) + " = " + canonical_text(at_zero[k]) + " at rest");
+    }
+
+    void keep_separable_parts() {
+        system_.mass = system_.momentum_v;
+        system_.potential = -at(system_.lagrangian, system_.v, Occurrences(system_.v), 0);
+        system_.hessian = SparseMatrix(system_.n, system_.n);
+        for (const ex& force : system_.force) system_.gradient.push_back(-force);
+        for (const auto& [place, value] : system_.force_q.entries())
+            system_.hessian.put(place.first, place.second, -value);
+    }
+
+    std::string coordinate_of(std::size_t k) const { return system_.q[k].get_name(); }
+
+    // The first reason is told.
+    void refuse_separable(const std::string& why) {
+        if (system_.separable) system_.not_separable = why;
+        system_.separable = false;
+    }
+
+    const Scene& scene_;
+    System system_;
+    Symbols motion_;  // positions, velocities and time
+};
+
 }  // namespace
 
 bool System::has_forces() const {
@@ -279,112 +426,7 @@ bool System::has_forces() const {
 }
 
 System build_system(const Scene& scene) {
-    System system;
-    system.n = static_cast<int>(scene.coordinates.size());
-    system.t = scene.time;
-    for (const Coordinate& coordinate : scene.coordinates) {
-        system.q.push_back(coordinate.position);
-        system.v.push_back(coordinate.velocity);
-        system.outer_force.push_back(coordinate.force);
-    }
-    for (const Parameter& parameter : scene.parameters) system.parameters.push_back(parameter.symbol);
-    system.lagrangian = scene.lagrangian;
-    Symbols all = system.q;
-    all.insert(all.end(), system.v.begin(), system.v.end());
-    all.push_back(system.t);
-    system.terms = terms_of(system.lagrangian, all);
-    system.momentum = gradient_of(system.terms, system.v);
-    system.force = gradient_of(system.terms, system.q);
-    for (std::size_t k = 0; k < system.force.size(); ++k) system.force[k] += system.outer_force[k];
-
-    // Derivatives and first-order quantities together, each with what it depends on.
-    const std::array<SparseMatrix, 4> derived = {
-        derivative_of(system.momentum, system.v), derivative_of(system.momentum, system.q),
-        derivative_of(system.force, system.v), derivative_of(system.force, system.q)};
-    const std::array<SparseMatrix*, 4> kept = {&system.momentum_v, &system.momentum_q, &system.force_v,
-                                               &system.force_q};
-    std::vector<ex> looked_at = system.momentum;
-    looked_at.insert(looked_at.end(), system.force.begin(), system.force.end());
-    const std::size_t first_order = looked_at.size();
-    for (const SparseMatrix& matrix : derived)
-        for (const auto& [place, value] : matrix.entries()) looked_at.push_back(value);
-    const Dependence dependence(scene, system, all);
-    const std::vector<Dependence::Kind> kinds = dependence.of(looked_at);
-
-    // A value that does not depend on what its formula mentions is written without it.
-    const Occurrences of_motion(all);
-    const auto constant_form = [&](const ex& value) {
-        try {
-            return at(value, all, of_motion, 0);
-        } catch (const std::exception&) {  // a pole at the origin: one away from it
-            return at(value, all, of_motion, GiNaC::numeric(1, 2));
-        }
-    };
-    const auto coordinate_of = [&](std::size_t k) { return system.q[k].get_name(); };
-    system.linear = true;
-    system.separable = true;
-    const auto reason = [&](const std::string& why) {
-        if (system.separable) system.not_separable = why;
-        system.separable = false;
-    };
-    std::size_t next = first_order;
-    for (std::size_t block = 0; block < derived.size(); ++block) {
-        *kept[block] = SparseMatrix(system.n, system.n);
-        for (const auto& [place, value] : derived[block].entries()) {
-            const Dependence::Kind& kind = kinds[next++];
-            if (kind.zero) continue;
-            const bool constant = !kind.on_q && !kind.on_v && !kind.on_t;
-            const ex kept_value = constant ? constant_form(value) : value;
-            kept[block]->put(place.first, place.second, kept_value);
-            system.linear = system.linear && constant;
-            const std::string of = (block < 2 ? "p_" : "f_") + coordinate_of(static_cast<std::size_t>(place.first));
-            const GiNaC::symbol& by =
-                (block == 0 || block == 2 ? system.v : system.q)[static_cast<std::size_t>(place.second)];
-            const auto text = [&] { return slope_text(of, by, kept_value); };
-            if (block == 0 && !constant && system.separable)
-                reason(text() + (kind.on_v   ? " depends on the velocity"
-                                 : kind.on_q ? " depends on the position"
-                                             : " depends on the time"));
-            if (block == 1 && system.separable) reason(text() + ": the momentum depends on the position");
-            if (block == 2 && system.separable) reason(text() + ": the force depends on the velocity");
-        }
-    }
-    for (std::size_t i = 0; i < first_order; ++i) {
-        ex& value = i < system.momentum.size() ? system.momentum[i] : system.force[i - system.momentum.size()];
-        if (kinds[i].zero) value = 0;
-        if (kinds[i].on_t) system.autonomous = false;
-        if (!dependence.is_broken(value)) continue;
-        system.linear = false;
-        if (kinds[i].on_v && i >= system.momentum.size())
-            reason("f_" + coordinate_of(i - system.momentum.size()) + ": the force depends on the velocity");
-    }
-    for (const Event& event : scene.outputs.events)
-        if (event.value.has(system.t)) system.autonomous = false;  // events are given the time with everything else
-    if (system.autonomous && mentions(system, system.t)) return build_system(without_time(scene));
-    check_mass(scene, system);
-
-    // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
-    if (system.separable) {
-        std::vector<ex> at_zero;
-        try {
-            at_zero = all_at(system.momentum, system.v, 0);
-            all_at({system.lagrangian}, system.v, 0);
-        } catch (const std::domain_error&) {  // however small, a term that is infinite at rest, or 0^0
-            reason("the Lagrangian has no value at rest");
-            at_zero.clear();
-        }
-        const std::vector<Dependence::Kind> rest = dependence.of(at_zero);
-        for (std::size_t k = 0; k < rest.size(); ++k)
-            if (!rest[k].zero && system.separable)
-                reason("p_" + coordinate_of(k) + " = " + canonical_text(at_zero[k]) + " at rest");
-    }
-    if (!system.separable) return system;
-    system.mass = system.momentum_v;
-    system.potential = -at(system.lagrangian, system.v, Occurrences(system.v), 0);
-    system.hessian = SparseMatrix(system.n, system.n);
-    for (const ex& force : system.force) system.gradient.push_back(-force);
-    for (const auto& [place, value] : system.force_q.entries()) system.hessian.put(place.first, place.second, -value);
-    return system;
+    return SystemBuilder(scene).build();
 }
 
 }  // namespace lobatto

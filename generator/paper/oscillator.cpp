@@ -28,7 +28,7 @@ ex interpolant() {
     return q;
 }
 
-void discrete_lagrangian(std::vector<Statement>& list) {
+void mean_kinetic_energy(std::vector<Statement>& list) {
     const ex theta = symbol("theta"), q = interpolant(), slope = q.diff(GiNaC::ex_to<GiNaC::symbol>(theta));
     const ex mean_kinetic = (m() / (2 * pow(h(), 2)) * integrate_polynomial(pow(slope, 2))).expand();
     exmap slopes{{symbol("alpha"), ex(1) / 12}, {symbol("beta"), ex(5) / 12}};
@@ -87,6 +87,9 @@ void discrete_lagrangian(std::vector<Statement>& list) {
                             for (int j = 0; j < 4; ++j) form += states()[i] * stiffness.op(i).op(j) * states()[j];
                         return equal(m() / (2 * pow(h(), 2)) * form, mean_kinetic);
                     }});
+}
+
+void mean_potential_energy(std::vector<Statement>& list) {
     list.push_back(
         {.label = "eq:discretePE",
          .section = "4",
@@ -106,7 +109,8 @@ void discrete_lagrangian(std::vector<Statement>& list) {
          .sentence =
              "V(q) polynomial of degree ≤ 5: U ≡ (1/h) ∫₀ʰ V(q(t)) dt = α[V(q_0)+V(q_1)] + β[V(q_ξ)+V(q_{1−ξ})]",
          .holds =
-             [=] {
+             [] {
+                 const ex theta = symbol("theta");
                  for (int degree = 1; degree <= 5; ++degree) {  // q = theta^3 is one of the interpolants
                      ex quadrature = 0;
                      for (int i = 0; i < 4; ++i) quadrature += weights()[i] * pow(nodes()[i], 3 * degree);
@@ -117,6 +121,9 @@ void discrete_lagrangian(std::vector<Statement>& list) {
          .instead = "(1/h) ∫₀ʰ V(q(t)) dt ≈ U = α[V(q_0)+V(q_1)] + β[V(q_ξ)+V(q_{1−ξ})], with equality when V(q(t)) "
                     "has degree ≤ 5 in t: for a "
                     "cubic q, when V is of degree 1"});
+}
+
+void discrete_lagrangian(std::vector<Statement>& list) {
     list.push_back(
         {.label = "eq:discreteLagrangian",
          .section = "4",
@@ -249,6 +256,8 @@ const Oscillator& oscillator() {
 }
 
 void section_4(std::vector<Statement>& list) {
+    mean_kinetic_energy(list);
+    mean_potential_energy(list);
     discrete_lagrangian(list);
     elimination(list);
     truncation_and_stability(list);

@@ -26,23 +26,27 @@ Propagation propagation() {
             (-left_l / left_r).normal()};
 }
 
-}  // namespace
+// (h omega)^2
+ex squared_angle() {
+    return pow(symbol("h") * symbol("omega"), 2);
+}
 
-void symplectic_structure(std::vector<Statement>& list) {
+// a, b, c and the common denominator of Phi, which is 1 at h = 0.
+exmap propagation_coefficients() {
+    const Propagation Phi = propagation();
+    const ex x = squared_angle(), common = (1 + x / 30 + x * x / 1800).expand();
+    return {{symbol("a"), (Phi.pp * common).normal()},
+            {symbol("b"), (Phi.pq * common).normal()},
+            {symbol("c"), (Phi.qp * common).normal()},
+            {symbol("delta_tilde"), common}};
+}
+
+void momenta_at_both_ends(std::vector<Statement>& list) {
     const Oscillator& system = oscillator();
-    const ex h = symbol("h"), m = symbol("m"), omega = symbol("omega"), p = symbol("p"), q = symbol("q"),
-             x = pow(h * omega, 2);
     const exmap delta{{symbol("delta"), system.determinant}};
     const GiNaC::lst step{symbol("q_l") == symbol("q_j"), symbol("q_r") == symbol("q_jp")};
     const exmap momenta{{symbol("p_j"), system.left_momentum.subs(step)},
                         {symbol("p_jp"), system.right_momentum.subs(step)}};
-    const Propagation Phi = propagation();
-    const ex common = (1 + x / 30 + x * x / 1800).expand();
-    const exmap coefficients{{symbol("a"), (Phi.pp * common).normal()},
-                             {symbol("b"), (Phi.pq * common).normal()},
-                             {symbol("c"), (Phi.qp * common).normal()},
-                             {symbol("delta_tilde"), common}};
-
     list.push_back({.label = "eq:rightMomentum",
                     .section = "4",
                     .what = "the momentum at the right end",
@@ -85,6 +89,11 @@ void symplectic_structure(std::vector<Statement>& list) {
                     .kind = Kind::equation,
                     .values = momenta}},
          .route = "both sides with p_j = −∂L_r/∂q_ℓ and p_{j+1} = ∂L_r/∂q_r"});
+}
+
+void propagation_matrix(std::vector<Statement>& list) {
+    const Propagation Phi = propagation();
+    const exmap coefficients = propagation_coefficients();
     list.push_back({.label = "eq:symplecticSystem",
                     .section = "4",
                     .what = "the propagation matrix has equal diagonal entries",
@@ -109,6 +118,12 @@ void symplectic_structure(std::vector<Statement>& list) {
                     .what = "det Φ = 1: symplectic",
                     .parts = {{.text = "det = (a^2 - b*c)/delta_tilde^2", .derived = 1, .values = coefficients}},
                     .route = "the derived coefficients"});
+}
+
+void discrete_energy(std::vector<Statement>& list) {
+    const ex h = symbol("h"), m = symbol("m"), omega = symbol("omega"), p = symbol("p"), q = symbol("q");
+    const Propagation Phi = propagation();
+    const exmap coefficients = propagation_coefficients();
     list.push_back({.label = "after eq:symplecticCoeffs: H",
                     .section = "4",
                     .what = "the exact flow preserves H",
@@ -136,20 +151,28 @@ void symplectic_structure(std::vector<Statement>& list) {
                                            GiNaC::subs_options::no_pattern);
                         return equal(moved, invariant);
                     }});
-    list.push_back({.label = "after eq:discreteEnergy: −b > 0",
-                    .section = "4",
-                    .what = "the discrete energy is positive definite",
-                    .parts = {},
-                    .route = "b = mhω²/43200·(y−60)(y²−84y+720), y = h²ω²: no root below y = 42 − 6√29, negative at "
-                             "the middle; likewise c > 0 below y = 10",
-                    .sentence = "under eq:stabilityCondition2, −b > 0",
-                    .holds = [=] {
-                        const ex bound = 42 - 6 * GiNaC::sqrt(ex(29)), b = coefficients.at(symbol("b"));
-                        const exmap middle{{m, 1}, {h, 1}, {omega, GiNaC::sqrt(bound / 2)}};
-                        const ex factored = m * h * pow(omega, 2) / 43200 * (x - 60) * (x - bound) * (x - 84 + bound);
-                        return equal(b, factored) && at(b, middle) < 0 && at(60 - bound, {}) > 0 &&
-                               at(84 - 2 * bound, {}) > 0;
-                    }});
+    list.push_back(
+        {.label = "after eq:discreteEnergy: −b > 0",
+         .section = "4",
+         .what = "the discrete energy is positive definite",
+         .parts = {},
+         .route = "b = mhω²/43200·(y−60)(y²−84y+720), y = h²ω²: no root below y = 42 − 6√29, negative at "
+                  "the middle; likewise c > 0 below y = 10",
+         .sentence = "under eq:stabilityCondition2, −b > 0",
+         .holds = [=] {
+             const ex x = squared_angle(), bound = 42 - 6 * GiNaC::sqrt(ex(29)), b = coefficients.at(symbol("b"));
+             const exmap middle{{m, 1}, {h, 1}, {omega, GiNaC::sqrt(bound / 2)}};
+             const ex factored = m * h * pow(omega, 2) / 43200 * (x - 60) * (x - bound) * (x - 84 + bound);
+             return equal(b, factored) && at(b, middle) < 0 && at(60 - bound, {}) > 0 && at(84 - 2 * bound, {}) > 0;
+         }});
+}
+
+}  // namespace
+
+void symplectic_structure(std::vector<Statement>& list) {
+    momenta_at_both_ends(list);
+    propagation_matrix(list);
+    discrete_energy(list);
 }
 
 }  // namespace lobatto::paper

@@ -49,11 +49,8 @@ bool midpoint_is_newmark() {
     return equal(q1.subs(newmark), q1.subs(midpoint)) && equal(v1.subs(newmark), v1.subs(midpoint));
 }
 
-void section_2(std::vector<Statement>& list) {
+void form_of_quadrature(std::vector<Statement>& list) {
     const ex alpha = symbol("alpha"), beta = symbol("beta"), xi = symbol("xi"), half = ex(1) / 2;
-    const ex without_alpha_2 = moment(2).subs(alpha == half - beta),
-             without_alpha_4 = moment(4).subs(alpha == half - beta);
-
     list.push_back({.label = "in the text: midpoint and Newmark",
                     .section = "1",
                     .what = "the implicit midpoint rule is Newmark's average acceleration on linear systems",
@@ -80,6 +77,12 @@ void section_2(std::vector<Statement>& list) {
                         const ex solved = GiNaC::lsolve(conditions, GiNaC::lst{alpha, beta});
                         return equal(alpha.subs(solved), ex(1) / 6) && equal(2 * beta.subs(solved), ex(4) / 6);
                     }});
+}
+
+void moment_conditions(std::vector<Statement>& list) {
+    const ex alpha = symbol("alpha"), beta = symbol("beta"), xi = symbol("xi"), half = ex(1) / 2;
+    const ex without_alpha_2 = moment(2).subs(alpha == half - beta),
+             without_alpha_4 = moment(4).subs(alpha == half - beta);
     list.push_back({.label = "after eq:lobattoQuad4points: f = 1 and f = t",
                     .section = "2",
                     .what = "the condition of degrees 0 and 1",
@@ -123,6 +126,9 @@ void section_2(std::vector<Statement>& list) {
                                .derived = 6 * without_alpha_4.subs(beta == 1 / (12 * xi * (1 - xi))),
                                .kind = Kind::equation}},
                     .route = "moment 4 with α and β eliminated through moments 0 and 2"});
+}
+
+void nodes_and_weights(std::vector<Statement>& list) {
     list.push_back(
         {.label = "after eq:lobattoQuad4points: ξ, α, β",
          .section = "2",
@@ -151,6 +157,12 @@ void section_2(std::vector<Statement>& list) {
                             if (!equal(defect(k), 0)) return false;
                         return equal(defect(6), ex(1) / 2100);
                     }});
+}
+
+void section_2(std::vector<Statement>& list) {
+    form_of_quadrature(list);
+    moment_conditions(list);
+    nodes_and_weights(list);
 }
 
 void section_3(std::vector<Statement>& list) {

@@ -67,7 +67,9 @@ bool keeps_sign(const ex& polynomial, const ex& leading, const std::vector<ex>& 
     return (polynomial - product).expand().is_zero() && (sign > 0 ? middle > 0 : middle < 0);
 }
 
-void truncation_and_stability(std::vector<Statement>& list) {
+namespace {
+
+void truncation_error(std::vector<Statement>& list) {
     const ex s = h();
     ex forward = symbol("q_j"), backward = symbol("q_j");
     for (int k = 1; k <= 6; ++k) {
@@ -106,6 +108,9 @@ void truncation_and_stability(std::vector<Statement>& list) {
              const auto [below, leading] = truncation();
              return below.expand().is_zero() && !leading.is_zero();
          }});
+}
+
+void characteristic_polynomial(std::vector<Statement>& list) {
     const auto [outer, centre] = border_coefficients();
     const ex r = symbol("r");
     list.push_back(
@@ -129,6 +134,9 @@ void truncation_and_stability(std::vector<Statement>& list) {
                .factor = "3240000"}},
          .route =
              "B² − 4A² of A(1 + r²) + Br; the paper's is that of 1800 times the polynomial; only the sign matters"});
+}
+
+void stability_interval(std::vector<Statement>& list) {
     list.push_back({.label = "before eq:stabilityCondition2: roots",
                     .section = "4",
                     .what = "two real roots in h²ω²",
@@ -188,6 +196,14 @@ void truncation_and_stability(std::vector<Statement>& list) {
              const ex gap = 1 - GiNaC::sqrt(root_pair()[0]) / GiNaC::Pi;
              return at(gap, {}) > 0 && at(gap - ex(1) / 100, {}) < 0;
          }});
+}
+
+}  // namespace
+
+void truncation_and_stability(std::vector<Statement>& list) {
+    truncation_error(list);
+    characteristic_polynomial(list);
+    stability_interval(list);
 }
 
 }  // namespace lobatto::paper

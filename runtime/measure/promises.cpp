@@ -157,23 +157,28 @@ template Return there_and_back(const Kernel&, const std::vector<double>&, const 
 template Return there_and_back(const Kernel&, const std::vector<__float128>&, const std::vector<__float128>&,
                                const std::vector<__float128>&, __float128, std::int64_t, bool);
 
-double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step) {
+namespace {
+
+const char* const no_tangent_map = "the tangent map cannot be measured: the step from the start fails";
+
+// Each component's size, q then p, and how far it is shifted to measure a slope.
+struct Shifts {
+    std::vector<__float128> sizes, shifts;
+};
+
+// A component's own size, and as its shift a part of what velocity and force move it in the step, or of itself where
+// they hardly do. T is the tangent map of the step, which ends at `after`.
+Shifts own_shifts(LoadedStepper<__float128>& stepper, const QuadrupleStart& start, double step,
+                  const std::vector<__float128>& after, const std::vector<__float128>& T) {
     using real = __float128;
-    LoadedStepper<real> stepper(kernel);
     const std::size_t n = start.q.size(), rows = 2 * n;
-    std::vector<real> q1, p1, T;
-    const char* const failure = "the tangent map cannot be measured: the step from the start fails";
-    if (stepper.prepare(start.parameters, step) != LOBATTO_OK ||
-        stepper.tangent(0, start.q, start.p, q1, p1, T) != LOBATTO_OK)
-        throw ComputationError(failure);
-    // Each component's own size, and its shift: a part of what velocity and force move it in the step, or of itself
-    // where they hardly do.
-    const std::vector<real> before = joined(start.q, start.p), after = joined(q1, p1);
+    const std::vector<real> before = joined(start.q, start.p);
     std::vector<real> velocity, p_of_v, force;
-    if (stepper.velocity(0, start.q, start.p, velocity) != LOBATTO_OK) throw ComputationError(failure);
+    if (stepper.velocity(0, start.q, start.p, velocity) != LOBATTO_OK) throw ComputationError(no_tangent_map);
     stepper.slopes(0, start.q, velocity, p_of_v, force);
     const real h = step;
-    std::vector<real> sizes(rows), shifts(rows);
+    Shifts result{std::vector<real>(rows), std::vector<real>(rows)};
+    auto& [sizes, shifts] = result;
     for (std::size_t i = 0; i < rows; ++i) {
         const real moved =
             i < n ? std::max(magnitude(h * velocity[i]), magnitude(after[i] - before[i])) : magnitude(h * force[i - n]);
@@ -191,6 +196,15 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             shifts[i] = std::max(shifts[i], real(1e-14) * given);
         }
     }
+    return result;
+}
+
+// Components that rest have the size, and a shift, that the others of their block give them, or those of the other
+// block.
+void shift_resting(Shifts& of, const std::vector<__float128>& T) {
+    using real = __float128;
+    auto& [sizes, shifts] = of;
+    const std::size_t rows = sizes.size(), n = rows / 2;
     // The unit of momenta in which the blocks dq1/dp and dp1/dq are of one size.
     real to_q = 0, to_p = 0;
     for (std::size_t i = 0; i < n; ++i)
@@ -224,6 +238,21 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             }
         }
     }
+}
+
+}  // namespace
+
+double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double step) {
+    using real = __float128;
+    LoadedStepper<real> stepper(kernel);
+    const std::size_t n = start.q.size(), rows = 2 * n;
+    std::vector<real> q1, p1, T;
+    if (stepper.prepare(start.parameters, step) != LOBATTO_OK ||
+        stepper.tangent(0, start.q, start.p, q1, p1, T) != LOBATTO_OK)
+        throw ComputationError(no_tangent_map);
+    Shifts found = own_shifts(stepper, start, step, joined(q1, p1), T);
+    shift_resting(found, T);
+    const auto& [sizes, shifts] = found;
     double defect = 0;
     for (std::size_t j = 0; j < rows; ++j) {
         const auto image = [&](real shift) {
@@ -232,7 +261,7 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             lobatto_advance call{};
             call.steps = 1;
             if (stepper.start(0, q, p) != LOBATTO_OK || stepper.advance(call) != LOBATTO_OK)
-                throw ComputationError(failure);
+                throw ComputationError(no_tangent_map);
             real time;
             stepper.state(time, q, p);
             return joined(q, p);

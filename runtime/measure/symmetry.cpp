@@ -80,23 +80,27 @@ Symmetry symmetry_of(const MatrixXd& B, const VectorXd& d, const std::vector<std
     return symmetry;
 }
 
-}  // namespace
+// The unknowns of a symmetry, the entries of B, where there are few, then those of b; what they must fulfil; and the
+// sum of the sizes of each condition's terms.
+struct Samples {
+    Eigen::Index wanted = 0, entries = 0, unknowns = 0;
+    MatrixXd conditions, sizes;
+};
 
-std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
-                                      const std::vector<double>& q, double step,
-                                      const std::vector<std::string>& names) {
-    LoadedStepper<double> stepper(kernel);
-    if (stepper.prepare(parameters, step) != LOBATTO_OK)
-        throw ComputationError("symmetries cannot be looked for: the kernel refuses the scene's values");
-    const Eigen::Index n = static_cast<Eigen::Index>(q.size()), entries = n <= 12 ? n * n : 0, unknowns = entries + n;
-    if (n > 64) return {};
-
-    // Two rows a sample: the condition at rest, and what it adds there in motion, so that strong forces do not drown
-    // the kinetic energy. Half of them are to find and half to confirm; beside them the sum of the terms' sizes for
-    // each entry. Samples where the slopes are not finite are left out, and the next ones are nearer; where they are
-    // not so at rest (a Lagrangian like -sqrt(v^2)), another motion takes its place.
-    const Eigen::Index wanted = 4 * unknowns;
-    MatrixXd conditions(2 * wanted, unknowns), sizes(2 * wanted, unknowns);
+// Two rows a sample: the condition at rest, and what it adds there in motion, so that strong forces do not drown the
+// kinetic energy. Half of them are to find and half to confirm. Samples where the slopes are not finite are left out,
+// and the next ones are nearer; where they are not so at rest (a Lagrangian like -sqrt(v^2)), another motion takes its
+// place.
+Samples sample_conditions(const Kernel& kernel, LoadedStepper<double>& stepper, const std::vector<double>& q) {
+    const Eigen::Index n = static_cast<Eigen::Index>(q.size());
+    Samples samples;
+    samples.entries = n <= 12 ? n * n : 0;
+    samples.unknowns = samples.entries + n;
+    samples.wanted = 4 * samples.unknowns;
+    const Eigen::Index entries = samples.entries, wanted = samples.wanted;
+    samples.conditions.resize(2 * wanted, samples.unknowns);
+    samples.sizes.resize(2 * wanted, samples.unknowns);
+    MatrixXd &conditions = samples.conditions, &sizes = samples.sizes;
     std::mt19937_64 generator(1);
     const auto random = [&] { return static_cast<double>(generator() >> 11) * 0x1p-52 - 1; };
     double spread = 1;
@@ -146,6 +150,22 @@ std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<do
     }
     if (row < 2 * wanted)
         throw ComputationError("symmetries cannot be looked for: the forces are not finite around the start");
+    return samples;
+}
+
+}  // namespace
+
+std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
+                                      const std::vector<double>& q, double step,
+                                      const std::vector<std::string>& names) {
+    LoadedStepper<double> stepper(kernel);
+    if (stepper.prepare(parameters, step) != LOBATTO_OK)
+        throw ComputationError("symmetries cannot be looked for: the kernel refuses the scene's values");
+    const Eigen::Index n = static_cast<Eigen::Index>(q.size());
+    if (n > 64) return {};
+    const Samples samples = sample_conditions(kernel, stepper, q);
+    const Eigen::Index wanted = samples.wanted, entries = samples.entries, unknowns = samples.unknowns;
+    const MatrixXd &conditions = samples.conditions, &sizes = samples.sizes;
     // Every unknown in the unit of its own terms, then every sample: a weak force counts as much as a strong one.
     VectorXd units = sizes.colwise().maxCoeff().transpose();
     MatrixXd scaled = conditions.topRows(wanted);
