@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <tuple>
+
 #include "generator/formula/limits.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/programs/programs.hpp"
@@ -49,7 +51,8 @@ Derivation derive(const Scene& scene, bool general) {
     check_method(scene, derivation.system, general);
     check_start(scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
-    derivation.structure = find_structure(scene, derivation.system, derivation.quadrature, general);
+    std::tie(derivation.structure, derivation.findings) =
+        find_structure(scene, derivation.system, derivation.quadrature, general);
     return derivation;
 }
 
@@ -58,9 +61,10 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
     other.scene = derivation.scene;
     other.scene.method = method;
     other.system = derivation.system;
-    check_method(other.scene, other.system, derivation.structure.general);
+    check_method(other.scene, other.system, derivation.structure.full());
     other.quadrature = quadrature_of(method);
-    other.structure = find_structure(other.scene, other.system, other.quadrature, derivation.structure.general);
+    std::tie(other.structure, other.findings) =
+        find_structure(other.scene, other.system, other.quadrature, derivation.structure.full());
     return other;
 }
 
@@ -92,10 +96,10 @@ PlainSource emit_plain(Scene scene, Precision precision) {
     Derivation derivation = derive(scene);
     const Limits limits(scene.path);
     // No shortcuts: they are worth their lines only where speed is asked for.
-    if (derivation.structure.form == Form::general)
+    if (derivation.structure.form() == Form::general)
         derivation = derive(scene, true);
     else
-        derivation.structure.form = Form::separable;
+        derivation.structure.iterate();
     derivation.structure.looped = false;
     try {
         return emit_plain(derivation, optimised_programs(derivation), precision);

@@ -56,8 +56,8 @@ std::vector<Output> outputs_of(const Derivation& derivation, long operations) {
              cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
             {"momenta", asked.momenta, "columns p_... of the trajectory", 0},
             {"tangent", asked.tangent,
-             derivation.structure.is_explicit ? "the derivative of a step, kick by kick and drift by drift"
-                                              : "the derivative of a step, from the matrix of its equations",
+             derivation.structure.is_explicit() ? "the derivative of a step, kick by kick and drift by drift"
+                                                : "the derivative of a step, from the matrix of its equations",
              cost(asked.tangent, [](Outputs& outputs) { outputs.tangent = false; })},
             {"dense", asked.dense > 0,
              fmt::format("{} states between two steps, on the step's polynomial", asked.dense), 0},
@@ -73,8 +73,8 @@ Checked check(const CheckCommand& options) {
     result.derivation = derive(scene, options.general);
     result.operations = operations_of(emit(result.derivation));
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    scene.method.arithmetic = StepArithmetic::plain;                                // which the general path has alone
-    const bool alone = options.general || result.derivation.structure.is_explicit;  // which have no other path
+    scene.method.arithmetic = StepArithmetic::plain;  // which the general path has alone
+    const bool alone = options.general || result.derivation.structure.is_explicit();  // which have no other path
     result.without = alone ? result.derivation : derive(scene, true);
     result.operations_without = alone ? result.operations : operations_of(emit(result.without));
     result.outputs = outputs_of(result.derivation, result.operations);
@@ -115,8 +115,8 @@ void print(const Checked& checked) {
                                 ? scene.lagrangian_text
                                 : fmt::format("a formula of {} characters", scene.lagrangian_text.size()));
     print_row("its kind", kind_of(derivation));
-    print_findings("Found, and put to use", derivation.structure.findings, true);
-    print_findings("Looked for, not found", derivation.structure.findings, false);
+    print_findings("Found, and put to use", derivation.findings, true);
+    print_findings("Looked for, not found", derivation.findings, false);
 
     fmt::print(std::cout, "\nA step of {} (order {})\n", scene.method.name(), scene.method.order());
     print_row("its form", form_of(derivation));
@@ -128,7 +128,7 @@ void print(const Checked& checked) {
               (unknowns == 0 ? "none" : std::to_string(unknowns)) + compared(unknowns, unknowns_of(checked.without)));
     if (const std::string solver = solver_text(derivation); !solver.empty()) print_row("solved", solver);
     const long elimination = elimination_of(derivation);
-    if (!derivation.structure.is_explicit)
+    if (!derivation.structure.is_explicit())
         print_row("elimination", fmt::format("some {} multiplications{}", elimination,
                                              compared(elimination, elimination_of(checked.without))));
 
@@ -149,7 +149,7 @@ nlohmann::ordered_json json_of(const Checked& checked) {
     const Derivation& derivation = checked.derivation;
     const Scene& scene = derivation.scene;
     Json findings = Json::array(), groups = Json::array(), outputs = Json::array();
-    for (const Finding& finding : derivation.structure.findings)
+    for (const Finding& finding : derivation.findings)
         findings.push_back({{"name", finding.name}, {"holds", finding.holds}, {"reason", finding.reason}});
     for (const GroupSolve& solve : solves_of(derivation)) {
         Json names = Json::array();

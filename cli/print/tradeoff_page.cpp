@@ -105,7 +105,7 @@ std::string report_page(const Experiment& experiment, const std::string& folder,
     for (const std::string& name : pictures)
         figures += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption>{}</figcaption></figure>\n", name,
                                data_address(file_text(folder + "/" + name + ".svg")), captions.at(name));
-    for (const Finding& finding : experiment.derivation().structure.findings)
+    for (const Finding& finding : experiment.derivation().findings)
         findings +=
             fmt::format("<tr><td class=\"text\">{}</td><td class=\"text\">{}</td><td class=\"text\">{}</td></tr>\n",
                         escaped(finding.name), finding.holds ? "yes" : "no", escaped(finding.reason));

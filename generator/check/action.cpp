@@ -71,7 +71,7 @@ public:
         slopes_of_L();
         second_derivatives();
         slopes_of_the_action();
-        if (derivation_.structure.form == Form::general) {
+        if (derivation_.structure.form() == Form::general) {
             routhian();
         } else {
             stage_equations();
@@ -113,8 +113,8 @@ private:
         Symbols z = system_.v;
         std::vector<GiNaC::ex> g = system_.momentum;
         SparseMatrix H;
-        if (derivation_.structure.form == Form::general) {
-            const Routhian& routhian = derivation_.structure.routhian;
+        if (derivation_.structure.form() == Form::general) {
+            const Routhian& routhian = derivation_.structure.routhian();
             z = routhian.z;
             g = routhian.gradient;
             H = routhian.second;
@@ -185,7 +185,7 @@ private:
 
     // P of the cyclic coordinates as the start has it.
     void set_cyclic_momenta() {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         const Numbers p = formulas_.evaluate(momentum_);
         P0_.clear();
         for (const int k : routhian.cyclic) P0_.push_back(p[static_cast<std::size_t>(k)]);
@@ -194,7 +194,7 @@ private:
 
     // The reduced system's residual against the whole system's, and its Jacobian against differences of it.
     void routhian() {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         const Path X = path(part(q_, routhian.active), part(v_, routhian.active));
         set_cyclic_momenta();
         const std::vector<Id> gradient = formulas_.convert(routhian.gradient);
@@ -216,7 +216,7 @@ private:
 
     // Lobatto's formulas determine kappa by a condition of their own; with the others it is zero.
     bool has_multiplier() const {
-        return !derivation_.structure.routhian.cyclic.empty() &&
+        return !derivation_.structure.routhian().cyclic.empty() &&
                derivation_.quadrature.method.family == Family::lobatto;
     }
 
@@ -225,7 +225,7 @@ private:
 
     // Residuals of all control points and of kappa.
     Numbers reduced_residual(const Path& path, const Numbers& kappa, const Reduced& reduced) const {
-        const std::size_t active = derivation_.structure.routhian.active.size(), cyclic = kappa.size(),
+        const std::size_t active = derivation_.structure.routhian().active.size(), cyclic = kappa.size(),
                           controls = control_.size();
         Numbers sums(controls * active + cyclic, cln::cl_R(0));
         for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -242,7 +242,7 @@ private:
 
     // kappa, in which its condition is linear.
     Numbers multiplier(const Path& X, const Reduced& reduced) const {
-        const std::size_t cyclic = derivation_.structure.routhian.cyclic.size();
+        const std::size_t cyclic = derivation_.structure.routhian().cyclic.size();
         const auto condition = [&](const Numbers& kappa) {
             const Numbers values = reduced_residual(X, kappa, reduced);
             return Numbers(values.end() - static_cast<std::ptrdiff_t>(cyclic), values.end());
@@ -262,7 +262,7 @@ private:
     // With P_i = P0 + kappa pi(c_i) and kappa as the condition wants it, the cyclic coordinates move on polynomials,
     // their slopes are those of constant momenta, and the active slopes are the same (D29).
     void cyclic_from_momenta(const Path& X, const Numbers& kappa, const Reduced& reduced) {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         const std::size_t active = routhian.active.size(), cyclic = kappa.size(), controls = control_.size();
         // The whole path: the cyclic coordinates from their velocities at the nodes, with m = controls - 1 of them.
         const std::size_t m = controls - 1;
@@ -298,7 +298,7 @@ private:
 
     // (D30) along one direction of all unknowns.
     void reduced_jacobian(const Path& X, const Numbers& kappa, const Reduced& reduced) {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         const std::size_t active = routhian.active.size(), cyclic = kappa.size(), controls = control_.size();
         Numbers flat, d;
         Noise noise(9);
@@ -328,7 +328,7 @@ private:
     // (D30) sum_i h b_i T_i^T H_i T_i d with T_i d = (D d/h, B d, kappa pi).
     Numbers jacobian_times(const Path& X, const Numbers& kappa, const std::pair<Path, Numbers>& direction,
                            const Reduced& reduced) {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         const std::size_t active = routhian.active.size(), cyclic = routhian.cyclic.size(), controls = X.size();
         std::vector<GiNaC::ex> entries;
         for (const auto& [place, value] : routhian.second.entries()) entries.push_back(value);

@@ -99,7 +99,7 @@ public:
         slopes_of_L();
         if (structure.looped) {
             repeated_terms();
-        } else if (structure.form == Form::general) {
+        } else if (structure.form() == Form::general) {
             general();
         } else {
             mass_ = formulas_(entries(system_.mass.dense()));
@@ -116,7 +116,7 @@ public:
 
     // Whether the step itself is a program.
     static bool is_stepped(const Derivation& derivation) {
-        return derivation.structure.form == Form::linear_map && derivation.system.n == 1 &&
+        return derivation.structure.form() == Form::linear_map && derivation.system.n == 1 &&
                !derivation.quadrature.is_explicit();
     }
 
@@ -197,7 +197,7 @@ private:
         Numbers gradient;
         for (const cln::cl_R& force : force_) gradient.push_back(-force);
         compare(claim, gradient, times(mass_, machine_.get("W", n_)), force_size_);
-        const auto& places = derivation_.structure.entries;
+        const auto& places = derivation_.structure.constant_mass().entries;
         const Numbers stored = machine_.get("S", places.size());
         const Numbers second = formulas_(entries(derivatives(system_.gradient, system_.q)));
         for (std::size_t l = 0; l < n_; ++l) {
@@ -226,7 +226,7 @@ private:
 
     // (D25 ... D29): one node in z, and the whole system in (q, velocity).
     void general() {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         set_cyclic_momenta();
         machine_.set("z", values_of(routhian.z));
         const Numbers g = formulas_(routhian.gradient);
@@ -258,15 +258,15 @@ private:
         }
     }
     void set_cyclic_momenta() {
-        const Routhian& routhian = derivation_.structure.routhian;
+        const Routhian& routhian = derivation_.structure.routhian();
         for (std::size_t c = 0; c < routhian.cyclic.size(); ++c)
             formulas_.set(routhian.P[c], p_[static_cast<std::size_t>(routhian.cyclic[c])]);
     }
 
     // Formulas applied to the rows of their tables, added up as the loops of a kernel add them.
     void repeated_terms() {
-        const bool general = derivation_.structure.form == Form::general;
-        const std::vector<GiNaC::symbol>& variables = general ? derivation_.structure.routhian.z : system_.q;
+        const bool general = derivation_.structure.form() == Form::general;
+        const std::vector<GiNaC::symbol>& variables = general ? derivation_.structure.routhian().z : system_.q;
         const Numbers z = values_of(variables);
         machine_.set("q", values_of(system_.q));
         machine_.set("z", z);
@@ -278,23 +278,25 @@ private:
         const std::string slope = general ? "g" : "W", second = general ? "H" : "S";
         std::map<std::pair<int, int>, std::size_t> entry;
         if (general)
-            for (const auto& [place, value] : derivation_.structure.routhian.second.entries())
+            for (const auto& [place, value] : derivation_.structure.routhian().second.entries())
                 entry.emplace(place, entry.size());
         else
-            for (const auto& place : derivation_.structure.entries) entry.emplace(place, entry.size());
+            for (const auto& place : derivation_.structure.constant_mass().entries) entry.emplace(place, entry.size());
         const auto element_target = [](const std::string& array, std::size_t i) {
             return array + "[" + std::to_string(i) + "]";
         };
+        const std::string rest_energy = name_of({LoopPart::rest, LoopPart::Of::energy});
         const auto add_energy = [&](const std::string& program) {
             if (!machine_.has(program)) return;
             for (const auto& [output, value] : machine_.outputs_of(program)) add(output.target, value);
         };
-        for (const auto& [output, value] : machine_.outputs_of("rest_node")) add(output.target, value);
-        add_energy("rest_energy");
+        for (const auto& [output, value] : machine_.outputs_of(name_of({LoopPart::rest, LoopPart::Of::node})))
+            add(output.target, value);
+        add_energy(rest_energy);
         const std::vector<Element>& elements = derivation_.structure.elements.repeated;
-        for (std::size_t number = 0; number < elements.size(); ++number) {
-            const Element& element = elements[number];
-            const std::string name = "element_" + std::to_string(number + 1);
+        for (int number = 0; number < static_cast<int>(elements.size()); ++number) {
+            const Element& element = elements[static_cast<std::size_t>(number)];
+            const std::string name = element_text(number);
             const auto pairs = pairs_of(element);
             for (std::size_t row = 0; row < element.rows.size(); ++row) {
                 const auto variable = [&](std::size_t j) { return element.rows[row][j]; };
@@ -304,7 +306,7 @@ private:
                     const Numbers a = formulas_(element.coefficients[row]);
                     for (std::size_t j = 0; j < a.size(); ++j) machine_.set("a" + std::to_string(j), a[j]);
                 }
-                for (const auto& [output, value] : machine_.outputs_of(name + "_node"))
+                for (const auto& [output, value] : machine_.outputs_of(name_of({number, LoopPart::Of::node})))
                     for (std::size_t j = 0; j < element.x.size(); ++j) {
                         if (output.target == slope + "[i" + std::to_string(j) + "]")
                             add(element_target(slope, static_cast<std::size_t>(variable(j))),
@@ -316,7 +318,7 @@ private:
                                                                      variable(pairs[column].second)})),
                                     value);
                     }
-                add_energy(name + "_energy");
+                add_energy(name_of({number, LoopPart::Of::energy}));
             }
         }
         const auto sum = [&](const std::string& target) {
@@ -329,15 +331,14 @@ private:
         else
             for (std::size_t k = 0; k < n_; ++k) expected_slope[k] = -force_[k];
         for (std::size_t i = 0; i < variables.size(); ++i) computed_slope.push_back(sum(element_target(slope, i)));
-        const SparseMatrix& matrix = general ? derivation_.structure.routhian.second : system_.hessian;
+        const SparseMatrix& matrix = general ? derivation_.structure.routhian().second : system_.hessian;
         expected_second = formulas_(entries(matrix));
         for (const auto& [place, value] : matrix.entries())
             computed_second.push_back(sum(element_target(second, entry.at(place))));
         const std::string claim = "emitted terms in loops";
         compare(claim, expected_slope, computed_slope);
         compare(claim, expected_second, computed_second);
-        if (machine_.has("rest_energy"))
-            compare(claim, general ? energy_ : formulas_({system_.potential}), {sum("sum")});
+        if (machine_.has(rest_energy)) compare(claim, general ? energy_ : formulas_({system_.potential}), {sum("sum")});
     }
 
     void events() {

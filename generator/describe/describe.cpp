@@ -35,7 +35,7 @@ public:
           s_(static_cast<std::size_t>(derivation.quadrature.points)),
           controls_(derivation.quadrature.control.size()),
           lobatto_(derivation.quadrature.method.family == Family::lobatto),
-          general_(derivation.structure.form == Form::general),
+          general_(derivation.structure.form() == Form::general),
           written_out_(!derivation.quadrature.is_explicit() &&
                        is_written_out(derivation.system, derivation.quadrature)),
           is_paper_scheme_(lobatto_ && s_ == 4 && n_ == 1 && !general_) {
@@ -255,7 +255,7 @@ protected:
         matrix("mass", "D2", "mass matrix", "M", system.mass);
         scalar("potential", "D3", "", "potential energy", "V", system.potential);
         SparseMatrix inverse(system.n, system.n), S(system.n, system.n);
-        if (d_.structure.diagonal_mass) {
+        if (d_.structure.constant_mass().diagonal_mass) {
             for (const auto& [place, value] : system.mass.entries()) inverse.put(place.first, place.second, 1 / value);
         } else {
             const GiNaC::matrix full = system.mass.dense().inverse();
@@ -272,9 +272,9 @@ protected:
         }
         for (const auto& [place, value] : system.mass.entries())
             momenta[static_cast<std::size_t>(place.first)] += value * system.v[static_cast<std::size_t>(place.second)];
-        for (const auto& [k, j] : d_.structure.entries) {
+        for (const auto& [k, j] : d_.structure.constant_mass().entries) {
             ex sum = 0;
-            if (d_.structure.diagonal_mass)
+            if (d_.structure.constant_mass().diagonal_mass)
                 sum = inverse(static_cast<std::size_t>(k), static_cast<std::size_t>(k)) *
                       system.hessian(static_cast<std::size_t>(k), static_cast<std::size_t>(j));
             else
@@ -313,7 +313,7 @@ protected:
 
     // (D29): the gradient of R, and with it the velocities of the cyclic coordinates.
     void routhian() {
-        const Routhian& routhian = d_.structure.routhian;
+        const Routhian& routhian = d_.structure.routhian();
         section("Without the cyclic coordinates");
         for (const GiNaC::symbol& momentum : routhian.P) rename(momentum, momentum.get_name());
         const auto named = [&](const std::string& letter, const std::vector<int>& which) {
@@ -341,7 +341,7 @@ protected:
     void general_step() {
         const Quadrature& q = d_.quadrature;
         const std::size_t r = q.nodes.size(), unknowns = controls_ - 1;
-        const bool multiplier = lobatto_ && !d_.structure.routhian.cyclic.empty();
+        const bool multiplier = lobatto_ && !d_.structure.routhian().cyclic.empty();
         section("The step: all positions but the first, in blocks of all coordinates");
         std::map<std::string, std::vector<GiNaC::symbol>> node;  // g_v at node 1, 2 ...
         for (const char* block :
@@ -410,7 +410,7 @@ public:
     Description run() {
         result_.name = d_.scene.name;
         result_.title = d_.scene.title;
-        result_.findings = d_.structure.findings;
+        result_.findings = d_.findings;
         facts();
         quadrature();
         if (general_)
@@ -420,11 +420,11 @@ public:
         if (written_out_ && !general_) discrete_equations();
         if (general_) {
             if (written_out_) general_equations();
-            if (!d_.structure.routhian.cyclic.empty()) routhian();
+            if (!d_.structure.routhian().cyclic.empty()) routhian();
             general_step();
         } else if (written_out_) {
             if (lobatto_) full_system();
-            if (d_.structure.form == Form::linear_map && n_ == 1)
+            if (d_.structure.form() == Form::linear_map && n_ == 1)
                 propagation_of_one();
             else
                 reduced_system();

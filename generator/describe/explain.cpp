@@ -37,8 +37,8 @@ bool has_linear_terms(const System& system) {
 
 // Points of a step where positions are unknown: of a general step all control points but the first.
 int unknown_points(const Derivation& d) {
-    if (d.structure.is_explicit) return 0;
-    if (d.structure.form != Form::general) return d.quadrature.points - 2;
+    if (d.structure.is_explicit()) return 0;
+    if (d.structure.form() != Form::general) return d.quadrature.points - 2;
     return d.scene.method.family == Family::lobatto ? d.scene.method.points - 1 : d.scene.method.points;
 }
 
@@ -83,7 +83,7 @@ std::string kind_of(const Derivation& derivation) {
 
 std::string form_of(const Derivation& derivation) {
     const int points = unknown_points(derivation);
-    switch (derivation.structure.form) {
+    switch (derivation.structure.form()) {
         case Form::linear_map:
             return "one matrix takes positions and momenta from one step to the next; nothing is solved for";
         case Form::separable:
@@ -108,23 +108,24 @@ int unknowns_of(const Derivation& derivation) {
 
 std::vector<GroupSolve> solves_of(const Derivation& derivation) {
     const Structure& structure = derivation.structure;
-    if (structure.form == Form::linear_map) return {};
-    const bool general = structure.form == Form::general;
+    if (structure.form() == Form::linear_map) return {};
+    const bool general = structure.form() == Form::general;
     const int points = unknown_points(derivation);
     // One multiplier a cyclic coordinate with Lobatto: its momentum may sway within a step.
     const int multipliers = general && derivation.scene.method.family == Family::lobatto
-                                ? static_cast<int>(structure.routhian.cyclic.size())
+                                ? static_cast<int>(structure.routhian().cyclic.size())
                                 : 0;
     std::vector<GroupSolve> solves;
     for (const Group& group : structure.groups) {
         GroupSolve solve;
         for (const int k : group.coordinates)
-            solve.coordinates.push_back(general ? structure.routhian.active[static_cast<std::size_t>(k)] : k);
+            solve.coordinates.push_back(general ? structure.routhian().active[static_cast<std::size_t>(k)] : k);
         solve.unknowns = points * static_cast<int>(group.coordinates.size()) + multipliers;
         solve.band =
             multipliers > 0 ? solve.unknowns - 1 : std::min((group.bandwidth + 1) * points, solve.unknowns) - 1;
-        const bool free = !general && std::none_of(structure.entries.begin(), structure.entries.end(),
-                                                   [&](const auto& e) { return e.first == group.coordinates.front(); });
+        const bool free =
+            !general && std::none_of(structure.constant_mass().entries.begin(), structure.constant_mass().entries.end(),
+                                     [&](const auto& e) { return e.first == group.coordinates.front(); });
         solve.method = free || solve.unknowns == 0        ? "nothing to solve"
                        : 3 * solve.band >= solve.unknowns ? "full matrix"
                                                           : "banded matrix";
@@ -134,7 +135,7 @@ std::vector<GroupSolve> solves_of(const Derivation& derivation) {
 }
 
 long elimination_of(const Derivation& derivation) {
-    const bool factored = derivation.structure.linear || derivation.structure.absorbed;  // once for all
+    const bool factored = derivation.structure.linear || derivation.structure.absorbed();  // once for all
     long multiplications = 0;
     for (const GroupSolve& solve : solves_of(derivation)) {
         const long N = solve.unknowns, band = solve.band;
@@ -165,15 +166,15 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    const bool has_fixed_point = !derivation.structure.general &&
-                                 (derivation.structure.form == Form::separable || derivation.system.n <= most_swept);
+    const bool has_fixed_point = !derivation.structure.full() &&
+                                 (derivation.structure.form() == Form::separable || derivation.system.n <= most_swept);
     std::string text = derivation.structure.linear ? "once a step, without iteration; "
                        : has_fixed_point
                            ? "by fixed-point iteration over all points at once; where it does not contract, "
                            : "";
     if (!derivation.structure.linear)
-        text +=
-            derivation.structure.absorbed ? "by iterations with one matrix for all steps; " : "by Newton's iteration; ";
+        text += derivation.structure.absorbed() ? "by iterations with one matrix for all steps; "
+                                                : "by Newton's iteration; ";
     if (solves.size() == 1) return text + kinds.front().first;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
         const auto& [how, list] = kinds[i];

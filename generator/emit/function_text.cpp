@@ -38,7 +38,7 @@ std::string plain_name(const Graph& graph, Id id) {
 // Programs whose values prepare() stores itself.
 bool is_prepared(const Program& program) {
     static const std::set<std::string> names = {"prepare", "prepare_map", "mass", "inverse_mass"};
-    return names.contains(program.name) || program.name.ends_with("_a");
+    return names.contains(program.name) || (program.part && program.part->of == LoopPart::Of::coefficients);
 }
 
 }  // namespace

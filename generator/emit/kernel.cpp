@@ -91,7 +91,7 @@ public:
                 tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
                 coefficients() + prepare(name);
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
-        for (const Declaration& declaration : declarations(d_.structure.form)) text += function(declaration);
+        for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
             text +=
                 "\n    // (D20) The whole step: (q1, p1) = Phi (q, p) + shift.\n"
@@ -129,7 +129,7 @@ private:
                                 coordinate.unit.empty() ? "" : " [" + comment_safe(coordinate.unit) + "]");
         }
         text += "\n";
-        for (const Finding& finding : d_.structure.findings)
+        for (const Finding& finding : d_.findings)
             if (finding.holds)
                 text += wrapped(fmt::format("// Structure    {}: {}", finding.name, comment_safe(finding.reason)),
                                 "//              ");
@@ -145,13 +145,13 @@ private:
     bool is_put_in_place(const Declaration& declaration) const {
         const std::string name = declaration.program;
         if (name == "stage") return takes_angles(declaration);
-        return d_.structure.form == Form::separable && !d_.structure.looped &&
+        return d_.structure.form() == Form::separable && !d_.structure.looped &&
                (name == "node" || name == "minus_acceleration" || name == "remainder") &&
                optimised_.cost_of_node <= 200;
     }
 
     std::string costs() const {
-        if (d_.structure.form != Form::separable) return "";
+        if (d_.structure.form() != Form::separable) return "";
         const bool uses_hessian = optimised_.uses_hessian, remainder = optimised_.has_remainder;
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool has_remainder = {};", remainder),
                            remainder ? "forces without the part in the stage map are a function of their own"
@@ -163,10 +163,10 @@ private:
 
     // Whether `stage` is written out, in packs of double: where angles may be near others.
     bool has_near_angles() const {
-        return d_.structure.form == Form::general && !d_.structure.looped && options_.precision == Precision::double_;
+        return d_.structure.form() == Form::general && !d_.structure.looped && options_.precision == Precision::double_;
     }
     std::string near_angles() const {
-        if (d_.structure.form != Form::general) return "";
+        if (d_.structure.form() != Form::general) return "";
         const std::string comment = angles_.empty()
                                         ? "stage computes all its sines and cosines anew"
                                         : "whose sines and cosines stage is given, anew or from those of angles near";
@@ -371,14 +371,14 @@ private:
     }
 
     bool takes_how(const Declaration& declaration) const {
-        return d_.structure.neighbours && has_lanes(options_.precision) &&
+        return d_.structure.neighbours() && has_lanes(options_.precision) &&
                std::string(declaration.program) == "minus_acceleration";
     }
     bool forced() const {
         return std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
                            [](const GiNaC::ex& force) { return !force.is_zero(); });
     }
-    bool is_map() const { return d_.structure.form == Form::linear_map; }
+    bool is_map() const { return d_.structure.form() == Form::linear_map; }
 
     const Derivation& d_;
     const OptimisedPrograms& optimised_;
@@ -393,16 +393,16 @@ private:
 
 // Where the Stepper of a kernel is; as stepping_of in runtime/kernel/base/contract.hpp.
 std::string stepper_of(const Structure& structure) {
-    if (structure.form == Form::linear_map) return "steppers/linear.hpp";
-    if (structure.form == Form::general) return "steppers/general.hpp";
-    return structure.clean         ? "steppers/clean.hpp"
-           : structure.is_explicit ? "steppers/splitting.hpp"
-                                   : "steppers/separable.hpp";
+    if (structure.form() == Form::linear_map) return "steppers/linear.hpp";
+    if (structure.form() == Form::general) return "steppers/general.hpp";
+    return structure.clean()         ? "steppers/clean.hpp"
+           : structure.is_explicit() ? "steppers/splitting.hpp"
+                                     : "steppers/separable.hpp";
 }
 
 std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
     std::set<std::string> parts = {stepper_of(derivation.structure)};
-    if (derivation.structure.neighbours) parts.insert("iteration/neighbours.hpp");
+    if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
     if (!derivation.scene.outputs.events.empty()) parts.insert("steppers/events.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
             case Op::sin:
@@ -434,7 +434,7 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
 
 KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options) {
     KernelSource source;
-    source.form = derivation.structure.form;
+    source.form = derivation.structure.form();
     source.support = support_of(derivation, optimised.programs.graph);
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);

@@ -11,10 +11,6 @@ namespace lobatto {
 
 namespace {
 
-std::string element_name(std::size_t number) {
-    return fmt::format("element_{}", number + 1);
-}
-
 std::string indented(const std::string& lines) {
     std::string text;
     std::size_t begin = 0;
@@ -36,8 +32,9 @@ LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, P
       precision_(precision),
       style_{precision, Phase::step_size, true, false, Notation::cpp, {}},
       names_(std::move(names)),
-      general_(derivation.structure.form == Form::general),
-      neighbours_(derivation.structure.neighbours && has_lanes(precision)) {}
+      general_(derivation.structure.form() == Form::general),
+      neighbours_(derivation.structure.neighbours() && has_lanes(precision)),
+      elements_(static_cast<int>(derivation.structure.elements.repeated.size())) {}
 
 const Program& LoopedText::program(const std::string& name) const {
     return *std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
@@ -45,17 +42,17 @@ const Program& LoopedText::program(const std::string& name) const {
 
 std::string LoopedText::tables() const {
     std::string text;
-    const auto& entries = d_.structure.entries;
     std::map<std::pair<int, int>, int> place;
     if (general_) {
-        for (const auto& [entry, value] : d_.structure.routhian.second.entries())
+        for (const auto& [entry, value] : d_.structure.routhian().second.entries())
             place.emplace(entry, static_cast<int>(place.size()));
     } else {
-        for (const auto& entry : entries) place.emplace(entry, static_cast<int>(place.size()));
+        for (const auto& entry : d_.structure.constant_mass().entries)
+            place.emplace(entry, static_cast<int>(place.size()));
     }
-    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
-        const Element& element = d_.structure.elements.repeated[number];
-        const std::string name = element_name(number);
+    for (int number = 0; number < elements_; ++number) {
+        const Element& element = element_of(number);
+        const std::string name = element_text(number);
         std::vector<int> variables, positions;
         const auto pairs = pairs_of(element);
         for (const auto& row : element.rows) {
@@ -93,11 +90,11 @@ std::string LoopedText::tables() const {
 std::string LoopedText::fields() const {
     std::string text;
     if (!general_) text += "        number mass[coordinates], inverse_mass[coordinates];\n";
-    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
-        const Element& element = d_.structure.elements.repeated[number];
+    for (int number = 0; number < elements_; ++number) {
+        const Element& element = element_of(number);
         if (!element.a.empty() && has_parameters(element))
             text +=
-                fmt::format("        number {}_a[{}];\n", element_name(number), element.rows.size() * element.a.size());
+                fmt::format("        number {}_a[{}];\n", element_text(number), element.rows.size() * element.a.size());
     }
     return text;
 }
@@ -117,8 +114,7 @@ std::vector<Output> LoopedText::prepared() const {
         append("mass");
         append("inverse_mass");
     }
-    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number)
-        append(element_name(number) + "_a");
+    for (int number = 0; number < elements_; ++number) append(name_of({number, LoopPart::Of::coefficients}));
     return result;
 }
 
@@ -138,16 +134,17 @@ std::string LoopedText::statements(const std::string& name, const std::string& i
     return indent.empty() ? lines : indented(lines);
 }
 
-// The rows of all elements, for the programs of one part: "node", "slope", "energy".
-std::string LoopedText::loops(const std::string& part, const char* variables) const {
+// The rows of all elements, for their programs of one part.
+std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
     std::string text;
-    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
-        const Element& element = d_.structure.elements.repeated[number];
-        const std::string name = element_name(number);
-        const bool exists = std::any_of(p_.programs.begin(), p_.programs.end(),
-                                        [&](const Program& p) { return p.name == name + "_" + part; });
-        if (!exists || program(name + "_" + part).outputs.empty()) continue;
-        const std::string inside = statements(name + "_" + part, "    ");
+    for (int number = 0; number < elements_; ++number) {
+        const Element& element = element_of(number);
+        const std::string name = element_text(number);
+        const LoopPart wanted{number, part};
+        const bool exists =
+            std::any_of(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.part == wanted; });
+        if (!exists || program(name_of(wanted)).outputs.empty()) continue;
+        const std::string inside = statements(name_of(wanted), "    ");
         std::string begin;
         for (std::size_t j = 0; j < element.x.size(); ++j) {
             const std::string index = fmt::format("i{}", j), value = fmt::format("x{}", j);
@@ -176,13 +173,13 @@ static std::size_t variable_of(const Output& output) {
 
 std::vector<RowFunction> LoopedText::row_functions() const {
     std::vector<RowFunction> result;
-    for (std::size_t number = 0; neighbours_ && number < d_.structure.elements.repeated.size(); ++number) {
-        const Element& element = d_.structure.elements.repeated[number];
+    for (int number = 0; neighbours_ && number < elements_; ++number) {
+        const Element& element = element_of(number);
         if (element.x.empty()) continue;
-        const std::string name = element_name(number);
+        const std::string name = element_text(number);
         std::vector<Output> list;
         std::string takes;
-        for (const Output& output : program(name + "_slope").outputs) {
+        for (const Output& output : program(name_of({number, LoopPart::Of::slope})).outputs) {
             list.push_back({fmt::format("rows.result[{}]", variable_of(output)), output.value});
             if (output.effect == Effect::subtract)
                 takes += fmt::format("        rows.takes[{}] = true;\n", variable_of(output));
@@ -206,16 +203,16 @@ std::vector<RowFunction> LoopedText::row_functions() const {
 // W = M^-1 grad V along the rows, in the way `how`.
 std::string LoopedText::along_rows() const {
     const std::string time = d_.system.autonomous ? "" : "time, ";
-    const FixedEnds& fixed_ends = d_.structure.fixed_ends;
+    const FixedEnds& fixed_ends = d_.structure.separable().fixed_ends;
     std::string text;
     bool is_first = true;
-    for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number) {
-        const Element& element = d_.structure.elements.repeated[number];
+    for (int number = 0; number < elements_; ++number) {
+        const Element& element = element_of(number);
         if (element.x.empty()) continue;  // a constant that repeats: of the energy, not of the forces
-        const std::string name = element_name(number);
+        const std::string name = element_text(number);
         const bool sets = is_first && covers(element, d_.system.n);
         std::string hung;
-        if (number == fixed_ends.element) {
+        if (static_cast<std::size_t>(number) == fixed_ends.element) {
             if (fixed_ends.before) hung = ", lobatto::fixed_before";
             if (fixed_ends.behind) hung += hung.empty() ? ", lobatto::fixed_behind" : " | lobatto::fixed_behind";
         }
@@ -227,7 +224,10 @@ std::string LoopedText::along_rows() const {
                         "            ");
     }
     std::vector<Output> list;
-    for (const Output& output : program(fixed_ends.before || fixed_ends.behind ? "inside_slope" : "rest_slope").outputs)
+    for (const Output& output :
+         program(
+             name_of({fixed_ends.before || fixed_ends.behind ? LoopPart::inside : LoopPart::rest, LoopPart::Of::slope}))
+             .outputs)
         list.push_back({"how::template at<" + output.target.substr(2, output.target.find(']') - 2) + ">(W)",
                         output.value, Effect::add});
     text += FunctionText(p_, list, names_, style_).lines();
@@ -242,20 +242,23 @@ std::string LoopedText::body(const std::string& function) const {
         const std::string clear = coordinates + "W[i] = number(0);\n",
                           scale = coordinates + "W[i] *= k.inverse_mass[i];\n";
         if (function == "node")
-            return clear + clear_entries + "S[e] = number(0);\n" + loops("node", "q") + statements("rest_node", "") +
-                   scale + clear_entries + "S[e] *= k.inverse_mass[entry_row[e]];\n";
+            return clear + clear_entries + "S[e] = number(0);\n" + loops(LoopPart::Of::node, "q") +
+                   statements(name_of({LoopPart::rest, LoopPart::Of::node}), "") + scale + clear_entries +
+                   "S[e] *= k.inverse_mass[entry_row[e]];\n";
         if (function == "minus_acceleration" && neighbours_) return along_rows();
-        if (function == "minus_acceleration") return clear + loops("slope", "q") + statements("rest_slope", "") + scale;
+        if (function == "minus_acceleration")
+            return clear + loops(LoopPart::Of::slope, "q") +
+                   statements(name_of({LoopPart::rest, LoopPart::Of::slope}), "") + scale;
         if (function == "quadratic_part")
-            return !d_.structure.absorbed && !d_.structure.diagonal_part
+            return !d_.structure.absorbed() && !d_.structure.diagonal_part()
                        ? ""
-                       : clear_entries + "S0[e] = real(0);\n" + loops("quadratic", "q") +
-                             statements("rest_quadratic", "") + clear_entries +
+                       : clear_entries + "S0[e] = real(0);\n" + loops(LoopPart::Of::quadratic, "q") +
+                             statements(name_of({LoopPart::rest, LoopPart::Of::quadratic}), "") + clear_entries +
                              "S0[e] *= k.inverse_mass[entry_row[e]];\n";
         if (function == "energy" && d_.scene.outputs.energy)
             return "        number sum = number(0);\n" + coordinates +
-                   "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + loops("energy", "q") +
-                   statements("rest_energy", "") + "        return sum;\n";
+                   "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + loops(LoopPart::Of::energy, "q") +
+                   statements(name_of({LoopPart::rest, LoopPart::Of::energy}), "") + "        return sum;\n";
         if (function == "momentum") return coordinates + "p[i] = k.mass[i] * velocity[i];\n";
         if (function == "velocity") return coordinates + "velocity[i] = k.inverse_mass[i] * p[i];\n";
         return "";
@@ -265,8 +268,10 @@ std::string LoopedText::body(const std::string& function) const {
                              coordinates + "z[coordinates + i] = q[i];\n";
     const std::string slope = join + "        number g[2 * coordinates];\n        slope(k, " + time + "z, g);\n";
     if (function == "node")
-        return clear + clear_entries + "H[e] = number(0);\n" + loops("node", "z") + statements("rest_node", "");
-    if (function == "slope") return clear + loops("slope", "z") + statements("rest_slope", "");
+        return clear + clear_entries + "H[e] = number(0);\n" + loops(LoopPart::Of::node, "z") +
+               statements(name_of({LoopPart::rest, LoopPart::Of::node}), "");
+    if (function == "slope")
+        return clear + loops(LoopPart::Of::slope, "z") + statements(name_of({LoopPart::rest, LoopPart::Of::slope}), "");
     if (function == "slopes")
         return slope + coordinates + "Lv[i] = g[i];\n" + coordinates + "Lq[i] = g[coordinates + i];\n";
     if (function == "momentum") return slope + coordinates + "p[i] = g[i];\n";
@@ -278,8 +283,8 @@ std::string LoopedText::body(const std::string& function) const {
                coordinates + "Lv[i] = g[i];\n" + coordinates +
                "Lq[i] = g[coordinates + i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
     if (function == "energy" && d_.scene.outputs.energy)
-        return join + "        number sum = number(0);\n" + loops("energy", "z") + statements("rest_energy", "") +
-               "        return sum;\n";
+        return join + "        number sum = number(0);\n" + loops(LoopPart::Of::energy, "z") +
+               statements(name_of({LoopPart::rest, LoopPart::Of::energy}), "") + "        return sum;\n";
     return "";
 }
 

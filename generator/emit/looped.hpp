@@ -33,7 +33,10 @@ public:
 private:
     const Program& program(const std::string& name) const;
     std::string statements(const std::string& name, const std::string& indent) const;
-    std::string loops(const std::string& part, const char* variables) const;
+    const Element& element_of(int number) const {
+        return d_.structure.elements.repeated[static_cast<std::size_t>(number)];
+    }
+    std::string loops(LoopPart::Of part, const char* variables) const;
 
     const Derivation& d_;
     const Programs& p_;
@@ -42,6 +45,7 @@ private:
     Naming names_;
     std::string along_rows() const;
     bool general_, neighbours_;
+    int elements_;  // how many
 };
 
 }  // namespace lobatto

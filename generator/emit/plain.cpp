@@ -247,7 +247,7 @@ public:
     }
 
 private:
-    bool is_general() const { return d_.structure.form == Form::general; }
+    bool is_general() const { return d_.structure.form() == Form::general; }
     bool autonomous() const { return d_.system.autonomous; }
 
     std::string preamble() const {
@@ -384,7 +384,7 @@ private:
             std::find_if(p_.programs.begin(), p_.programs.end(), [](const Program& p) { return p.name == "node"; });
         std::vector<Output> outputs = found->outputs;
         std::size_t e = 0;
-        for (const auto& [place, value] : d_.structure.routhian.second.entries())
+        for (const auto& [place, value] : d_.structure.routhian().second.entries())
             for (Output& output : outputs)
                 if (output.target == fmt::format("H[{}]", e) && output.effect == Effect::assign) {
                     output.target = fmt::format("H[{} * Z + {}]", place.first, place.second);

@@ -36,19 +36,19 @@ std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
 std::string separable_shapes(const Structure& structure, const System& system, int nodes, Precision precision) {
     std::string text;
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
-    line(text, fmt::format("bool is_explicit = {}", structure.is_explicit),
-         structure.is_explicit ? "kicks and drifts in turn" : "the inner nodes are solved for");
-    if (structure.form == Form::separable) {
-        line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part),
-             structure.diagonal_part ? "taken into the stage map: the constant part of M^-1 V''"
-                                     : "nothing is taken into the stage map");
-        line(text, fmt::format("bool neighbours = {}", structure.neighbours && has_lanes(precision)),
-             structure.neighbours ? "formulas go along neighbouring coordinates, which lie in lanes"
-                                  : "coordinates are taken one by one");
-        if (structure.neighbours && has_lanes(precision)) {
+    line(text, fmt::format("bool is_explicit = {}", structure.is_explicit()),
+         structure.is_explicit() ? "kicks and drifts in turn" : "the inner nodes are solved for");
+    if (structure.form() == Form::separable) {
+        line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part()),
+             structure.diagonal_part() ? "taken into the stage map: the constant part of M^-1 V''"
+                                       : "nothing is taken into the stage map");
+        line(text, fmt::format("bool neighbours = {}", structure.neighbours() && has_lanes(precision)),
+             structure.neighbours() ? "formulas go along neighbouring coordinates, which lie in lanes"
+                                    : "coordinates are taken one by one");
+        if (structure.neighbours() && has_lanes(precision)) {
             line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
                  "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
-            const bool immediate = is_one_pass(structure.elements, structure.fixed_ends, system.q);
+            const bool immediate = is_one_pass(structure.elements, structure.separable().fixed_ends, system.q);
             const bool unit_masses = has_unit_masses(system);
             line(text, fmt::format("bool unit_masses = {}", unit_masses),
                  unit_masses ? "forces are accelerations" : "forces are divided by them");
@@ -56,18 +56,19 @@ std::string separable_shapes(const Structure& structure, const System& system, i
                  immediate ? "coordinates may move one after another, each as soon as its force is known"
                            : "coordinates move when all forces are known");
         }
-        line(text, fmt::format("bool clean = {}", structure.clean),
-             structure.clean ? "round-off-clean steps" : "steps as fast as can be");
-        line(text, fmt::format("bool absorbed = {}", structure.absorbed),
-             structure.absorbed ? "Newton's iteration has the Jacobian of V's quadratic part"
-                                : "Newton's iteration has its own Jacobians");
+        line(text, fmt::format("bool clean = {}", structure.clean()),
+             structure.clean() ? "round-off-clean steps" : "steps as fast as can be");
+        line(text, fmt::format("bool absorbed = {}", structure.absorbed()),
+             structure.absorbed() ? "Newton's iteration has the Jacobian of V's quadratic part"
+                                  : "Newton's iteration has its own Jacobians");
     }
-    line(text, fmt::format("int entries = {}", structure.entries.size()), "of M^-1 V'' that are not identically zero");
-    return text + places("entry", structure.entries);
+    line(text, fmt::format("int entries = {}", structure.constant_mass().entries.size()),
+         "of M^-1 V'' that are not identically zero");
+    return text + places("entry", structure.constant_mass().entries);
 }
 
 std::string general_shapes(const Derivation& d) {
-    const Routhian& routhian = d.structure.routhian;
+    const Routhian& routhian = d.structure.routhian();
     const auto entries = places_of(routhian.second), mass = places_of(d.system.momentum_v);
     std::string text;
     line(text, fmt::format("int nodes = {}", d.quadrature.nodes.size()), "of the quadrature");
@@ -173,24 +174,24 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     static constexpr const char* forms[] = {"linear_map", "separable", "general"};
     const int controls = static_cast<int>(d.quadrature.control.size());
     const bool multiplier = d.scene.method.family == Family::lobatto;
-    const int unknowns = structure.form == Form::linear_map || structure.is_explicit ? 0
-                         : structure.form == Form::separable
+    const int unknowns = structure.form() == Form::linear_map || structure.is_explicit() ? 0
+                         : structure.form() == Form::separable
                              ? d.system.n * (d.quadrature.points - 2)
-                             : static_cast<int>(structure.routhian.active.size()) * (controls - 1) +
-                                   (multiplier ? static_cast<int>(structure.routhian.cyclic.size()) : 0);
+                             : static_cast<int>(structure.routhian().active.size()) * (controls - 1) +
+                                   (multiplier ? static_cast<int>(structure.routhian().cyclic.size()) : 0);
     std::string text = fmt::format("    using real = {};\n\n", type_name(precision));
     text += fmt::format(
         "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n"
         "    static constexpr const char* method = \"{}\";\n",
         name, digest, d.quadrature.method.name());
-    line(text, fmt::format("lobatto::Form form = lobatto::Form::{}", forms[static_cast<int>(structure.form)]),
+    line(text, fmt::format("lobatto::Form form = lobatto::Form::{}", forms[static_cast<int>(structure.form())]),
          "how a step is taken");
     line(text, fmt::format("int coordinates = {}", d.system.n), "n");
     line(text, fmt::format("int order = {}", d.quadrature.order()), "of accuracy in h");
     line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
-    line(text, fmt::format("bool any_number = {}", !structure.general),
-         structure.general ? "Newton's iteration alone"
-                           : "formulas are templates on the type of numbers: fixed-point iteration first");
+    line(text, fmt::format("bool any_number = {}", !structure.full()),
+         structure.full() ? "Newton's iteration alone"
+                          : "formulas are templates on the type of numbers: fixed-point iteration first");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");
@@ -200,9 +201,9 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     std::vector<int> directions;
     for (const Event& event : outputs.events) directions.push_back(event.direction);
     text += integer_table("event_direction", directions);
-    if (structure.form == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
+    if (structure.form() == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.system, d.quadrature.points, precision);
-    const bool solves = structure.form == Form::separable && !structure.is_explicit;
+    const bool solves = structure.form() == Form::separable && !structure.is_explicit();
     return solves ? text + order_of_unknowns(structure) : text;
 }
 
@@ -230,11 +231,11 @@ std::string tables(const Derivation& d, Precision precision) {
                table.vector("b", rule.b, "kicks at the nodes") +
                table.vector("drift_length", drifts, "between neighbouring nodes");
     }
-    if (d.structure.form != Form::general) {
+    if (d.structure.form() != Form::general) {
         std::string text = "\n" + table.vector("c", rule.c, "nodes on [0, 1]") +
                            table.vector("b", rule.b, "their weights") +
                            table.matrix("A", rule.A, "stage map A_ij over the interior nodes");
-        if (d.structure.form == Form::separable)
+        if (d.structure.form() == Form::separable)
             text +=
                 table.matrix("E", rule.E, "extrapolation from the nodes of one step to the interior nodes of the next");
         return text;

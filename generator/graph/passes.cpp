@@ -14,6 +14,17 @@
 
 namespace lobatto {
 
+std::string element_text(int element) {
+    return element == LoopPart::rest     ? "rest"
+           : element == LoopPart::inside ? "inside"
+                                         : "element_" + std::to_string(element + 1);
+}
+
+std::string name_of(const LoopPart& part) {
+    static constexpr const char* parts[] = {"node", "slope", "quadratic", "energy", "a"};
+    return element_text(part.element) + "_" + parts[static_cast<std::size_t>(part.of)];
+}
+
 namespace {
 
 std::vector<Id> roots_of(const Program& program) {

@@ -2,6 +2,7 @@
 // Graph to graph: fold, factor, powers, phases, shared parts, sine-cosine pairs.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,11 +21,27 @@ struct Output {
     Effect effect = Effect::assign;
 };
 
+// What a program computes of a system in loops: of the rows of one repeated term, or of the terms that do not repeat.
+struct LoopPart {
+    enum class Of : std::uint8_t { node, slope, quadratic, energy, coefficients };
+    static constexpr int rest = -1, inside = -2;  // in place of an element; inside: where fixed ends are rows
+    int element = rest;
+    Of of = Of::node;
+    bool operator==(const LoopPart&) const = default;
+};
+
 // One function of the kernel: its outputs, computed together.
 struct Program {
     std::string name;  // node
     std::vector<Output> outputs;
+    std::optional<LoopPart> part = std::nullopt;
 };
+
+std::string element_text(int element);      // element_1, rest, inside
+std::string name_of(const LoopPart& part);  // element_1_slope
+inline Program program_of(const LoopPart& part) {
+    return {name_of(part), {}, part};
+}
 
 // All programs of a kernel over one graph, so that what they hoist is shared; and names for values that deserve one
 // when hoisted.

@@ -18,6 +18,7 @@ struct Derivation {
     System system;
     Quadrature quadrature;
     Structure structure;
+    std::vector<Finding> findings;  // what the structure rests on, and what was looked for in vain
 
     // The equations of all nodes written out, for people and for checks; a kernel is assembled from one node's formulas
     // and does not need them. Made at the first call.

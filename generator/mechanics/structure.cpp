@@ -104,27 +104,38 @@ public:
           quadrature_(quadrature),
           n_(system.n),
           interior_(n_ * (quadrature.points - 2)) {
-        result_.general = general;
+        general_.full = general;
     }
 
-    Structure run() {
-        result_.is_explicit = quadrature_.is_explicit();
-        result_.clean = scene_.method.arithmetic == StepArithmetic::clean && !result_.general;
-        result_.linear = system_.linear && !result_.general && !result_.clean;
+    std::pair<Structure, std::vector<Finding>> run() {
+        separable_.is_explicit = quadrature_.is_explicit();
+        separable_.clean = scene_.method.arithmetic == StepArithmetic::clean && !general_.full;
+        result_.linear = system_.linear && !general_.full && !separable_.clean;
         result_.closed_solution = closed_solution(system_);
         choose_form();
-        if (result_.form == Form::general)
+        if (form_ == Form::general)
             general();
         else
             separable();
         time_and_forces();
         solution();
-        return std::move(result_);
+        switch (form_) {
+            case Form::linear_map:
+                result_.of_form = LinearMapForm{std::move(separable_)};
+                break;
+            case Form::separable:
+                result_.of_form = std::move(separable_);
+                break;
+            case Form::general:
+                result_.of_form = std::move(general_);
+                break;
+        }
+        return {std::move(result_), std::move(findings_)};
     }
 
 private:
     void find(const std::string& name, bool holds, const std::string& reason) {
-        result_.findings.push_back({name, holds, reason});
+        findings_.push_back({name, holds, reason});
     }
     std::string name(int k) const { return system_.q[static_cast<std::size_t>(k)].get_name(); }
     // x, y, z and 9 more
@@ -140,8 +151,8 @@ private:
     }
 
     void choose_form() {
-        if (result_.general) {
-            result_.form = Form::general;
+        if (general_.full) {
+            form_ = Form::general;
             find("general path", true,
                  "asked for: nothing is looked for, all nodes of a step are solved for with full matrices");
             return;
@@ -151,8 +162,8 @@ private:
                                : system_.not_separable + ", so the end of a step is solved for with the points inside");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
-        result_.diagonal_mass = system_.separable && diagonal;
-        if (result_.clean) {
+        separable_.diagonal_mass = system_.separable && diagonal;
+        if (separable_.clean) {
             find("round-off-clean arithmetic", true,
                  "asked for: every step is iterated until nothing changes and its increments are added without error, "
                  "so that rounding errors grow like a random walk");
@@ -160,13 +171,13 @@ private:
         }
         const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
         // The inverse of a full mass matrix is written out: few coordinates only, or nothing to solve.
-        const bool takes_mass = result_.diagonal_mass || interior_ <= full_mass_limit;
-        if (!system_.separable || (!takes_mass && !result_.is_explicit))
-            result_.form = Form::general;
+        const bool takes_mass = separable_.diagonal_mass || interior_ <= full_mass_limit;
+        if (!system_.separable || (!takes_mass && !separable_.is_explicit))
+            form_ = Form::general;
         else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted && takes_mass)
-            result_.form = Form::linear_map;
-        if (!result_.is_explicit) return;
-        result_.linear = result_.form == Form::linear_map;
+            form_ = Form::linear_map;
+        if (!separable_.is_explicit) return;
+        result_.linear = form_ == Form::linear_map;
         find("explicit steps", true,
              "asked for: positions and velocities move in turn, straight from node to node, and nothing is solved for");
     }
@@ -178,27 +189,27 @@ private:
                 coupling = fmt::format("L holds {}'*{}' with the factor {}", name(place.first), name(place.second),
                                        canonical_text(value));
         if (n_ > 1)
-            find("diagonal mass matrix", result_.diagonal_mass,
-                 result_.diagonal_mass
+            find("diagonal mass matrix", separable_.diagonal_mass,
+                 separable_.diagonal_mass
                      ? "no two velocities are multiplied: each momentum is its own mass times velocity"
                      : coupling);
         linearity();
         // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has
         // one.
-        if (result_.diagonal_mass) {
-            for (const auto& [place, value] : system_.hessian.entries()) result_.entries.push_back(place);
+        if (separable_.diagonal_mass) {
+            for (const auto& [place, value] : system_.hessian.entries()) separable_.entries.push_back(place);
         } else {
             std::set<int> columns;
             for (const auto& [place, value] : system_.hessian.entries()) columns.insert(place.second);
             for (int i = 0; i < n_; ++i)
-                for (const int j : columns) result_.entries.emplace_back(i, j);
+                for (const int j : columns) separable_.entries.emplace_back(i, j);
         }
-        const bool full = result_.entries.size() == static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_);
+        const bool full = separable_.entries.size() == static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_);
         if (n_ > 1)
             find("sparse second derivatives", !full,
                  full ? fmt::format("all {} entries of M^-1 V'' occur", n_ * n_)
                       : fmt::format("{} of {} entries of M^-1 V'' are not zero, and only they are computed",
-                                    result_.entries.size(), n_ * n_));
+                                    separable_.entries.size(), n_ * n_));
         std::set<int> free;
         for (int k = 0; k < n_; ++k) free.insert(k);
         for (const auto& [place, value] : system_.hessian.entries()) {
@@ -207,25 +218,25 @@ private:
         }
         for (int k = 0; k < n_; ++k)
             if (!system_.gradient[static_cast<std::size_t>(k)].is_zero()) free.erase(k);
-        if (!result_.diagonal_mass) free.clear();
+        if (!separable_.diagonal_mass) free.clear();
         find("cyclic coordinates", !free.empty(),
              free.empty() ? "no coordinate is without a force"
                           : names(free) + ": without a force, so the motion is uniform and nothing is solved for");
         Couplings couplings(static_cast<std::size_t>(n_));
-        for (const auto& [row, column] : result_.entries) couplings.add(row, column);
+        for (const auto& [row, column] : separable_.entries) couplings.add(row, column);
         result_.groups = couplings.groups();
-        if (!result_.is_explicit) describe_groups();
-        if (result_.form == Form::linear_map) return;
+        if (!separable_.is_explicit) describe_groups();
+        if (form_ == Form::linear_map) return;
         repetition();
         absorption();
         neighbourhood();
     }
 
     void general() {
-        const std::vector<int> cyclic = result_.general ? std::vector<int>{} : find_cyclic(scene_, system_);
-        result_.routhian = reduce(system_, cyclic);
-        const int active = static_cast<int>(result_.routhian.active.size());
-        if (result_.general) {
+        const std::vector<int> cyclic = general_.full ? std::vector<int>{} : find_cyclic(scene_, system_);
+        general_.routhian = reduce(system_, cyclic);
+        const int active = static_cast<int>(general_.routhian.active.size());
+        if (general_.full) {
             Group all;
             for (int k = 0; k < active; ++k) all.coordinates.push_back(k);
             all.bandwidth = active - 1;
@@ -240,7 +251,7 @@ private:
                        ": L holds only the velocity, so the momentum is constant and the motion "
                        "follows from it without equations");
         Couplings couplings(static_cast<std::size_t>(active));
-        for (const auto& [place, value] : result_.routhian.second.entries())
+        for (const auto& [place, value] : general_.routhian.second.entries())
             if (place.first < 2 * active && place.second < 2 * active)
                 couplings.add(place.first % active, place.second % active);
         result_.groups = couplings.groups();
@@ -251,8 +262,8 @@ private:
             all.bandwidth = active - 1;
             result_.groups = {all};
         }
-        const std::size_t size = result_.routhian.z.size();
-        const std::size_t present = result_.routhian.second.entries().size();
+        const std::size_t size = general_.routhian.z.size();
+        const std::size_t present = general_.routhian.second.entries().size();
         find("sparse second derivatives", present < size * size,
              present == size * size
                  ? fmt::format("all {} second derivatives of L occur", present)
@@ -264,8 +275,8 @@ private:
 
     // Terms of V, or of L, that are one formula of many variables.
     void repetition() {
-        const bool general = result_.form == Form::general;
-        if (result_.form == Form::linear_map || (!general && !result_.diagonal_mass)) return;
+        const bool general = form_ == Form::general;
+        if (form_ == Form::linear_map || (!general && !separable_.diagonal_mass)) return;
         std::vector<ex> terms;
         std::vector<std::pair<int, ex>> forces;
         for (const ex& term : general ? system_.terms : all_at(system_.terms, system_.v, 0))
@@ -279,7 +290,7 @@ private:
         }
         const std::size_t count = terms.size() + forces.size();
         if (count < looped_from) return;
-        Elements elements = find_elements(system_, general ? result_.routhian.z : system_.q, terms, forces);
+        Elements elements = find_elements(system_, general ? general_.routhian.z : system_.q, terms, forces);
         const std::size_t single = elements.others.size() + elements.other_forces.size();
         result_.looped = 4 * single <= count;
         if (result_.looped) result_.elements = std::move(elements);
@@ -292,8 +303,9 @@ private:
 
     // The quadratic part of V: worth taking out of the iteration when the rest bends the forces less at the start.
     void absorption() {
-        if (result_.linear || result_.clean || result_.is_explicit || interior_ == 0 || !result_.diagonal_mass) return;
-        result_.constant_hessian = SparseMatrix(n_, n_);
+        if (result_.linear || separable_.clean || separable_.is_explicit || interior_ == 0 || !separable_.diagonal_mass)
+            return;
+        separable_.constant_hessian = SparseMatrix(n_, n_);
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
         std::vector<ex> whole, rest;
@@ -302,14 +314,14 @@ private:
         for (const auto& [place, value] : system_.hessian.entries()) {
             const ex constant = constant_part.of(value);
             if (!constant.is_zero()) {
-                result_.constant_hessian.put(place.first, place.second, constant);
+                separable_.constant_hessian.put(place.first, place.second, constant);
                 diagonal = diagonal && place.first == place.second;
             }
             const ex mass = system_.mass(static_cast<std::size_t>(place.first), static_cast<std::size_t>(place.first));
             whole.push_back(value / mass);
             rest.push_back((value - constant) / mass);
         }
-        if (result_.constant_hessian.entries().empty()) {
+        if (separable_.constant_hessian.entries().empty()) {
             find("quadratic part absorbed", false, "V has no quadratic part");
             return;
         }
@@ -319,17 +331,17 @@ private:
             without = contraction_of(whole);
         } catch (const DomainError&) {  // then as if there were no quadratic part
         }
-        result_.diagonal_part = diagonal && with < without;
-        result_.absorbed = !result_.diagonal_part && with < 0.1;
+        separable_.diagonal_part = diagonal && with < without;
+        separable_.absorbed = !separable_.diagonal_part && with < 0.1;
         std::string reason = fmt::format(
             "without its quadratic part V bends the forces as much at the start, so nothing is taken out of the "
             "iteration");
-        if (result_.diagonal_part)
+        if (separable_.diagonal_part)
             reason = fmt::format(
                 "the constant part of V'' is diagonal and taken into the stage map: at the start an iteration "
                 "leaves {:.1g} of the error, not {:.1g}",
                 with, without);
-        else if (result_.absorbed)
+        else if (separable_.absorbed)
             reason = fmt::format(
                 "V is nearly quadratic at the start, so that where the fixed-point iteration does not contract one "
                 "matrix serves "
@@ -337,19 +349,19 @@ private:
                 with);
         else if (!diagonal)
             reason = "the constant part of V'' couples coordinates, and the rest is no small part of the forces";
-        find("quadratic part absorbed", result_.diagonal_part || result_.absorbed, reason);
+        find("quadratic part absorbed", separable_.diagonal_part || separable_.absorbed, reason);
     }
 
     void neighbourhood() {
-        if (!result_.looped || result_.linear || result_.clean) return;
-        result_.neighbours = !result_.general && !result_.diagonal_part && are_neighbours(result_.elements);
-        find("neighbouring coordinates", result_.neighbours,
-             result_.neighbours      ? "formulas go along coordinates that stand side by side: vector lanes hold these"
-             : result_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
-                                     : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
-        if (!result_.neighbours) return;
-        result_.fixed_ends = fixed_ends_of(result_.elements, system_.q);
-        const bool before = result_.fixed_ends.before, behind = result_.fixed_ends.behind;
+        if (!result_.looped || result_.linear || separable_.clean) return;
+        separable_.neighbours = !general_.full && !separable_.diagonal_part && are_neighbours(result_.elements);
+        find("neighbouring coordinates", separable_.neighbours,
+             separable_.neighbours ? "formulas go along coordinates that stand side by side: vector lanes hold these"
+             : separable_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
+                                        : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
+        if (!separable_.neighbours) return;
+        separable_.fixed_ends = fixed_ends_of(result_.elements, system_.q);
+        const bool before = separable_.fixed_ends.before, behind = separable_.fixed_ends.behind;
         if (before || behind)
             find("fixed ends", true,
                  (before && behind ? "both ends are"
@@ -386,9 +398,9 @@ private:
 
     void linearity() {
         std::string reason = "all forces are linear, so a step is one matrix: nothing is iterated";
-        if (result_.linear && result_.form != Form::linear_map)
+        if (result_.linear && form_ != Form::linear_map)
             reason = "all forces are linear, so one solve a step is exact, its matrix factored once for all steps";
-        if (result_.is_explicit && system_.linear && !result_.linear) return;  // of no use
+        if (separable_.is_explicit && system_.linear && !result_.linear) return;  // of no use
         if (!result_.linear) reason = curved();
         find("linear system", result_.linear, reason);
     }
@@ -423,9 +435,9 @@ private:
     }
 
     void describe_groups() {
-        if (n_ == 1 || (result_.form == Form::general && result_.routhian.active.size() == 1)) return;
+        if (n_ == 1 || (form_ == Form::general && general_.routhian.active.size() == 1)) return;
         const std::size_t count = result_.groups.size();
-        const auto& in = result_.form == Form::general ? result_.routhian.active : std::vector<int>{};
+        const auto& in = form_ == Form::general ? general_.routhian.active : std::vector<int>{};
         const auto listed = [&](const Group& group) {
             std::vector<int> coordinates;
             for (const int k : group.coordinates)
@@ -486,10 +498,26 @@ private:
     const System& system_;
     const Quadrature& quadrature_;
     const int n_, interior_;
+    Form form_ = Form::separable;
+    SeparableForm separable_;  // also what is known of a linear map
+    GeneralForm general_;
     Structure result_;
+    std::vector<Finding> findings_;
 };
 
 }  // namespace
+
+const ConstantMassForm& Structure::constant_mass() const {
+    if (form() == Form::linear_map) return std::get<LinearMapForm>(of_form);
+    return separable();
+}
+
+void Structure::iterate() {
+    if (form() != Form::linear_map) return;
+    SeparableForm separable;
+    static_cast<ConstantMassForm&>(separable) = std::get<LinearMapForm>(of_form);
+    of_form = std::move(separable);
+}
 
 ConstantPart::ConstantPart(const std::vector<GiNaC::symbol>& variables) {
     for (const auto& symbol : variables) variables_.insert(symbol);
@@ -522,7 +550,8 @@ ex ConstantPart::of(const ex& value) const {
     return factor * of(sum);
 }
 
-Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general) {
+std::pair<Structure, std::vector<Finding>> find_structure(const Scene& scene, const System& system,
+                                                          const Quadrature& quadrature, bool general) {
     return Finder(scene, system, quadrature, general).run();
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "generator/mechanics/elements.hpp"
@@ -29,13 +30,6 @@ struct ClosedSolution {
     GiNaC::ex omega_squared;  // w2, in parameters
 };
 
-// How a step is taken.
-enum class Form {
-    linear_map,  // one affine map, no equations: autonomous linear systems with few coordinates
-    separable,   // constant mass matrix: only the interior nodes are implicit (D11 ... D17)
-    general      // any L: all nodes but the first are implicit (D25 ... D30)
-};
-
 // L without the cyclic coordinates: their velocities eliminated for their momenta P (Routh). Variables z = (v, q, P),
 // v and q of the active coordinates. Without cyclic coordinates R = L.
 struct Routhian {
@@ -52,26 +46,54 @@ struct Group {
     int bandwidth = 0;             // the largest distance in this order of two that are coupled
 };
 
+// The forms of a step, each with what was found for it.
+//
+// What the forms of a constant mass matrix share.
+struct ConstantMassForm {
+    bool is_explicit = false;                  // nothing is solved for (steppers/splitting.hpp)
+    bool diagonal_mass = false;                // no two velocities are multiplied
+    std::vector<std::pair<int, int>> entries;  // where M^-1 V'' is not identically zero, row by row
+};
+// One affine map, no equations: autonomous linear systems with few coordinates.
+struct LinearMapForm : ConstantMassForm {};
+// Only the interior nodes are implicit (D11 ... D17).
+struct SeparableForm : ConstantMassForm {
+    bool clean = false;             // steps are round-off-clean (steppers/clean.hpp), in loops
+    bool neighbours = false;        // the formulas of loops go along neighbouring coordinates
+    FixedEnds fixed_ends;           // of neighbours
+    bool diagonal_part = false;     // the constant part of M^-1 V'' is diagonal, and taken into the stage map (D31)
+    bool absorbed = false;          // Newton's iteration has the Jacobian of V's quadratic part (D31)
+    SparseMatrix constant_hessian;  // the part of V'' that does not depend on q
+};
+// Any L: all nodes but the first are implicit (D25 ... D30).
+struct GeneralForm {
+    bool full = false;  // asked for: nothing is looked for, matrices are full
+    Routhian routhian;
+};
+enum class Form { linear_map, separable, general };  // in the order of Structure's variant
+
 struct Structure {
-    Form form = Form::separable;
-    bool general = false;        // all that follows was switched off
-    bool is_explicit = false;    // separable: nothing is solved for (steppers/splitting.hpp)
-    bool clean = false;          // separable: steps are round-off-clean (steppers/clean.hpp), in loops
-    bool linear = false;         // constant second derivatives: one correction, its Jacobian factored once a step size
-    bool diagonal_mass = false;  // of a separable system
-    bool looped = false;         // terms of L that repeat are written once, in loops over tables
-    Elements elements;           // looped: of V in q, or of L in z
-    FixedEnds fixed_ends;        // of neighbours
-    bool neighbours = false;     // looped, and its formulas go along neighbouring coordinates
-    bool diagonal_part =
-        false;              // separable: the constant part of M^-1 V'' is diagonal, and taken into the stage map (D31)
-    bool absorbed = false;  // separable: Newton's iteration has the Jacobian of V's quadratic part (D31)
-    SparseMatrix constant_hessian;             // the part of V'' that does not depend on q
-    std::vector<std::pair<int, int>> entries;  // separable: where M^-1 V'' is not identically zero, row by row
-    Routhian routhian;                         // general
+    std::variant<LinearMapForm, SeparableForm, GeneralForm> of_form;
+    bool linear = false;  // constant second derivatives: one correction, its Jacobian factored once a step size
+    bool looped = false;  // terms of L that repeat are written once, in loops over tables
+    Elements elements;    // looped: of V in q, or of L in z
     std::vector<Group> groups;
     std::optional<ClosedSolution> closed_solution;
-    std::vector<Finding> findings;  // all of the above and what was looked for in vain, in words
+
+    Form form() const { return static_cast<Form>(of_form.index()); }
+    // Of both forms with constant mass.
+    const ConstantMassForm& constant_mass() const;
+    const SeparableForm& separable() const { return std::get<SeparableForm>(of_form); }
+    const Routhian& routhian() const { return std::get<GeneralForm>(of_form).routhian; }
+    // A linear map is taken as a separable step.
+    void iterate();
+    // Of any form: false where the form has no such thing.
+    bool is_explicit() const { return form() != Form::general && constant_mass().is_explicit; }
+    bool clean() const { return form() == Form::separable && separable().clean; }
+    bool neighbours() const { return form() == Form::separable && separable().neighbours; }
+    bool diagonal_part() const { return form() == Form::separable && separable().diagonal_part; }
+    bool absorbed() const { return form() == Form::separable && separable().absorbed; }
+    bool full() const { return form() == Form::general && std::get<GeneralForm>(of_form).full; }
 };
 
 // Coordinates of a linear map; unknowns of a separable step whose constant mass matrix is full.
@@ -89,7 +111,9 @@ private:
     std::set<GiNaC::ex, GiNaC::ex_is_less> variables_;
 };
 
-// `general`: find nothing, for comparison.
-Structure find_structure(const Scene& scene, const System& system, const Quadrature& quadrature, bool general = false);
+// The findings are what the structure rests on, and what was looked for in vain, in words. `general`: find nothing, for
+// comparison.
+std::pair<Structure, std::vector<Finding>> find_structure(const Scene& scene, const System& system,
+                                                          const Quadrature& quadrature, bool general = false);
 
 }  // namespace lobatto

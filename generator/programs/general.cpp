@@ -26,7 +26,7 @@ public:
 private:
     // g = dR/dz with the forces beside dR/dq, and its derivative.
     void node() {
-        const Routhian& routhian = d_.structure.routhian;
+        const Routhian& routhian = d_.structure.routhian();
         const std::size_t active = routhian.active.size();
         const GiNaC::exmap before = symbols_;
         for (std::size_t i = 0; i < routhian.z.size(); ++i) {

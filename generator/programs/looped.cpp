@@ -19,12 +19,12 @@ using GiNaC::ex;
 class LoopedBuilder : public ProgramBuilder {
 public:
     explicit LoopedBuilder(const Derivation& derivation)
-        : ProgramBuilder(derivation), general_(derivation.structure.form == Form::general) {
+        : ProgramBuilder(derivation), general_(derivation.structure.form() == Form::general) {
         std::size_t e = 0;
         if (general_) {
-            for (const auto& [place, value] : d_.structure.routhian.second.entries()) entry_[place] = e++;
+            for (const auto& [place, value] : d_.structure.routhian().second.entries()) entry_[place] = e++;
         } else {
-            for (const auto& place : d_.structure.entries) entry_[place] = e++;
+            for (const auto& place : d_.structure.constant_mass().entries) entry_[place] = e++;
         }
     }
 
@@ -32,7 +32,7 @@ public:
         if (!general_) masses();
         written_out();
         for (std::size_t number = 0; number < d_.structure.elements.repeated.size(); ++number)
-            element(number, d_.structure.elements.repeated[number]);
+            element(static_cast<int>(number), d_.structure.elements.repeated[number]);
         symbols_ = before_;
         velocities_as_inputs();
         events();
@@ -75,7 +75,7 @@ private:
     // What does not repeat: straight-line code over q, or z.
     void written_out() {
         before_ = symbols_;
-        const std::vector<GiNaC::symbol>& variables = general_ ? d_.structure.routhian.z : d_.system.q;
+        const std::vector<GiNaC::symbol>& variables = general_ ? d_.structure.routhian().z : d_.system.q;
         if (general_)
             for (std::size_t i = 0; i < variables.size(); ++i) {
                 const std::size_t k = i % n_;
@@ -94,14 +94,16 @@ private:
             return gradient;
         };
         const ConstantPart constant_part = free_of(variables);
-        Program node{"rest_node", {}}, slope_only{"rest_slope", {}}, quadratic{"rest_quadratic", {}};
+        Program node = program_of({LoopPart::rest, LoopPart::Of::node}),
+                slope_only = program_of({LoopPart::rest, LoopPart::Of::slope}),
+                quadratic = program_of({LoopPart::rest, LoopPart::Of::quadratic});
         const SparseMatrix second_derivatives = derivative_of(add_slopes(slope_only, elements.others), variables);
         node.outputs = slope_only.outputs;
         for (const auto& [place, value] : second_derivatives.entries()) {
             const auto known = entry_.find(place);
             if (known == entry_.end()) continue;  // zero after all
             node.outputs.push_back({at(second(), known->second), convert(value), Effect::add});
-            if (!d_.structure.absorbed && !d_.structure.diagonal_part) continue;
+            if (!d_.structure.absorbed() && !d_.structure.diagonal_part()) continue;
             const ex constant = constant_part.of(value);
             if (!constant.is_zero())
                 quadratic.outputs.push_back({at("S0", known->second), convert(constant), Effect::add});
@@ -112,20 +114,24 @@ private:
                                                         variables.begin() + (general_ ? static_cast<long>(n_) : 0));
             for (const ex& term : elements.others)
                 values.push_back(convert(general_ ? energy_of(term, velocities) : term));
-            p_.programs.push_back({"rest_energy", {{"sum", g().add(values), Effect::add}}});
+            Program energy = program_of({LoopPart::rest, LoopPart::Of::energy});
+            energy.outputs.push_back({"sum", g().add(values), Effect::add});
+            p_.programs.push_back(std::move(energy));
         }
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));
         p_.programs.push_back(std::move(quadratic));
-        if (!d_.structure.fixed_ends.before && !d_.structure.fixed_ends.behind) return;
+        if (!d_.structure.neighbours()) return;
+        const FixedEnds& fixed_ends = d_.structure.separable().fixed_ends;
+        if (!fixed_ends.before && !fixed_ends.behind) return;
         // The same where the walls of a chain are rows.
-        Program inside{"inside_slope", {}};
-        add_slopes(inside, d_.structure.fixed_ends.others);
+        Program inside = program_of({LoopPart::inside, LoopPart::Of::slope});
+        add_slopes(inside, fixed_ends.others);
         p_.programs.push_back(std::move(inside));
     }
 
-    void element(std::size_t number, const Element& element) {
-        const std::string name = fmt::format("element_{}", number + 1);
+    void element(int number, const Element& element) {
+        const std::string name = element_text(number);
         const auto start_of = [&](int variable) {
             const auto i = static_cast<std::size_t>(variable);
             return general_ && i < n_ ? 0.1 : g().input_of(q_[i % n_]).start;
@@ -143,7 +149,8 @@ private:
         for (const auto& x : element.x) gradient.push_back(is_force ? ex(0) : term.diff(x));
         if (is_force) gradient[static_cast<std::size_t>(element.target)] = term;
         const ConstantPart constant_part = free_of(element.x);
-        Program node{name + "_node", {}}, slope_only{name + "_slope", {}}, quadratic{name + "_quadratic", {}};
+        Program node = program_of({number, LoopPart::Of::node}), slope_only = program_of({number, LoopPart::Of::slope}),
+                quadratic = program_of({number, LoopPart::Of::quadratic});
         // Action and reaction: the same value, added and taken away.
         Ids slopes;
         std::vector<bool> taken;
@@ -164,7 +171,7 @@ private:
                 {fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column),
                  convert(value), Effect::add});
             const ex constant = constant_part.of(value);
-            if ((d_.structure.absorbed || d_.structure.diagonal_part) && !constant.is_zero())
+            if ((d_.structure.absorbed() || d_.structure.diagonal_part()) && !constant.is_zero())
                 quadratic.outputs.push_back(
                     {fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column),
                      convert(constant), Effect::add});
@@ -174,14 +181,15 @@ private:
             std::vector<GiNaC::symbol> velocities;
             for (std::size_t j = 0; general_ && j < element.x.size(); ++j)
                 if (element.rows.front()[j] < static_cast<int>(n_)) velocities.push_back(element.x[j]);
-            p_.programs.push_back(
-                {name + "_energy", {{"sum", convert(general_ ? energy_of(term, velocities) : term), Effect::add}}});
+            Program energy = program_of({number, LoopPart::Of::energy});
+            energy.outputs.push_back({"sum", convert(general_ ? energy_of(term, velocities) : term), Effect::add});
+            p_.programs.push_back(std::move(energy));
         }
         p_.programs.push_back(std::move(node));
         p_.programs.push_back(std::move(slope_only));
         p_.programs.push_back(std::move(quadratic));
         // Coefficients that are parameters are put into an array by prepare().
-        Program table{name + "_a", {}};
+        Program table = program_of({number, LoopPart::Of::coefficients});
         if (has_parameters(element))
             for (std::size_t j = 0; j < element.a.size(); ++j)
                 for (const auto& row : element.coefficients) table.outputs.push_back({"", convert(row[j])});

@@ -66,24 +66,24 @@ void ProgramBuilder::events() {
 
 Programs build_programs(const Derivation& derivation) {
     if (derivation.structure.looped) return looped_programs(derivation);
-    return derivation.structure.form == Form::general ? general_programs(derivation) : separable_programs(derivation);
+    return derivation.structure.form() == Form::general ? general_programs(derivation) : separable_programs(derivation);
 }
 
 namespace {
 
 // What `whole` costs, about, in additions: as one program, or as `part` of each repeated formula, row by row.
-double cost_of(const Programs& programs, const Structure& structure, const std::string& whole,
-               const std::string& part) {
+double cost_of(const Programs& programs, const Structure& structure, const std::string& whole, LoopPart::Of part) {
     double sum = 0;
     for (const Program& program : programs.programs) {
-        if (program.name != whole && !program.name.ends_with(part)) continue;
+        if (program.part ? program.part->of != part : program.name != whole) continue;
         std::vector<Id> values;
         for (const Output& output : program.outputs) values.push_back(output.value);
         const Operations operations = count(programs.graph, programs.graph.topological(values));
-        double rows = 1;
-        for (std::size_t e = 0; e < structure.elements.repeated.size(); ++e)
-            if (program.name == fmt::format("element_{}{}", e + 1, part))
-                rows = static_cast<double>(structure.elements.repeated[e].rows.size());
+        const bool repeats = program.part && program.part->element >= 0;
+        const double rows =
+            repeats ? static_cast<double>(
+                          structure.elements.repeated[static_cast<std::size_t>(program.part->element)].rows.size())
+                    : 1;
         sum += rows * static_cast<double>(operations.additions + operations.multiplications + 8 * operations.divisions +
                                           16 * operations.functions);
     }
@@ -93,17 +93,18 @@ double cost_of(const Programs& programs, const Structure& structure, const std::
 // Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
 // and five products for each of them (measured).
 bool hessian_pays(const Programs& programs, const Structure& structure) {
-    const double evaluation = cost_of(programs, structure, "minus_acceleration", "_slope"),
-                 with_slopes = cost_of(programs, structure, "node", "_node");
-    return with_slopes + 5 * static_cast<double>(structure.entries.size()) <= 2 * evaluation;
+    if (structure.form() == Form::general) return false;
+    const double evaluation = cost_of(programs, structure, "minus_acceleration", LoopPart::Of::slope),
+                 with_slopes = cost_of(programs, structure, "node", LoopPart::Of::node);
+    return with_slopes + 5 * static_cast<double>(structure.constant_mass().entries.size()) <= 2 * evaluation;
 }
 
 // Whether fixed-point iterations are solved by accelerations alone, without what is taken into the stage map. Passes
-// may change what is uses_hessian: a program that was left out before them stays so.
+// change costs; a program that was left out before them stays out.
 bool takes_remainder(const Programs& programs, const Structure& structure) {
     const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
                                       [](const Program& program) { return program.name == "remainder"; });
-    return is_there && !structure.looped && !structure.is_explicit && !structure.clean &&
+    return is_there && !structure.looped && !structure.is_explicit() && !structure.clean() &&
            !hessian_pays(programs, structure);
 }
 
@@ -116,7 +117,7 @@ OptimisedPrograms optimised_programs(const Derivation& derivation) {
     if (!takes_remainder(result.programs, structure))
         std::erase_if(result.programs.programs, [](const Program& program) { return program.name == "remainder"; });
     result.report = optimise(result.programs);
-    result.cost_of_node = cost_of(result.programs, structure, "node", "_node");
+    result.cost_of_node = cost_of(result.programs, structure, "node", LoopPart::Of::node);
     result.uses_hessian = hessian_pays(result.programs, structure);
     result.has_remainder = takes_remainder(result.programs, structure);
     return result;

@@ -57,11 +57,11 @@ public:
     Programs build() {
         prepare();
         mechanics();
-        if (d_.structure.form == Form::linear_map) {
+        if (d_.structure.form() == Form::linear_map) {
             if (n_ == 1) propagation_of_one();
         } else {
-            if (d_.structure.diagonal_part || d_.structure.absorbed) quadratic_part();
-            if (d_.structure.diagonal_part) remainder();
+            if (d_.structure.diagonal_part() || d_.structure.absorbed()) quadratic_part();
+            if (d_.structure.diagonal_part()) remainder();
         }
         velocities_as_inputs();
         events();
@@ -100,7 +100,7 @@ private:
         const Ids W = times(inverse_mass_, gradient);
         Program node{"node", {}};
         for (std::size_t k = 0; k < n_; ++k) node.outputs.push_back({at("W", k), W[k]});
-        for (std::size_t e = 0; e < d_.structure.entries.size(); ++e)
+        for (std::size_t e = 0; e < d_.structure.constant_mass().entries.size(); ++e)
             node.outputs.push_back({at("S", e), stiffness(e, d_.system.hessian)});
         p_.programs.push_back(std::move(node));
         program("minus_acceleration", "W", W);
@@ -108,7 +108,7 @@ private:
 
     // Entry e of M^-1 V'', for the V'' given.
     Id stiffness(std::size_t e, const SparseMatrix& hessian) {
-        const auto [row, column] = d_.structure.entries[e];
+        const auto [row, column] = d_.structure.constant_mass().entries[e];
         Ids terms;
         for (std::size_t l = 0; l < n_; ++l) {
             const Id inverse = inverse_mass_[static_cast<std::size_t>(row)][l];
@@ -122,15 +122,15 @@ private:
     // The constant part of M^-1 V'', which the quadratic part of V leaves (D31).
     void quadratic_part() {
         Ids values;
-        for (std::size_t e = 0; e < d_.structure.entries.size(); ++e)
-            values.push_back(stiffness(e, d_.structure.constant_hessian));
+        for (std::size_t e = 0; e < d_.structure.constant_mass().entries.size(); ++e)
+            values.push_back(stiffness(e, d_.structure.separable().constant_hessian));
         program("quadratic_part", "S0", values);
     }
 
     // What V leaves without its quadratic part: W - D q without what cancels in it.
     void remainder() {
         std::vector<GiNaC::ex> gradient = d_.system.gradient;
-        for (const auto& [place, value] : d_.structure.constant_hessian.entries())
+        for (const auto& [place, value] : d_.structure.separable().constant_hessian.entries())
             gradient[static_cast<std::size_t>(place.first)] -=
                 value * d_.system.q[static_cast<std::size_t>(place.second)];
         // Expanded where that leaves fewer terms: then some cancelled.

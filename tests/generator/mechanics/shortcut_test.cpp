@@ -70,7 +70,7 @@ double distance(const Motion& x, const Motion& y) {
 }
 
 const Finding& finding(const Derivation& derivation, const std::string& name) {
-    for (const Finding& f : derivation.structure.findings)
+    for (const Finding& f : derivation.findings)
         if (f.name == name) return f;
     throw std::runtime_error("no finding " + name);
 }
@@ -151,7 +151,7 @@ TEST_CASE("cyclic coordinates leave the solve, their momenta stay to the last bi
             cyclic.method = method;
             const Derivation shortcut = derive(cyclic), whole = derive(cyclic, true);
             CHECK(finding(shortcut, "cyclic coordinates").holds);
-            REQUIRE(shortcut.structure.routhian.cyclic.size() == row.cyclic.size());
+            REQUIRE(shortcut.structure.routhian().cyclic.size() == row.cyclic.size());
             const Motion reduced = motion(shortcut, 100), general = motion(whole, 100);
             CHECK(distance(reduced, general) < 1e-11);  // measured 2e-12: momenta of 1e-2, rounded beside others of 1
             const int n = static_cast<int>(cyclic.coordinates.size()), c = static_cast<int>(row.cyclic.size());
@@ -179,8 +179,8 @@ TEST_CASE("a cyclic coordinate stays in the solve where its mass may vanish thou
                                                    "\"\n[coordinates]\nx = { position = 1, velocity = 0.3 }\n"
                                                    "y = { position = 0.5, velocity = 1 }\n" +
                                                    run));
-        CHECK(finding(derivation, "cyclic coordinates").holds == !derivation.structure.routhian.cyclic.empty());
-        return derivation.structure.routhian.cyclic;
+        CHECK(finding(derivation, "cyclic coordinates").holds == !derivation.structure.routhian().cyclic.empty());
+        return derivation.structure.routhian().cyclic;
     };
     CHECK(cyclic_of("x'*y' + x'*y^2 - y^3").empty());                    // 0
     CHECK(cyclic_of("x'*y' + (1 - y^2)*x'^2/2 - y^3").empty());          // of both signs
@@ -217,7 +217,7 @@ TEST_CASE("positions and velocities of one formula are told apart in the energy 
         "[coordinates]\nx = { count = 12, position = \"i/10\", velocity = 0.5 }\n" +
         run);
     const Derivation derivation = derive(squares);
-    REQUIRE(derivation.structure.form == Form::general);
+    REQUIRE(derivation.structure.form() == Form::general);
     REQUIRE(derivation.structure.looped);
     LoadedStepper<double> stepper(test::kernel_in_own_cache(derivation, Precision::double_));
     REQUIRE(stepper.prepare({}, 0.05) == LOBATTO_OK);
@@ -248,8 +248,8 @@ TEST_CASE("a formula without a value at zero is no wall") {
         "  - (x[1] - 1)^2\"\"\"\n[coordinates]\nx = { count = 24, position = 1, velocity = \"sin(i)/10\" }\n" +
         run);
     const Derivation shortcut = derive(quotients);
-    REQUIRE(shortcut.structure.neighbours);
-    CHECK_FALSE(shortcut.structure.fixed_ends.before);
+    REQUIRE(shortcut.structure.neighbours());
+    CHECK_FALSE(shortcut.structure.separable().fixed_ends.before);
     CHECK(distance(motion(shortcut, 50), motion(derive(quotients, true), 50)) < 1e-12);
 }
 
@@ -339,9 +339,9 @@ TEST_CASE("a kernel with fewer outputs is shorter") {
 TEST_CASE("a nearly quadratic potential is iterated without factoring, and agrees with Newton's iteration") {
     const Scene fput = library("fput_beta");
     const Derivation absorbed = derive(fput);
-    REQUIRE(absorbed.structure.absorbed);
+    REQUIRE(absorbed.structure.absorbed());
     Derivation newton = absorbed;
-    newton.structure.absorbed = false;
+    std::get<SeparableForm>(newton.structure.of_form).absorbed = false;
     const Motion with = motion(absorbed, 100), without = motion(newton, 100);
     CHECK(distance(with, without) < 1e-12);
     CHECK(emit(absorbed).header.find("quadratic_part") != std::string::npos);
@@ -351,13 +351,13 @@ TEST_CASE("a nearly quadratic potential is iterated without factoring, and agree
 TEST_CASE("diagonal mass and sparse second derivatives leave fewer operations than the general path") {
     for (const char* name : {"henon_heiles", "swinging_spring", "stiff_fput"}) {
         const Scene sparse = library(name);
-        std::size_t entries = derive(sparse).structure.entries.size();
+        std::size_t entries = derive(sparse).structure.constant_mass().entries.size();
         const std::size_t n = sparse.coordinates.size();
-        if (derive(sparse).structure.form == Form::general)
-            entries = derive(sparse).structure.routhian.second.entries().size();
-        CHECK(entries <= (derive(sparse).structure.form == Form::general ? 4 : 1) * n * n);
+        if (derive(sparse).structure.form() == Form::general)
+            entries = derive(sparse).structure.routhian().second.entries().size();
+        CHECK(entries <= (derive(sparse).structure.form() == Form::general ? 4 : 1) * n * n);
     }
-    CHECK(derive(library("stiff_fput")).structure.entries.size() < 36);
+    CHECK(derive(library("stiff_fput")).structure.constant_mass().entries.size() < 36);
 }
 
 TEST_CASE("a force that jumps is not taken for a constant one") {

@@ -232,7 +232,7 @@ TEST_CASE("a coordinate at rest far from zero takes no accuracy from the others"
 
 TEST_CASE("formulas go along neighbouring coordinates where these stand in rows, and only there") {
     const auto claims = [](const Motion& motion, const char* output = "", bool general = false) {
-        return derivation_of(motion, lobatto_4, output, general).structure.neighbours;
+        return derivation_of(motion, lobatto_4, output, general).structure.neighbours();
     };
     CHECK(claims(lattice()));
     CHECK_FALSE(claims(lattice(), "", true));

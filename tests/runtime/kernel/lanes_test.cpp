@@ -237,7 +237,7 @@ TEST_CASE("the bits of a lane do not depend on how many iterations its neighbour
         {0, 0},
         0.02};
     const Derivation derivation = derivation_of(stiff, "points = 5");
-    REQUIRE(derivation.structure.diagonal_part);
+    REQUIRE(derivation.structure.diagonal_part());
     const Kernel kernel = ensemble_kernel_in_own_cache(derivation);
     const auto among = [&](double amplitude) {
         return together(kernel, stiff, kernel->lanes, 5000, [&](std::int64_t index, EnsembleStart& start) {

@@ -180,7 +180,7 @@ TEST_CASE("a step along neighbours has the same bits in registers and in memory,
             INFO(body << method);
             const Derivation derivation =
                 derivation_of(Motion{body, {}, {}, {}, 0.1}, method, "energy = false\ntangent = false");
-            REQUIRE(derivation.structure.neighbours);
+            REQUIRE(derivation.structure.neighbours());
             const std::string header = emit(derivation).header;
             CHECK((header.find("_run, lobatto::fixed_") != std::string::npos) ==
                   (body == hung_chain || body == half_hung_chain));
