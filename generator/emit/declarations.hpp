@@ -2,6 +2,7 @@
 // The functions of a kernel: how each is declared and what its comment says.
 #pragma once
 
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@ struct Declaration {
 const std::vector<Declaration>& declarations(Form form);
 
 // A struct cannot have the name of one of its members.
+const std::set<std::string>& member_names();  // the constants and types
 bool is_member_name(const std::string& name);
 
 }  // namespace lobatto

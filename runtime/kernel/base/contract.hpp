@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an emitted kernel K provides: a struct of static functions, the formulas of one scene, and of constants.
+// What an emitted kernel K provides: static functions, the formulas of one scene, and constants (concept.hpp checks).
 //
 // Every kernel: real; name, digest, method; coordinates (n), order, parameter_count, Parameters, parameter();
 // Coefficients, prepare(); form; and these claims, all constexpr:

@@ -10,6 +10,7 @@
 #include <regex>
 
 #include "analysis/support_text.hpp"
+#include "generator/emit/declarations.hpp"
 #include "generator/emit/function_text.hpp"
 #include "generator/pipeline.hpp"
 #include "generator/programs/programs.hpp"
@@ -383,4 +384,32 @@ TEST_CASE("titles and units cannot break out of the comments they stand in") {
     const KernelSource source = emit(derivation);
     CHECK(source.header.find("\nint broken") == std::string::npos);
     CHECK(complaints(source) == "");
+}
+
+TEST_CASE("the names that a scene may not take are those that kernels declare") {
+    const Method lobatto_4, gauss_3{Family::gauss, 3}, splitting{Family::splitting, 11};
+    const Method clean{Family::lobatto, 5, 0, StepArithmetic::clean};
+    std::set<std::string> declared;
+    for (const auto& [name, method] : std::vector<std::pair<std::string, Method>>{{"harmonic_oscillator", lobatto_4},
+                                                                                  {"pendulum", splitting},
+                                                                                  {"pendulum", clean},
+                                                                                  {"double_pendulum", lobatto_4},
+                                                                                  {"lagrange_top", gauss_3},
+                                                                                  {"stiff_fput", lobatto_4},
+                                                                                  {"fput_beta", lobatto_4}}) {
+        Scene scene = read_scene(std::string(LOBATTO_SOURCE_DIR) + "/scenes/" + name + ".toml");
+        scene.method = method;
+        const std::string header = emit(derive(scene)).header;
+        const std::regex declaration(
+            R"(\n    (?:static constexpr [\w:* ]*?|using |struct |static [\w:]+&? )(\w+)(?:\[| =| \{|\())");
+        for (auto match = std::sregex_iterator(header.begin(), header.end(), declaration);
+             match != std::sregex_iterator(); ++match)
+            declared.insert((*match)[1]);
+    }
+    for (const std::string& name : declared) {
+        if (name.starts_with("element_")) continue;  // tables of repeated terms, numbered
+        CHECK_MESSAGE(is_member_name(name), name << " is declared, but a scene may take it");
+    }
+    for (const std::string& name : member_names())
+        CHECK_MESSAGE(declared.contains(name), name << " is reserved, but no kernel declares it");
 }
