@@ -8,8 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "analysis/accuracy/error_estimate.hpp"
-#include "analysis/accuracy/exact_energy.hpp"
+#include "analysis/accuracy/companion.hpp"
 #include "analysis/stability/limit.hpp"
 #include "runtime/measure/frequency.hpp"
 
@@ -20,10 +19,7 @@ namespace {
 constexpr std::size_t most_judged_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
-constexpr double far = 1000;                 // times the error wanted: estimates may be off by nearly as much
-constexpr double coarse_energy = 0x1p-40;    // of what energies are computed from: their rounding does not matter
 constexpr double still = 0x1p-40;            // of the place: what rounding moves it by
-constexpr double quickly = 30;               // times further apart than motions of different frequencies get
 
 // Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
 std::uint64_t scrambled(std::int64_t number) {
@@ -33,41 +29,9 @@ std::uint64_t scrambled(std::int64_t number) {
     return z ^ (z >> 31);
 }
 
-// Above that of the first state; in 60 digits where in double they are rounding, as of small motions.
-std::vector<double> energies_along(const Derivation& derivation, const LoadedStepper<double>& stepper,
-                                   const States<double>& states, const std::vector<double>& parameters) {
-    std::vector<double> energies = energies_of(stepper, states);
-    if (derivation.system.q.size() > ExactEnergy::most_coordinates) return energies;
-    ExactEnergy exact(derivation, parameters);
-    std::optional<cln::cl_R> first;
-    double largest = 0;
-    for (const double energy : energies) largest = std::fmax(largest, std::fabs(energy));
-    for (std::size_t i = 0; i < states.size(); ++i) {
-        const std::vector<double>& state = states[i];
-        const auto middle = state.begin() + 1 + static_cast<std::ptrdiff_t>(state.size() / 2);
-        const std::vector<double> q(state.begin() + 1, middle);
-        std::vector<double> v;
-        if (stepper.velocity(state[0], q, {middle, state.end()}, v) != LOBATTO_OK) continue;
-        const auto here = exact.at(q, v);
-        if (!here) continue;
-        if (!first) first = here->value;
-        if (i == 0 && largest > coarse_energy * cln::double_approx(here->size)) return energies;
-        energies[i] = cln::double_approx(here->value - *first);
-    }
-    return energies;
-}
-
 }  // namespace
 
-std::vector<int> unit_groups(const Scene& scene) {
-    std::map<std::string, int> numbers;
-    std::vector<int> groups;
-    for (const Coordinate& coordinate : scene.coordinates)
-        groups.push_back(numbers.try_emplace(coordinate.unit, static_cast<int>(numbers.size())).first->second);
-    return groups;
-}
-
-StepJudge::StepJudge(const Scene& scene) : groups_(unit_groups(scene)), rows_a_step_(1 + scene.outputs.dense) {}
+StepJudge::StepJudge(const Scene& scene) : groups_(amplitude_groups(scene)), rows_a_step_(1 + scene.outputs.dense) {}
 
 void StepJudge::keep(std::int64_t number, std::vector<double> row) {
     const std::uint64_t place = scrambled(number);
@@ -166,64 +130,21 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
     }
     judgement.limit = stability_limit(derivation.quadrature, judgement.radians);
 
-    std::map<std::int64_t, std::vector<double>> in_time;
-    for (const auto& [place, state] : some_) in_time.emplace(state.number, state.row);
-    States<double> states;
-    for (const auto& [number, row] : in_time) states.push_back(row);
-    const ErrorEstimate estimate(derivation.quadrature);
-    const bool conserves = kernel->has_energy != 0 && derivation.system.autonomous && !derivation.system.has_forces();
-    const std::vector<double> energies =
-        conserves ? energies_along(derivation, stepper, states, request.parameters) : std::vector<double>();
-    Evidence evidence =
-        evidence_of(stepper, states, request.parameters, request.step, scale, error_power(derivation.quadrature.method),
-                    energies, conserves && derivation.quadrature.method.family == Family::lobatto);
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     std::vector<double> moving = scale;
-    bool any_moves = false;
     for (std::size_t k = 0; k < n; ++k) {
         const double way = (most_[k] - least_[k]) / 2, place = std::max(std::fabs(most_[k]), std::fabs(least_[k]));
-        if (way > still * place)
-            any_moves = true;
-        else
-            moving[k] = moving[n + k] = std::numeric_limits<double>::infinity();
+        if (!(way > still * place)) moving[k] = moving[n + k] = std::numeric_limits<double>::infinity();
     }
-    if (!any_moves) evidence.certain = 0;
     const SingleSteps single =
         single_steps(stepper, hardest_.states(), request.every, result.time, request.parameters, request.step, moving);
-    evidence.certain = std::fmax(evidence.certain, single.error);
     if (single.unresolved)
         judgement.unresolved = {1 + std::llround((*single.unresolved - request.time) / request.step),
                                 *single.unresolved};
-    const double steps = static_cast<double>(result.steps_done), duration = steps * std::fabs(request.step);
-    const double random = std::numeric_limits<double>::epsilon() + request.tolerance;
-    judgement.error = std::fmin(1, estimate.after(steps, duration, evidence, random));
-    const double way = evidence.rate * duration;
-    judgement.neighbours = evidence.growth == 0              ? Neighbours::unknown
-                           : evidence.growth > quickly * way ? Neighbours::part_quickly
-                                                             : Neighbours::stay;
     return judgement;
 }
 
-std::string StepJudge::Judgement::text() const {
-    if (error >= 1) return "as large as the motion itself";
-    const char* const supposed = neighbours == Neighbours::unknown        ? ", if nearby trajectories stay near"
-                                 : neighbours == Neighbours::part_quickly ? "; nearby trajectories diverge quickly"
-                                                                          : "";
-    return fmt::format("{:.1g} of the amplitude at the end{}", error, supposed);
-}
-
-std::string StepJudge::loss(const Judgement& judgement, const TrajectoryRequest& request,
-                            const TrajectoryResult& result) {
-    return fmt::format(
-        "the run is wrong somewhere on its way to its end, t = {:.6g}, q = {}, p = {}: its error is estimated as large "
-        "as the motion itself, and the step is beyond the first limit of linear stability: h omega = {:.3g} is more "
-        "than {:.4g}, omega the largest frequency met. Try a smaller step, such as h = {:.6g}, or Gauss, which has no "
-        "limit.",
-        result.time, list_text(result.q), list_text(result.p), judgement.radians, judgement.limit,
-        request.step * judgement.limit / judgement.radians / 2);
-}
-
-std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double wanted_error) {
+std::vector<std::string> StepJudge::warnings(const Judgement& judgement) {
     std::vector<std::string> texts;
     if (judgement.radians > judgement.limit)
         texts.push_back(fmt::format(
@@ -235,10 +156,6 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
             "in step {}, from t = {:.6g} on, the motion is not resolved: half the step leads to another place, or the "
             "step jumps over a singularity. Take a shorter step, or coordinates without a singularity there",
             judgement.unresolved->step, judgement.unresolved->time));
-    if (wanted_error > 0 && judgement.error > far * wanted_error)
-        texts.push_back(fmt::format(
-            "the scene asks for an error of {:.2g}, and it is probably near {:.1g}; `lobatto tune` chooses a step",
-            wanted_error, judgement.error));
     return texts;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Whether the step of a run suits its motion: against the stability limit, and by what its own polynomials say.
+// Whether the step of a run suits its motion: against the stability limit, and in the steps where the motion changes
+// most.
 #pragma once
 
 #include <cstdint>
@@ -25,32 +26,22 @@ public:
     std::vector<double> save() const;
     void restore(const std::vector<double>& seen);
 
-    enum class Neighbours { unknown, stay, part_quickly };  // motions that begin beside this one
     struct Judgement {
-        double error = 0;                             // estimated, relative to the amplitude, at most 1
-        Neighbours neighbours = Neighbours::unknown;  // unknown of long runs
-        double radians = 0;                           // h times the largest frequency met; 0: not looked for
-        double limit = 0;  // of that, by linear stability; infinite when it lies above, and for Gauss
+        double radians = 0;  // h times the largest frequency met; 0: not looked for
+        double limit = 0;    // of that, by linear stability; infinite when it lies above, and for Gauss
         struct Unresolved {
             std::int64_t step;  // the first is 1
             double time;        // of its start
         };
         std::optional<Unresolved> unresolved;  // the first such step that was found
-        std::string text() const;              // of the error, one line
-        // Beyond the limit, and the error as large as the motion: where no energy is kept that would tell, the run is
-        // lost.
-        bool is_lost() const { return radians > limit && error >= 1; }
     };
     Judgement judge(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
-    // What to tell of a run that is lost, as of any stop.
-    static std::string loss(const Judgement& judgement, const TrajectoryRequest& request,
-                            const TrajectoryResult& result);
     // One warning a string.
-    static std::vector<std::string> warnings(const Judgement& judgement, double wanted_error);
+    static std::vector<std::string> warnings(const Judgement& judgement);
 
 private:
-    std::vector<int> groups_;           // coordinates of the same unit have the same number
+    std::vector<int> groups_;           // coordinates that share an amplitude have the same number
     std::int64_t rows_a_step_;          // states between the steps are less accurate than those at them
     std::vector<double> least_, most_;  // 2n
     struct State {
@@ -62,8 +53,5 @@ private:
     std::int64_t seen_ = 0;
     void keep(std::int64_t number, std::vector<double> row);
 };
-
-// Coordinates of the same unit have the same number.
-std::vector<int> unit_groups(const Scene& scene);
 
 }  // namespace lobatto

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/accuracy/step_judge.hpp"
+#include "analysis/accuracy/companion.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
@@ -74,7 +74,7 @@ Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequ
     ReferenceRequest wish;
     wish.until = until;
     wish.wanted = request_.wanted;
-    wish.groups = unit_groups(scene_);
+    wish.groups = amplitude_groups(scene_);
     wish.interrupted = request_.interrupted;
     const auto compute = [&] {
         request_.say("compiling the reference in " + precision_name(reference.precision));

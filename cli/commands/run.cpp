@@ -6,7 +6,9 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <thread>
 
+#include "analysis/accuracy/companion.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/accuracy/step_judge.hpp"
 #include "analysis/accuracy/watch.hpp"
@@ -37,6 +39,8 @@ struct RunOptions {
     bool general = false;
     Overrides overrides;
     bool resume = false;
+    bool unmeasured = false;
+    bool beyond_horizon = false;
     bool quiet = false;
 };
 
@@ -166,18 +170,23 @@ Prepared prepare(const RunOptions& options) {
 // All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
 class Observers {
 public:
-    static inline const std::vector<std::string> names = {"counts", "watch", "step judge", "energy watch"};
+    static inline const std::vector<std::string> names = {"counts", "watch", "step judge", "energy watch", "companion"};
 
-    Observers(const Prepared& run, const LoadedStepper<double>& stepper, const std::vector<double>& velocity)
+    // `measures`: whether a companion runs beside it.
+    Observers(const Prepared& run, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
+              const std::vector<double>& velocity, bool measures)
         : watch(run.scene, run.derivation.structure, stepper, velocity),
           judge(run.scene),
           energy(run.derivation, run.kernel),
-          counts(1 + run.scene.outputs.events.size(), 0) {}
+          counts(1 + run.scene.outputs.events.size(), 0) {
+        if (measures) companion.emplace(run.derivation, run.kernel, request);
+    }
 
     void observe(const Records& records) {
         watch.observe(records);
         judge.observe(records);
         energy.observe(records);
+        if (companion) companion->observe(records);
         counts[0] += static_cast<double>(records.count);
     }
     void observe(const EventRecords& records) {
@@ -186,19 +195,24 @@ public:
     }
 
     std::map<std::string, std::vector<double>> save() const {
-        return {
-            {"counts", counts}, {"watch", watch.save()}, {"step judge", judge.save()}, {"energy watch", energy.save()}};
+        return {{"counts", counts},
+                {"watch", watch.save()},
+                {"step judge", judge.save()},
+                {"energy watch", energy.save()},
+                {"companion", companion ? companion->save() : std::vector<double>()}};
     }
     void restore(const std::map<std::string, std::vector<double>>& saved) {
         counts = saved.at("counts");
         watch.restore(saved.at("watch"));
         judge.restore(saved.at("step judge"));
         energy.restore(saved.at("energy watch"));
+        if (companion) companion->restore(saved.at("companion"));
     }
 
     Watch watch;
     StepJudge judge;
     EnergyWatch energy;
+    std::optional<Companion> companion;
     std::vector<double> counts;  // of the states, and of each kind of event
 };
 
@@ -267,12 +281,36 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
     return result;
 }
 
-// Of a run beyond stability whose energy could not tell: that its motion is lost. Empty: it is not.
-std::string loss_of(const Prepared& run, const TrajectoryRequest& request, const TrajectoryResult& result,
-                    const std::optional<StepJudge::Judgement>& judgement) {
-    const bool is_lost = judgement && judgement->is_lost() && !result.interrupted && !run.derivation.system.linear &&
-                         !EnergyWatch::can_watch(run.derivation);
-    return is_lost ? StepJudge::loss(*judgement, request, result) : "";
+// That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
+std::string loss_of(const RunOptions& options, const Scene& scene, const TrajectoryRequest& request,
+                    const std::optional<MeasuredError>& error) {
+    if (!error || !error->is_lost() || options.beyond_horizon || scene.run.beyond_horizon) return "";
+    const char* const why = error->companion_stopped
+                                ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
+                                : "from there on the error is as large as the motion itself, and nothing of it is left";
+    const std::string chaos =
+        error->doubling ? fmt::format(", an earlier end (errors double every {:.3g})", *error->doubling) : "";
+    return fmt::format(
+        "the run left its motion by t = {:.6g}, q = {}, p = {}: {}. Try a smaller step, such as h = {:.6g}, more "
+        "points{}, or --beyond-horizon where the statistics of the motion are what counts.",
+        *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, chaos);
+}
+
+constexpr double large_error = 0.03;  // of the amplitude: worth a warning whoever asked
+constexpr double missed = 2;          // times the error wanted
+
+std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) {
+    if (error.is_lost()) return {};
+    std::vector<std::string> texts;
+    const double worst = std::fmax(error.at_end, error.largest);
+    if (worst > large_error)
+        texts.push_back(
+            fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points", worst));
+    else if (wanted > 0 && error.at_end > missed * wanted)
+        texts.push_back(
+            fmt::format("the scene asks for an error of {:.2g}, and it is {:.2g}; `lobatto tune` chooses a step",
+                        wanted, error.at_end));
+    return texts;
 }
 
 // That a run which went to its end has left the motion of its Lagrangian. Empty: it has not.
@@ -327,7 +365,7 @@ void run(const RunOptions& options) {
     const std::string identity = identity_of(request, header, run.compiled.object);
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
-    Observers observers(run, stepper, velocity);
+    Observers observers(run, stepper, request, velocity, !options.unmeasured);
     std::optional<Checkpoint> from;
     if (options.resume) {
         from = checkpoint_of(path, identity, run.kernel, has_events ? 2 : 1, Observers::names);
@@ -341,26 +379,31 @@ void run(const RunOptions& options) {
                                       : "nothing was left: from the start");
     }
     Files files(options, run, header, from);
+    const auto began = std::chrono::steady_clock::now();
+    if (observers.companion && std::thread::hardware_concurrency() > 1) observers.companion->start();
     const TrajectoryResult result = integrate_into(files, observers, identity, run, request, options.quiet);
+    std::optional<MeasuredError> error;
+    if (observers.companion) error = observers.companion->finish(result, seconds_since(began));
 
-    std::optional<StepJudge::Judgement> judgement;
+    std::string departure = departure_of(run, request, result, observers);
+    if (departure.empty()) departure = loss_of(options, scene, request, error);
+    std::vector<std::string> warnings;
+    if (error && departure.empty()) warnings = warnings_of(*error, scene.run.error);
     if (result.status == LOBATTO_OK && result.steps_done > 1)
-        judgement = observers.judge.judge(run.derivation, run.kernel, request, result);
-    const std::string loss = loss_of(run, request, result, judgement);
-    if (judgement && loss.empty())
-        for (const std::string& warning : StepJudge::warnings(*judgement, scene.run.error))
-            fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+        for (const std::string& warning :
+             StepJudge::warnings(observers.judge.judge(run.derivation, run.kernel, request, result)))
+            warnings.push_back(warning);
+    for (const std::string& warning : warnings) fmt::print(stderr, "lobatto: warning: {}.\n", warning);
     if (!options.quiet) {
         print_table(run.derivation, scene, stepper, request, result, observers.watch);
-        if (judgement) print_row("estimated error", judgement->text());
+        if (error) print_row("measured error", text_of(*error, scene));
         print_events(scene.outputs.events, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
         if (!run.steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
-    fail_where_it_failed(scene, request, result, loss.empty() ? departure_of(run, request, result, observers) : loss,
-                         files);
+    fail_where_it_failed(scene, request, result, departure, files);
 }
 
 }  // namespace
@@ -380,6 +423,10 @@ void add_run(CommandLine& program) {
     command.flag(
         "--resume", options->resume,
         "continue the same run where it was interrupted or killed; its files are then the same, byte for byte");
+    command.flag("--unmeasured", options->unmeasured,
+                 "do not measure the error by a companion, the same run with 2/3 of the step on another processor");
+    command.flag("--beyond-horizon", options->beyond_horizon,
+                 "go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
     command.does([options] { run(*options); });

@@ -142,6 +142,12 @@ private:
         const long largest = precision_ == Precision::single ? 128 : precision_ == Precision::double_ ? 1024 : 16384;
         const long exponent =
             cln::zerop(value) ? 0 : cln::cl_I_to_long(cln::float_exponent(cln::cl_float(value, cln::float_format(20))));
+        // What rounds to zero among the kernel's numbers is zero; what keeps few of its digits is refused.
+        const long kept = precision_ == Precision::single     ? 24
+                          : precision_ == Precision::double_  ? 53
+                          : precision_ == Precision::extended ? 64
+                                                              : 113;
+        if (exponent < 2 - largest - kept) return literal(cln::cl_float(0, cln::float_format(20)));
         if (exponent > largest || exponent < 4 - largest)
             throw DomainError("the formulas derived from it contain the number " + decimal(value, 3) +
                               ", beyond the range of the kernel's number type; choose other units");

@@ -88,8 +88,9 @@ cln::cl_R float_of(const GiNaC::numeric& value) {
     return cln::cl_float(cln::the<cln::cl_R>(value.to_cl_N()), format);
 }
 
-std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>& inputs,
-                                const std::vector<Id>& roots) {
+// Of all nodes below the roots.
+static std::vector<Sized> all_sized(const Graph& graph, const std::vector<cln::cl_R>& inputs,
+                                    const std::vector<Id>& roots) {
     const std::vector<cln::cl_R> values = graph.evaluate(inputs, roots);
     std::vector<Sized> sized(values.size());
     for (const Id id : graph.topological(roots)) {
@@ -99,8 +100,35 @@ std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>
         here.value = values[static_cast<std::size_t>(id)];
         here.size = size_of(graph[id], here, operands);
     }
+    return sized;
+}
+
+std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>& inputs,
+                                const std::vector<Id>& roots) {
+    const std::vector<Sized> sized = all_sized(graph, inputs, roots);
     std::vector<Sized> result;
     for (const Id root : roots) result.push_back(sized[static_cast<std::size_t>(root)]);
+    return result;
+}
+
+std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<cln::cl_R>& inputs,
+                                        const std::vector<Id>& roots) {
+    const std::vector<Sized> sized = all_sized(graph, inputs, roots);
+    const auto of = [&](Id id) -> const Sized& { return sized[static_cast<std::size_t>(id)]; };
+    std::vector<std::set<Id>> hidden(sized.size());
+    for (const Id id : graph.topological(roots))
+        for (const Id operand : graph[id].operands) {
+            hidden[static_cast<std::size_t>(id)].merge(std::set<Id>(hidden[static_cast<std::size_t>(operand)]));
+            const bool is_small = graph[id].op == Op::add && !of(operand).vanishes() &&
+                                  Sized{of(operand).value, of(id).size}.vanishes();
+            const bool is_flat = (graph[id].op == Op::exp && cln::zerop(of(id).value)) ||
+                                 (graph[id].op == Op::tanh && Sized{1 - cln::abs(of(id).value), 1}.vanishes());
+            if (!is_small && !is_flat) continue;
+            for (const Id below : graph.topological({operand}))
+                if (graph[below].op == Op::input) hidden[static_cast<std::size_t>(id)].insert(below);
+        }
+    std::vector<std::set<Id>> result;
+    for (const Id root : roots) result.push_back(hidden[static_cast<std::size_t>(root)]);
     return result;
 }
 
@@ -112,6 +140,17 @@ void Formulas::set(const GiNaC::ex& symbol, const cln::cl_R& value) {
     const std::size_t index = static_cast<std::size_t>(graph_[static_cast<Id>(index_of(inputs_, symbol))].index);
     if (index >= values_.size()) values_.resize(index + 1);
     values_[index] = value;
+}
+
+std::vector<GiNaC::exset> Formulas::hidden(const std::vector<Id>& roots) const {
+    std::vector<GiNaC::exset> result;
+    for (const std::set<Id>& inputs : hidden_inputs(graph_, values_, roots)) {
+        result.emplace_back();
+        for (const auto& [symbol, id] : inputs_)
+            if (inputs.contains(static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(id).to_int())))
+                result.back().insert(symbol);
+    }
+    return result;
 }
 
 cln::cl_R Formulas::get(const GiNaC::ex& symbol) const {

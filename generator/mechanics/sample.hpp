@@ -4,6 +4,7 @@
 
 #include <cln/cln.h>
 
+#include <set>
 #include <vector>
 
 #include "generator/graph/graph.hpp"
@@ -21,6 +22,12 @@ struct Sized {
     }
 };
 
+// For each root the inputs that it holds where its value does not tell of them: in terms too small beside others though
+// they are not zero, as exp(-(t - 40)^2) beside q at t near 0, and in exp and tanh far out, where these are flat. Input
+// nodes, each once.
+std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<cln::cl_R>& inputs,
+                                        const std::vector<Id>& roots);
+
 // The values of some nodes with their sizes. DomainError when one is not real.
 std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots);
 
@@ -35,6 +42,8 @@ public:
     std::vector<Sized> evaluate_sized(const std::vector<Id>& roots) const {
         return sized_values(graph_, values_, roots);
     }
+    // For each root the symbols that hidden_inputs finds.
+    std::vector<GiNaC::exset> hidden(const std::vector<Id>& roots) const;
     std::vector<cln::cl_R> operator()(const std::vector<GiNaC::ex>& expressions) {
         return evaluate(convert(expressions));
     }

@@ -145,8 +145,17 @@ private:
                 if (!here[i].equals(there[i])) kinds[i].*flag = true;
             for (std::size_t k = 0; k < symbols.size(); ++k) formulas.set(symbols[k], before[k]);
         };
-        for (std::size_t i = 0; i < kinds.size(); ++i)
-            if (!here[i].vanishes()) kinds[i].zero = false;
+        // What a term depends on counts also where the term is too small to be seen.
+        const std::vector<GiNaC::exset> hidden = formulas.hidden(roots);
+        const auto hides = [&](std::size_t i, const Symbols& symbols) {
+            return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return hidden[i].contains(s); });
+        };
+        for (std::size_t i = 0; i < kinds.size(); ++i) {
+            if (!here[i].vanishes() || !hidden[i].empty()) kinds[i].zero = false;
+            kinds[i].on_q |= hides(i, system_.q);
+            kinds[i].on_v |= hides(i, system_.v);
+            kinds[i].on_t |= hides(i, {system_.t});
+        }
         moved(system_.q, &Kind::on_q);
         moved(system_.v, &Kind::on_v);
         moved({system_.t}, &Kind::on_t);

@@ -143,7 +143,7 @@ private:
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
         const Table table(source_, table_of(source_, section, example), section.at, "[run]",
-                          {"step", "steps_per_period", "period", "until", "error"});
+                          {"step", "steps_per_period", "period", "until", "error", "beyond_horizon"});
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
         const Entry* period = table.find("period");
@@ -177,6 +177,8 @@ private:
             fail(until.value.at,
                  fmt::format("the run has {} steps; at most 9e15: make until smaller or the step larger",
                              shown(end / h)));
+        if (const Entry* beyond = table.find("beyond_horizon"))
+            scene_.run.beyond_horizon = boolean_of(source_, *beyond);
         if (const Entry* error = table.find("error")) {
             GiNaC::numeric value = 0;
             system_.read_formula(*error, system_.scope_of("the error", false), &value);

@@ -33,9 +33,10 @@ struct Parameter {
 };
 
 struct Run {
-    GiNaC::ex step;    // h > 0; in parameters
-    GiNaC::ex until;   // end time, >= 0; in parameters
-    double error = 0;  // that is wanted, relative to the amplitude of the motion; 0: nothing is said
+    GiNaC::ex step;               // h > 0; in parameters
+    GiNaC::ex until;              // end time, >= 0; in parameters
+    double error = 0;             // that is wanted, relative to the amplitude of the motion; 0: nothing is said
+    bool beyond_horizon = false;  // goes on where nothing of the motion is left: statistics of chaos
 };
 
 // An event: the value crosses zero. Located on the step's own polynomial.

@@ -86,7 +86,7 @@ TEST_CASE("a run says how good it is and where its trajectory is") {
         "  energy error            \\S+ at most, relative \\S+\n"
         "  symplectic defect       \\S+\n"
         "  position error          \\S+ rad at most, against the exact elliptic solution\n"
-        "  estimated error         \\S+ of the amplitude at the end\n"
+        "  measured error          \\S+ of the amplitude at the end \\(\\S+ rad in q\\)\n"
         "  trajectory              \\S+/run.csv, 2401 states\n");
     CHECK_MESSAGE(std::regex_match(first.out, table), first.out);
     const test::Finished second = place.run({pendulum, "-o", place.file("again.csv")});

@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/companion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t most_numbers = 16384;  // of all comparisons together, positions and momenta
+constexpr std::int64_t most_comparisons = 256;
+constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude
+constexpr double short_run = 2;                // seconds: of these the companion always reaches the end
+constexpr double at_rest = 0x1p-40;            // of the place: what rounding moves it by
+constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
+constexpr int most_coupled = 16;               // coordinates of which that is looked for
+constexpr double out_of_step = 0.5;            // of an amplitude: two motions of which each knows nothing of the other
+constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double exponential = 30;  // times more than errors that grow with the square of the time
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// `row`: q, p.
+void lose(MeasuredError& error, double time, const std::vector<double>& row) {
+    const auto middle = row.begin() + std::ssize(row) / 2;
+    error.lost_after = time;
+    error.lost_q.assign(row.begin(), middle);
+    error.lost_p.assign(middle, row.end());
+}
+
+std::vector<double> joined(std::vector<double> q, const std::vector<double>& p) {
+    q.insert(q.end(), p.begin(), p.end());
+    return q;
+}
+
+void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count) {
+    if (least.empty()) least.assign(row, row + count), most = least;
+    for (std::size_t i = 0; i < count; ++i) {
+        least[i] = std::fmin(least[i], row[i]);
+        most[i] = std::fmax(most[i], row[i]);
+    }
+}
+
+}  // namespace
+
+std::vector<int> amplitude_groups(const Scene& scene) {
+    std::map<std::string, int> numbers;
+    std::vector<int> groups;
+    for (const Coordinate& coordinate : scene.coordinates) {
+        const std::string array = coordinate.written.substr(0, coordinate.written.find('['));
+        groups.push_back(numbers.try_emplace(array, static_cast<int>(numbers.size())).first->second);
+    }
+    return groups;
+}
+
+Companion::Companion(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request)
+    : kernel_(kernel),
+      groups_(amplitude_groups(derivation.scene)),
+      order_(derivation.quadrature.order()),
+      rows_a_step_(1 + request.dense) {
+    request_.parameters = request.parameters;
+    request_.q = request.q;
+    request_.p = request.p;
+    request_.time = request.time;
+    request_.step = request.step;
+    request_.steps = request.steps;
+    request_.every = request.every;
+    request_.tolerance = request.tolerance;
+    pulses_ = find_pulses(derivation.system, request.parameters, request.time,
+                          request.time + static_cast<double>(request.steps) * request.step, std::fabs(request.step));
+    const std::int64_t comparisons =
+        std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
+    const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
+    stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
+}
+
+Companion::~Companion() {
+    cancelled_ = true;
+    if (thread_.joinable()) thread_.join();
+}
+
+void Companion::observe(const Records& records) {
+    const std::size_t count = 2 * groups_.size();
+    for (std::int64_t i = 0; i < records.count; ++i) {
+        const double* const row = records.rows + i * records.columns + 1;
+        widen_to(least_, most_, row, count);
+        const std::int64_t number = seen_++;
+        if (number % rows_a_step_ != 0) continue;
+        const std::int64_t steps = std::min(number / rows_a_step_ * request_.every, request_.steps);
+        if (steps > 0 && (steps % stride_ == 0 || steps == request_.steps)) run_.push_back({steps, {row, row + count}});
+    }
+}
+
+Companion::Segment Companion::segment(std::size_t number) const {
+    Segment result;
+    result.begin = static_cast<std::int64_t>(number) * stride_;
+    result.steps = std::min(stride_, request_.steps - result.begin);
+    result.taken = result.steps + (result.steps + 1) / 2;
+    return result;
+}
+
+void Companion::start() {
+    if (request_.steps > 0) thread_ = std::thread([this] { compute(); });
+}
+
+struct Companion::Place {
+    LoadedStepper<double> stepper;
+    double time, step;  // step: 0 before the first
+    std::vector<double> q, p;
+    lobatto_status status = LOBATTO_OK;
+
+    // Steps of another size begin at this place.
+    void set_step(double size, const std::vector<double>& parameters) {
+        if (size == step || status != LOBATTO_OK) return;
+        status = stepper.prepare(parameters, size);
+        if (status == LOBATTO_OK) status = stepper.start(time, q, p);
+        step = size;
+    }
+    std::int64_t advance(std::int64_t steps, double tolerance) {
+        lobatto_advance call{};
+        call.steps = steps;
+        call.tolerance = tolerance;
+        if (status == LOBATTO_OK) status = stepper.advance(call);
+        stepper.state(time, q, p);
+        return call.steps_done;
+    }
+};
+
+bool Companion::is_near_pulse(double from, double step) const {
+    const double begin = std::fmin(from, from + step), end = std::fmax(from, from + step), size = end - begin;
+    const auto first = std::lower_bound(pulses_.begin(), pulses_.end(), begin - graded * size,
+                                        [](const Pulse& pulse, double time) { return pulse.time < time; });
+    for (auto pulse = first; pulse != pulses_.end() && pulse->time < end + graded * size; ++pulse) {
+        const double distance = std::fmax(0.0, std::fmax(begin - pulse->time, pulse->time - end));
+        if (size > std::fmax(pulse->width / 2, distance / graded)) return true;
+    }
+    return false;
+}
+
+// Steps shorter and shorter towards a pulse.
+void Companion::take_finely(Place& place, double from, double step) {
+    if (place.status != LOBATTO_OK || cancelled_) return;
+    if (is_near_pulse(from, step) && from + step / 2 != from) {
+        take_finely(place, from, step / 2);
+        take_finely(place, from + step / 2, step / 2);
+        return;
+    }
+    place.set_step(step, request_.parameters);
+    place.advance(1, request_.tolerance);
+}
+
+void Companion::take(Place& place, const Segment& part) {
+    const double from = request_.time + static_cast<double>(part.begin) * request_.step,
+                 size = request_.step * static_cast<double>(part.steps) / static_cast<double>(part.taken);
+    const std::int64_t piece = std::max<std::int64_t>(1, request_.steps / amplitude_looks);
+    std::int64_t done = 0;
+    while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
+        const double here = from + static_cast<double>(done) * size;
+        std::int64_t count = 0;
+        while (count < std::min(piece, part.taken - done) &&
+               (pulses_.empty() || !is_near_pulse(here + static_cast<double>(count) * size, size)))
+            count = pulses_.empty() ? std::min(piece, part.taken - done) : count + 1;
+        if (count == 0) {
+            take_finely(place, here, size);
+            ++done;
+        } else {
+            place.set_step(size, request_.parameters);
+            done += place.advance(count, request_.tolerance);
+        }
+        const std::vector<double> row = joined(place.q, place.p);
+        const std::lock_guard lock(mutex_);
+        widen_to(companion_least_, companion_most_, row.data(), row.size());
+    }
+}
+
+void Companion::compute() {
+    Place place{LoadedStepper<double>(kernel_), request_.time, 0, request_.q, request_.p};
+    std::size_t done = 0;
+    {
+        const std::lock_guard lock(mutex_);
+        done = companion_.size();
+        if (done > 0) {
+            const auto middle = companion_.back().row.begin() + std::ssize(place.q);
+            place.q.assign(companion_.back().row.begin(), middle);
+            place.p.assign(middle, companion_.back().row.end());
+            place.time = request_.time + static_cast<double>(companion_.back().steps) * request_.step;
+        }
+    }
+    if (done == 0) {
+        std::vector<double> moved = place.q;
+        for (double& x : moved)
+            if (x != 0) x = std::nextafter(x, std::numeric_limits<double>::infinity());
+        if (place.stepper.prepare(request_.parameters, request_.step) == LOBATTO_OK &&
+            place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
+            place.q = moved;  // else the start is at the edge of where the Lagrangian is real
+    }
+    for (Segment part = segment(done); part.steps > 0; part = segment(++done)) {
+        take(place, part);
+        if (cancelled_) return;
+        const std::lock_guard lock(mutex_);
+        if (place.status != LOBATTO_OK) {
+            stopped_ = place.time;
+            break;
+        }
+        companion_.push_back({part.begin + part.steps, joined(place.q, place.p)});
+    }
+    finished_ = true;
+}
+
+std::vector<double> Companion::save() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<double> all{static_cast<double>(seen_), static_cast<double>(run_.size()),
+                            static_cast<double>(companion_.size())};
+    for (const auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
+        all.push_back(static_cast<double>(range->size()));
+        all.insert(all.end(), range->begin(), range->end());
+    }
+    for (const auto* points : {&run_, &companion_})
+        for (const Point& point : *points) {
+            all.push_back(static_cast<double>(point.steps));
+            all.insert(all.end(), point.row.begin(), point.row.end());
+        }
+    return all;
+}
+
+void Companion::restore(const std::vector<double>& saved) {
+    auto at = saved.begin();
+    const auto take = [&](std::ptrdiff_t count) {
+        if (saved.end() - at < count) return std::vector<double>();
+        std::vector<double> part(at, at + count);
+        at += count;
+        return part;
+    };
+    const std::vector<double> counts = take(3);
+    if (counts.empty()) return;
+    seen_ = std::llround(counts[0]);
+    for (auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
+        const std::vector<double> size = take(1);
+        if (!size.empty()) *range = take(std::llround(size[0]));
+    }
+    for (const auto& [points, count] : {std::pair{&run_, counts[1]}, std::pair{&companion_, counts[2]}})
+        for (std::int64_t i = 0; i < std::llround(count); ++i) {
+            const std::vector<double> point = take(1 + 2 * std::ssize(groups_));
+            if (!point.empty()) points->push_back({std::llround(point[0]), {point.begin() + 1, point.end()}});
+        }
+}
+
+std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, double seconds) {
+    const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
+    if (has_end) {
+        // On one processor it waited until now.
+        const auto now = std::chrono::steady_clock::now();
+        const bool begins_now = !thread_.joinable();
+        if (begins_now) start();
+        const double longest = begins_now ? std::fmax(short_run / 2, seconds / 2) : std::fmax(short_run - seconds, 0.0);
+        while (!finished_ && seconds_since(now) < longest) std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    cancelled_ = true;
+    if (thread_.joinable()) thread_.join();
+    if (!has_end || run_.empty()) return std::nullopt;
+    return compare(result);
+}
+
+std::vector<double> Companion::amplitudes() const {
+    const std::size_t n = groups_.size();
+    std::vector<double> own(2 * n), shared(2 * n, 0.0);
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+        double least = least_[i], most = most_[i];
+        if (!companion_least_.empty()) {
+            least = std::fmin(least, companion_least_[i]);
+            most = std::fmax(most, companion_most_[i]);
+        }
+        const double place = std::fmax(std::fabs(least), std::fabs(most)), half = (most - least) / 2;
+        own[i] = half > at_rest * place ? half : 0;
+    }
+    for (std::size_t i = 0; i < 2 * n; ++i)
+        for (std::size_t k = 0; k < n; ++k)
+            if (groups_[k] == groups_[i % n]) shared[i] = std::fmax(shared[i], own[i < n ? k : n + k]);
+    // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
+    LoadedStepper<double> stepper(kernel_);
+    std::vector<double> q, p, T;
+    if (kernel_->has_tangent != 0 && n <= most_coupled &&
+        stepper.prepare(request_.parameters, request_.step) == LOBATTO_OK &&
+        stepper.tangent(request_.time, request_.q, request_.p, q, p, T) == LOBATTO_OK) {
+        const std::vector<double> found = shared;
+        for (std::size_t i = 0; i < 2 * n; ++i)
+            for (std::size_t j = 0; j < 2 * n; ++j)
+                if (i % n != j % n && found[i] > 0)
+                    shared[i] = std::fmax(shared[i], noise * std::fabs(T[i * 2 * n + j]) * found[j]);
+    }
+    return shared;
+}
+
+MeasuredError Companion::compare(const TrajectoryResult& result) const {
+    const std::size_t n = groups_.size();
+    const std::vector<double> amplitude = amplitudes();
+    MeasuredError error;
+    error.companion_stopped = stopped_;
+    std::vector<std::pair<double, double>> course;  // time, largest error until then
+    const std::size_t count = std::min(run_.size(), companion_.size());
+    for (std::size_t j = 0; j < count; ++j) {
+        const Segment part = segment(j);
+        const double ratio = static_cast<double>(part.taken) / static_cast<double>(part.steps),
+                     of_run = 1 / (1 - std::pow(ratio, -order_));
+        error.until = request_.time + static_cast<double>(run_[j].steps) * request_.step;
+        error.end = 0;
+        double apart = 0;
+        for (std::size_t i = 0; i < 2 * n; ++i) {
+            if (!(amplitude[i] > 0)) continue;
+            const double difference = std::fabs(run_[j].row[i] - companion_[j].row[i]);
+            apart = std::fmax(apart, difference / amplitude[i]);
+            if (i >= n || !(of_run * difference / amplitude[i] > error.end)) continue;
+            error.end = of_run * difference / amplitude[i];
+            error.coordinate = i;
+            error.absolute = of_run * difference;
+        }
+        error.largest = std::fmax(error.largest, error.end);
+        course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
+        if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, run_[j].row);
+    }
+    if (!error.lost_after && stopped_)
+        lose(error, *stopped_, count > 0 ? run_[count - 1].row : joined(request_.q, request_.p));
+    error.complete = count == run_.size();
+    // Exponential growth: from the first error that is there to the first that is as large as it can be.
+    const auto first = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > 0; });
+    auto last = std::find_if(first, course.end(), [](const auto& c) { return c.second > out_of_step / 2; });
+    if (last == course.end() && first != course.end()) last = std::prev(course.end());
+    if (first != course.end() && last > first) {
+        const double growth = last->second / first->second, times = last->first / first->first;
+        // Half of the way in half of the time: a jump is no growth.
+        const auto middle = first + (last - first) / 2;
+        const double part = std::log(middle->second / first->second) / std::log(growth);
+        if (growth > exponential * times * times && part > 0.2 && part < 0.8)
+            error.doubling = (last->first - first->first) / std::log2(growth);
+    }
+    error.at_end = error.end;
+    if (!error.complete && !course.empty()) {
+        const double whole = std::fabs(result.time - request_.time), part = course.back().first;
+        error.at_end *= error.doubling ? std::exp2((whole - part) / *error.doubling) : whole * whole / (part * part);
+    }
+    return error;
+}
+
+std::string text_of(const MeasuredError& error, const Scene& scene) {
+    const std::string chaos = error.doubling ? fmt::format("; errors double every {:.3g}", *error.doubling) : "";
+    if (error.companion_stopped && error.lost_after)
+        return fmt::format("not known after t = {:.4g}, where the same run with 2/3 of the step stops",
+                           *error.lost_after);
+    if (error.lost_after)
+        return fmt::format("as large as the motion itself from t = {:.4g} on{}", *error.lost_after, chaos);
+    const std::string place = error.complete ? "at the end" : fmt::format("at t = {:.4g}", error.until);
+    std::string text = error.largest > 3 * error.end
+                           ? fmt::format("{:.1e} of the amplitude at most; {} {:.1e}", error.largest, place, error.end)
+                           : fmt::format("{:.1e} of the amplitude {}", error.end, place);
+    const Coordinate& worst = scene.coordinates[error.coordinate];
+    if (error.end > 0)
+        text +=
+            fmt::format(" ({:.1e}{} in {})", error.absolute, worst.unit.empty() ? "" : " " + worst.unit, worst.written);
+    if (!error.complete)
+        text += fmt::format(", not measured beyond; perhaps {:.0e} at the end", std::fmin(error.at_end, 1));
+    return text + chaos;
+}
+
+}  // namespace lobatto

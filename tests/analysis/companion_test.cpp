@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The measured error of a run: near the true one, and never silent where nothing of the motion is left.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "runtime/run/output.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+std::string scene_of(const std::string& lagrangian, const std::string& coordinates, const std::string& method,
+                     double step, double until, const std::string& rest = "") {
+    return fmt::format(
+        "lagrangian = \"{}\"\ntime = \"t\"\n[coordinates]\n{}\n[method]\n{}\n[run]\nstep = {}\nuntil = {}\n{}",
+        lagrangian, coordinates, method, step, until, rest);
+}
+
+const std::string four = "points = 4", gauss_4 = "family = \"gauss\"\nstages = 4",
+                  swinging = "q = { position = 1, velocity = 0 }";
+
+class Place {
+public:
+    explicit Place(const std::string& scene) { test::write_text(folder / "scene.toml", scene); }
+    test::Finished run(std::vector<std::string> options = {}) const {
+        options.insert(options.begin(), {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv"});
+        return test::run(options);
+    }
+    std::vector<double> end() const { return read_trajectory(folder / "run.csv").rows.back(); }
+
+    test::TemporaryFolder folder;
+};
+
+// What the table says: the absolute error at the end, in the coordinate where it is largest.
+double absolute_error(const std::string& table) {
+    const std::size_t row = table.find("  measured error");
+    REQUIRE(row != std::string::npos);
+    const std::string line = table.substr(row, table.find('\n', row) - row);
+    const std::size_t bracket = line.find('(');
+    INFO(line);
+    REQUIRE(bracket != std::string::npos);
+    return std::strtod(line.c_str() + bracket + 1, nullptr);
+}
+
+}  // namespace
+
+TEST_CASE("the measured error is the true one within a factor of two, by any method") {
+    // Against the same motion with a step that leaves rounding alone.
+    const std::string lagrangian = "x'^2/2 + y'^2/2 - (x^2 + y^2)/2 - x^2*y + y^3/3";
+    const std::string coordinates = "x = { position = 0.3, velocity = 0.1 }\ny = { position = 0.1, velocity = 0.3 }";
+    const Place exact(scene_of(lagrangian, coordinates, "points = 10", 0.02, 20));
+    REQUIRE(exact.run().exit_code == 0);
+    const std::vector<double> truth = exact.end();
+    for (const auto& [method, step] :
+         std::vector<std::pair<std::string, double>>{{"points = 2", 0.02},
+                                                     {"points = 4", 0.2},
+                                                     {"points = 4", 0.5},
+                                                     {"points = 6", 1},
+                                                     {"family = \"gauss\"\nstages = 2", 0.2},
+                                                     {"family = \"splitting\"\nstages = 11", 0.4}}) {
+        const Place place(scene_of(lagrangian, coordinates, method, step, 20));
+        const test::Finished done = place.run();
+        CAPTURE(method);
+        CAPTURE(step);
+        REQUIRE(done.exit_code == 0);
+        const std::vector<double> end = place.end();
+        const double error = std::fmax(std::fabs(end[1] - truth[1]), std::fabs(end[2] - truth[2]));
+        CHECK(absolute_error(done.out) > error / 2);
+        CHECK(absolute_error(done.out) < error * 2);
+    }
+}
+
+TEST_CASE("a run of which nothing is left returns 3 and says so, also when it is quiet") {
+    struct Row {
+        std::string lagrangian, coordinates, method;
+        double step, until;
+    };
+    const std::vector<Row> rows = {
+        {"q'^2/2 + cos(q)", "q = { position = 3.1415926, velocity = 0 }", gauss_4, 0.1, 1000},
+        {"q'^2/2 + cos(q)", "q = { position = \\\"pi\\\", velocity = 0 }", gauss_4, 0.1, 1000},
+        {"x'^2/2 + x^2/2 - x^4/4", "x = { position = 1e-9, velocity = 0 }", gauss_4, 0.1, 1000},
+        {"q'^2/2 - q^4/4 + q*cos(t^2)", swinging, four, 0.1, 60},
+        {"x'^2/2 + y'^2/2 + 1/sqrt(x^2 + y^2)",
+         "x = { position = 0.1, velocity = 0 }\ny = { position = 0, velocity = 4.3588989435 }", four, 0.02, 60}};
+    for (const Row& row : rows) {
+        std::string coordinates = row.coordinates;
+        while (coordinates.find('\\') != std::string::npos) coordinates.erase(coordinates.find('\\'), 1);
+        const Place place(scene_of(row.lagrangian, coordinates, row.method, row.step, row.until));
+        CAPTURE(row.lagrangian);
+        CAPTURE(coordinates);
+        const test::Finished quiet = place.run({"--quiet"});
+        CHECK(quiet.exit_code == 3);
+        CHECK(quiet.out == "");
+        CHECK(quiet.err.find("the run left its motion by t = ") != std::string::npos);
+        CHECK(place.run({"--quiet", "--unmeasured"}).exit_code == 0);
+        const test::Finished accepted = place.run({"--beyond-horizon"});
+        CHECK(accepted.exit_code == 0);
+        CHECK(accepted.out.find("as large as the motion itself from t = ") != std::string::npos);
+    }
+    // Asked for by the scene; and the same motion where it still is one.
+    const std::string top = "q = { position = 3.1415926, velocity = 0 }";
+    CHECK(Place(scene_of("q'^2/2 + cos(q)", top, gauss_4, 0.1, 1000, "beyond_horizon = true\n")).run().exit_code == 0);
+    CHECK(Place(scene_of("q'^2/2 + cos(q)", top, gauss_4, 0.1, 50)).run().exit_code == 0);
+}
+
+TEST_CASE("what a pulse between the nodes does is measured") {
+    struct Row {
+        const char* lagrangian;
+        double fine;  // a step that sees the pulse
+    };
+    for (const Row& row : {Row{"q'^2/2 - q^2/2 + 100*q*exp(-((t - 5.03)/0.001)^2)", 0.0005},
+                           Row{"q'^2/2 - q^2/2 + 30*q/(1 + ((t - 5.03)/0.003)^2)", 0.0005},
+                           Row{"q'^2/2 - q^2/2 + 100*q/cosh((t - 7.77)/0.0002)", 0.00005},
+                           Row{"q'^2/2 - q^2/2*(1 + 1e4*exp(-((t - 5.03)/0.0003)^2))", 0.0001},
+                           Row{"q'^2/2 - q^2/2 + q*exp(-sin(t)^2/1e-4)", 0.001}}) {
+        CAPTURE(row.lagrangian);
+        const Place coarse(scene_of(row.lagrangian, swinging, four, 0.1, 10)),
+            fine(scene_of(row.lagrangian, swinging, four, row.fine, 10));
+        const test::Finished done = coarse.run({"--beyond-horizon"});
+        REQUIRE(done.exit_code == 0);
+        REQUIRE(fine.run({"--every", "100"}).exit_code == 0);
+        const double error = std::fabs(coarse.end()[1] - fine.end()[1]);
+        if (done.out.find("as large as the motion") != std::string::npos) continue;
+        CHECK(absolute_error(done.out) > error / 2);
+        CHECK(absolute_error(done.out) < error * 2);
+    }
+}
+
+TEST_CASE("a pulse far from the start is not taken for nothing, and what rounds to zero is zero") {
+    for (const char* lagrangian :
+         {"q'^2/2 - q^2/2 + q*exp(-(t - 40)^2)", "q'^2/2 - q^2/2 + q*(1 + tanh((t - 40)/0.01))",
+          "q'^2/2 - q^2/2 + exp(-1600)*q", "q'^2/2 - q^2/2 - exp(-(q - 40)^2)"}) {
+        const Place place(scene_of(lagrangian, swinging, four, 0.05, 50));
+        const test::Finished done = place.run();
+        CAPTURE(lagrangian);
+        CAPTURE(done.err);
+        CHECK(done.exit_code == 0);
+        // exp(-(t - 40)^2) kicks q by sqrt(pi) exp(-1/4) cos(50 - 40): far from cos(50).
+        const bool is_kicked = std::string(lagrangian).find("t - 40") != std::string::npos;
+        CHECK((std::fabs(place.end()[1] - std::cos(50)) > 0.1) == is_kicked);
+    }
+}
+
+TEST_CASE("the unit of a coordinate changes nothing: each is measured by its own amplitude") {
+    const std::string lagrangian = "a'^2/2 - a^2/2*1e-4 + b'^2/2 + 25*cos(b)";
+    const Place without(scene_of(lagrangian, "a = { position = 1e6, velocity = 0 }\nb = { position = 1, velocity = 0 }",
+                                 four, 0.2, 100)),
+        with(scene_of(lagrangian,
+                      "a = { position = 1e6, velocity = 0, unit = \"m\" }\nb = { position = 1, velocity = 0, unit = "
+                      "\"rad\" }",
+                      four, 0.2, 100));
+    const test::Finished plain = without.run(), united = with.run();
+    CHECK(absolute_error(plain.out) == absolute_error(united.out));
+    CHECK(plain.out.find(" in b)") != std::string::npos);
+    CHECK(absolute_error(plain.out) > 1e-5);
+}
+
+TEST_CASE("a run that is not measured says nothing of its error") {
+    const Place place(scene_of("q'^2/2 - q^2/2", swinging, four, 0.1, 10));
+    CHECK(place.run({"--unmeasured"}).out.find("measured error") == std::string::npos);
+    CHECK(place.run().out.find("measured error") != std::string::npos);
+}
