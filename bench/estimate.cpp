@@ -168,7 +168,7 @@ of an array share one. `analysis/accuracy/companion.cpp` holds all of it, `tests
 - **Pulses.** A pulse in the explicit time may fall between all nodes of both. The formulas tell where it is: the maximum of u in exp(u), a complex root of u in 1/u, a root of u in tanh(u) or 1/cosh(u). There the
   companion takes steps of half its width, growing to an eighth of the distance.
 - **Rounding.** A coordinate that moves by less than 2^−40 of its place, or by less than 10^−10 of what the others move it by in one step, is moved by rounding and tells nothing.
-- **Long runs.** Of a run above two seconds the companion compares what it has reached when the run ends; the rest is extrapolated and said to be. `--unmeasured` runs without it.
+- **Long runs.** Of a run above one second the companion compares what it has reached when the run ends; the rest is extrapolated and said to be. `--unmeasured` runs without it.
 
 The rest of this page is about the estimate that experiments record beside their measured errors, and that `run` printed before it measured. It is written by
 

@@ -15,11 +15,9 @@ namespace {
 constexpr std::size_t most_numbers = 16384;  // of all comparisons together, positions and momenta
 constexpr std::int64_t most_comparisons = 256;
 constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude
-constexpr double short_run = 2;                // seconds: of these the companion always reaches the end
-constexpr double at_rest = 0x1p-40;            // of the place: what rounding moves it by
+constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
 constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
 constexpr int most_coupled = 16;               // coordinates of which that is looked for
-constexpr double out_of_step = 0.5;            // of an amplitude: two motions of which each knows nothing of the other
 constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
 constexpr double exponential = 30;  // times more than errors that grow with the square of the time
 
@@ -40,25 +38,7 @@ std::vector<double> joined(std::vector<double> q, const std::vector<double>& p) 
     return q;
 }
 
-void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count) {
-    if (least.empty()) least.assign(row, row + count), most = least;
-    for (std::size_t i = 0; i < count; ++i) {
-        least[i] = std::fmin(least[i], row[i]);
-        most[i] = std::fmax(most[i], row[i]);
-    }
-}
-
 }  // namespace
-
-std::vector<int> amplitude_groups(const Scene& scene) {
-    std::map<std::string, int> numbers;
-    std::vector<int> groups;
-    for (const Coordinate& coordinate : scene.coordinates) {
-        const std::string array = coordinate.written.substr(0, coordinate.written.find('['));
-        groups.push_back(numbers.try_emplace(array, static_cast<int>(numbers.size())).first->second);
-    }
-    return groups;
-}
 
 Companion::Companion(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request)
     : kernel_(kernel),
@@ -252,14 +232,15 @@ void Companion::restore(const std::vector<double>& saved) {
         }
 }
 
-std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, double seconds) {
+std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
     if (has_end) {
-        // On one processor it waited until now.
-        const auto now = std::chrono::steady_clock::now();
-        const bool begins_now = !thread_.joinable();
+        const bool begins_now = !thread_.joinable();  // there is one processor: it waited until now
         if (begins_now) start();
-        const double longest = begins_now ? std::fmax(short_run / 2, seconds / 2) : std::fmax(short_run - seconds, 0.0);
+        const auto now = std::chrono::steady_clock::now();
+        const double longest = result.seconds < short_run ? std::numeric_limits<double>::infinity()
+                               : begins_now               ? result.seconds / 2
+                                                          : 0;
         while (!finished_ && seconds_since(now) < longest) std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     cancelled_ = true;
@@ -270,19 +251,10 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, d
 
 std::vector<double> Companion::amplitudes() const {
     const std::size_t n = groups_.size();
-    std::vector<double> own(2 * n), shared(2 * n, 0.0);
-    for (std::size_t i = 0; i < 2 * n; ++i) {
-        double least = least_[i], most = most_[i];
-        if (!companion_least_.empty()) {
-            least = std::fmin(least, companion_least_[i]);
-            most = std::fmax(most, companion_most_[i]);
-        }
-        const double place = std::fmax(std::fabs(least), std::fabs(most)), half = (most - least) / 2;
-        own[i] = half > at_rest * place ? half : 0;
-    }
-    for (std::size_t i = 0; i < 2 * n; ++i)
-        for (std::size_t k = 0; k < n; ++k)
-            if (groups_[k] == groups_[i % n]) shared[i] = std::fmax(shared[i], own[i < n ? k : n + k]);
+    std::vector<double> least = least_, most = most_;
+    for (const auto* row : {&companion_least_, &companion_most_})
+        if (!row->empty()) widen_to(least, most, row->data(), row->size());
+    std::vector<double> shared = amplitudes_of(least, most, groups_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
     LoadedStepper<double> stepper(kernel_);
     std::vector<double> q, p, T;

@@ -18,14 +18,12 @@
 #include <thread>
 #include <vector>
 
+#include "analysis/accuracy/amplitude.hpp"
 #include "analysis/accuracy/pulses.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {
-
-// Coordinates whose errors are measured by one amplitude have the same number: those of an array.
-std::vector<int> amplitude_groups(const Scene& scene);
 
 struct MeasuredError {
     double end = 0;                      // at `until`: of the positions, relative to the amplitude of each; the largest
@@ -59,10 +57,9 @@ public:
     std::vector<double> save() const;
     void restore(const std::vector<double>& saved);
 
-    // Waits for the companion, where the run took less than two seconds, and compares what there is; of a longer run
-    // that is as much as was computed beside it. `seconds`: that the run took. Nothing: the run was stopped, or took no
-    // step.
-    std::optional<MeasuredError> finish(const TrajectoryResult& result, double seconds);
+    // Waits for the companion, where the run took less than a second of processor time, and compares what there is; of
+    // a longer run that is as much as was computed beside it. Nothing: the run was stopped, or took no step.
+    std::optional<MeasuredError> finish(const TrajectoryResult& result);
 
 private:
     struct Point {

@@ -379,11 +379,10 @@ void run(const RunOptions& options) {
                                       : "nothing was left: from the start");
     }
     Files files(options, run, header, from);
-    const auto began = std::chrono::steady_clock::now();
     if (observers.companion && std::thread::hardware_concurrency() > 1) observers.companion->start();
     const TrajectoryResult result = integrate_into(files, observers, identity, run, request, options.quiet);
     std::optional<MeasuredError> error;
-    if (observers.companion) error = observers.companion->finish(result, seconds_since(began));
+    if (observers.companion) error = observers.companion->finish(result);
 
     std::string departure = departure_of(run, request, result, observers);
     if (departure.empty()) departure = loss_of(options, scene, request, error);

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/accuracy/ensemble_companion.hpp"
 #include "analysis/accuracy/sweep_watch.hpp"
 #include "analysis/kernel_of.hpp"
 #include "analysis/motion.hpp"
@@ -37,8 +39,10 @@ const char* const reason[] = {"reached the end",
                               "singular mass matrix",
                               "t + h equals t",
                               "not supported by the kernel",
-                              "energy off: beyond stability, or past a singularity"};
-constexpr int departed = 7;
+                              "energy off: beyond stability, or past a singularity",
+                              "not resolved: the error is as large as the motion"};
+constexpr double large_error = 0.03;  // of the amplitude: worth a warning whoever asked
+constexpr int departed = 7, unresolved = 8;
 
 struct SweepOptions {
     std::string scene;
@@ -49,6 +53,8 @@ struct SweepOptions {
     Overrides overrides;
     std::optional<std::int64_t> steps;
     int threads = 0;
+    bool unmeasured = false;
+    bool beyond_horizon = false;
     bool quiet = false;
 };
 
@@ -78,7 +84,7 @@ SweepTable::Format format_of(const SweepOptions& options) {
 
 // Initial values are written q(0), as other columns hold q at the time t. A name of the scene keeps its column; ours
 // gives way to it, as in steps_.
-std::vector<Column> columns_of(const Scene& scene, const Grid& grid) {
+std::vector<Column> columns_of(const Scene& scene, const Grid& grid, bool measures) {
     std::vector<Column> columns;
     const auto own = [&](std::string name, bool whole) {
         const auto taken = [&] {
@@ -104,6 +110,7 @@ std::vector<Column> columns_of(const Scene& scene, const Grid& grid) {
     if (scene.outputs.momenta)
         for (const Coordinate& coordinate : scene.coordinates) columns.push_back({"p_" + coordinate.name, ""});
     if (scene.outputs.energy) own("energy_error", false);
+    if (measures) own("error", false);
     return columns;
 }
 
@@ -122,30 +129,81 @@ std::vector<std::string> comments_of(const Scene& scene, const KernelSource& sou
     }
     if (!parameters.empty()) comments.push_back(fmt::format("parameters: {}", fmt::join(parameters, ", ")));
     for (const Axis& axis : grid.axes()) comments.push_back(fmt::format("vary: {} = {}", axis.name, axis.written));
-    for (int status = 0; status <= departed; ++status)
+    for (int status = 0; status <= unresolved; ++status)
         if (status != LOBATTO_UNSUPPORTED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
     comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
     return comments;
 }
 
+// What is said of a trajectory that has ended.
+struct Verdict {
+    int status = LOBATTO_OK;
+    bool measures = false;
+    double error = 0;  // at the end, relative to the amplitude
+};
+
+// Judges the trajectories, in their order: by their energies, and by their companions.
+class Judges {
+public:
+    Judges(const SweepOptions& options, const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+           const EnsembleRequest& request)
+        : watch(derivation, source, kernel, request),
+          accepts_lost_(options.beyond_horizon || derivation.scene.run.beyond_horizon) {
+        if (!options.unmeasured) companion_.emplace(derivation, kernel, request);
+    }
+
+    bool measures() const { return companion_.has_value(); }
+
+    Verdict judge(const EnsembleTrajectory& trajectory) {
+        Verdict verdict{static_cast<int>(trajectory.status), measures(), std::nan("")};
+        if (verdict.status != LOBATTO_OK) return verdict;
+        if (watch.departs(trajectory)) verdict.status = departed;
+        if (companion_) {
+            const EnsembleCompanion::Error error = companion_->of(trajectory);
+            verdict.error = error.relative;
+            if (error.lost && !accepts_lost_ && verdict.status == LOBATTO_OK) verdict.status = unresolved;
+        }
+        if (verdict.status == LOBATTO_OK) {
+            watch.observe(trajectory);
+            if (!(verdict.error <= worst_error) && !std::isnan(verdict.error)) {
+                worst_error = verdict.error;
+                worst = trajectory.index;
+            }
+        } else {
+            ++refused[static_cast<std::size_t>(verdict.status - departed)];
+        }
+        return verdict;
+    }
+
+    SweepWatch watch;
+    std::array<std::int64_t, 2> refused{};  // departed, unresolved
+    double worst_error = -1;                // of those that are resolved
+    std::int64_t worst = -1;
+
+private:
+    std::optional<EnsembleCompanion> companion_;
+    bool accepts_lost_;
+};
+
 // The states of one trajectory; only the last of them can be one at which it failed.
 void write(SweepTable& table, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
-           const EnsembleTrajectory& trajectory, int status) {
+           const EnsembleTrajectory& trajectory, const Verdict& verdict) {
     const Records& kept = trajectory.kept;
     const int numbers = scene.outputs.momenta ? kept.columns : 1 + (kept.columns - 1) / 2;
     for (std::int64_t i = 0; i < kept.count; ++i) {
         const bool last = i + 1 == kept.count;
         table.add(trajectory.index);
         for (std::size_t a = 0; a < grid.axes().size(); ++a) table.add(grid.value(trajectory.index, a));
-        table.add(static_cast<std::int64_t>(last ? status : LOBATTO_OK));
+        table.add(static_cast<std::int64_t>(last ? verdict.status : LOBATTO_OK));
         table.add(last ? trajectory.steps_done : i * request.every);
         for (int column = 0; column < numbers; ++column) table.add(kept.rows[i * kept.columns + column]);
         if (scene.outputs.energy) table.add(kept.energy[i] - trajectory.energy_start);
+        if (verdict.measures) table.add(last ? verdict.error : std::nan(""));
         table.end_row();
     }
 }
 
-std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleResult& result, std::int64_t departures,
+std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleResult& result, const Judges& judges,
                           const std::vector<Failure>& failures) {
     std::vector<std::string> reasons;
     std::int64_t failed = 0;
@@ -154,15 +212,18 @@ std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleRe
         failed += result.count_of[status];
         reasons.push_back(fmt::format("{} {}", result.count_of[status], reason[status]));
     }
-    if (departures > 0) reasons.push_back(fmt::format("{} {}", departures, reason[departed]));
-    failed += departures;
+    for (const int status : {departed, unresolved}) {
+        const std::int64_t count = judges.refused[static_cast<std::size_t>(status - departed)];
+        if (count > 0) reasons.push_back(fmt::format("{} {}", count, reason[status]));
+        failed += count;
+    }
     std::string text = fmt::format("{}: {} of {} failed: {}. The others went on. {}:", scene.path, failed,
                                    counted(result.trajectories, "trajectory", "trajectories"), fmt::join(reasons, ", "),
                                    failed > std::ssize(failures) ? "The first of them" : "They are");
     for (const Failure& failure : failures) {
         text += fmt::format("\n  trajectory {}, {}: {}", failure.index, values_of(grid, failure.index),
                             reason[failure.status]);
-        if (failure.status != departed)
+        if (failure.status < departed)
             text += fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
     }
     return text + "\nTry a smaller --step, or leave these values out.";
@@ -174,8 +235,9 @@ std::string spread_text(const Spread& spread) {
 }
 
 void print_table(const Derivation& derivation, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
-                 const EnsembleResult& result, std::int64_t departures, int kernel_lanes) {
-    const std::int64_t failed = result.trajectories - result.count_of[LOBATTO_OK] + departures;
+                 const EnsembleResult& result, const Judges& judges, int kernel_lanes) {
+    const std::int64_t failed =
+        result.trajectories - result.count_of[LOBATTO_OK] + judges.refused[0] + judges.refused[1];
     const std::string of_all = result.interrupted ? fmt::format(" of {}", request.count) : "";
     print_row("trajectories", fmt::format("{}{}{}", result.trajectories, of_all,
                                           failed == 0 ? "" : fmt::format(", {} failed", failed)));
@@ -198,7 +260,10 @@ void print_table(const Derivation& derivation, const Scene& scene, const Grid& g
                   fmt::format("{:.2g} to {:.2g}, mean {:.2g}, rms {:.2g}", result.energy_error.least,
                               result.energy_error.largest, result.energy_error.mean, result.energy_error.rms));
     }
-    if (result.count_of[LOBATTO_OK] == 0 || scene.coordinates.size() > coordinates_told) return;
+    if (judges.worst >= 0)
+        print_row("measured error", fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}",
+                                                judges.worst_error, judges.worst, values_of(grid, judges.worst)));
+    if (failed == result.trajectories || scene.coordinates.size() > coordinates_told) return;
     for (std::size_t k = 0; k < scene.coordinates.size(); ++k)
         print_row(scene.coordinates[k].name + " at the end", spread_text(result.q[k]));
     for (std::size_t k = 0; k < scene.coordinates.size() && scene.outputs.momenta; ++k)
@@ -275,19 +340,21 @@ void sweep(const SweepOptions& options) {
     const std::string path =
         output_path(options.output, scene.name + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
     keep_scene(scene.path, path);
-    SweepTable table(path, format, comments_of(scene, source, request, grid), columns_of(scene, grid));
+    SweepTable table(path, format, comments_of(scene, source, request, grid),
+                     columns_of(scene, grid, !options.unmeasured));
     std::vector<Failure> failures;
-    SweepWatch watch(derivation, source, kernel, request);
-    std::int64_t departures = 0;
+    Judges judges(options, derivation, source, kernel, request);
+    Verdict verdict;
+    request.counts = [&](const EnsembleTrajectory& trajectory) {
+        verdict = judges.judge(trajectory);
+        return verdict.status == LOBATTO_OK;
+    };
     request.sink = [&](const EnsembleTrajectory& trajectory) {
-        const bool departs = trajectory.status == LOBATTO_OK && watch.departs(trajectory);
-        departures += departs ? 1 : 0;
-        if (trajectory.status == LOBATTO_OK) watch.observe(trajectory);
-        const int status = departs ? departed : trajectory.status;
-        write(table, scene, grid, request, trajectory, status);
-        if (status == LOBATTO_OK || failures.size() == failures_told) return;
+        if (trajectory.status != LOBATTO_OK) verdict = judges.judge(trajectory);
+        write(table, scene, grid, request, trajectory, verdict);
+        if (verdict.status == LOBATTO_OK || failures.size() == failures_told) return;
         const double time = trajectory.kept.rows[(trajectory.kept.count - 1) * trajectory.kept.columns];
-        failures.push_back({trajectory.index, trajectory.steps_done, status, time});
+        failures.push_back({trajectory.index, trajectory.steps_done, verdict.status, time});
     };
     EnsembleResult result;
     {
@@ -298,26 +365,32 @@ void sweep(const SweepOptions& options) {
         result = integrate(kernel, request);
     }
     table.finish();
-    if (const std::string warning = watch.warning(); !warning.empty())
+    if (const std::string warning = judges.watch.warning(); !warning.empty())
         fmt::print(stderr, "lobatto: warning: {}.\n", warning);
 
+    if (judges.worst_error > large_error)
+        fmt::print(
+            stderr,
+            "lobatto: warning: the error of trajectory {}, {}, is {:.2g} of the amplitude; take a smaller step, or "
+            "more points.\n",
+            judges.worst, values_of(grid, judges.worst), judges.worst_error);
     if (!options.quiet) {
         fmt::print("{}: kernel {}\n", scene.path, source.digest);
-        print_table(derivation, scene, grid, request, result, departures, kernel->lanes);
+        print_table(derivation, scene, grid, request, result, judges, kernel->lanes);
         print_row("table", fmt::format("{}, {}", path, counted(table.rows(), "row", "rows")));
         if (!steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
         print_fixed_times(scene, grid);
     }
-    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || departures > 0;
+    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || judges.refused[0] + judges.refused[1] > 0;
     if (result.interrupted) {
         fmt::print(stderr, "lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n",
                    result.trajectories, request.count, path);
-        if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, departures, failures));
+        if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, judges, failures));
         throw ExitCode{interrupted_exit};
     }
     if (failed)
-        throw ComputationError(failures_text(scene, grid, result, departures, failures) +
+        throw ComputationError(failures_text(scene, grid, result, judges, failures) +
                                fmt::format(" What was computed is in {}.", path));
 }
 
@@ -348,6 +421,10 @@ void add_sweep(CommandLine& program) {
     add_set_option(command, options->overrides);
     command.option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
         .between(1, 1024);
+    command.flag("--unmeasured", options->unmeasured,
+                 "do not measure errors by companions, which take 3/2 of the sweep's time");
+    command.flag("--beyond-horizon", options->beyond_horizon,
+                 "trajectories of which nothing is left are no failures: for the statistics of chaos");
     command.flag("--quiet", options->quiet, "Print nothing but errors");
     command.footer(
         "Example:\n  lobatto sweep scenes/pendulum.toml --vary q=0:3:1000 --vary omega=1,2,5 --until 10 -o table.npy");

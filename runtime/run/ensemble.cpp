@@ -404,12 +404,12 @@ class Reduction {
 public:
     explicit Reduction(std::size_t n) : n_(n), q_(n), p_(n) {}
 
-    void add(const EnsembleTrajectory& trajectory, EnsembleResult& result) {
+    void add(const EnsembleTrajectory& trajectory, const EnsembleRequest& request, EnsembleResult& result) {
         ++result.trajectories;
         ++result.count_of[static_cast<std::size_t>(trajectory.status)];
         result.steps_done += trajectory.steps_done;
         result.iterations += trajectory.iterations;
-        if (trajectory.status != LOBATTO_OK) return;
+        if (trajectory.status != LOBATTO_OK || (request.counts && !request.counts(trajectory))) return;
         const double error = trajectory.energy_error_largest;
         if (!std::isnan(error) && (result.energy_error_index < 0 || error > result.energy_error_largest)) {
             result.energy_error_largest = error;
@@ -512,7 +512,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
         result.processor_seconds += group.processor_seconds;
         for (const Ended& ended : group.trajectories) {
             const EnsembleTrajectory trajectory = view(result.trajectories, ended);
-            reduction.add(trajectory, result);
+            reduction.add(trajectory, request, result);
             if (request.sink) request.sink(trajectory);
         }
         result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);

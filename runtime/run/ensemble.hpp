@@ -44,17 +44,19 @@ struct EnsembleRequest {
     std::function<void(std::int64_t index, EnsembleStart& start)> start;
     bool from_velocities = false;  // momenta are computed with the parameters of each trajectory
     double time = 0;
-    double step = 0;                                        // h; may be negative
-    double tolerance = 0;                                   // of a step's iteration; 0: to rounding
-    std::int64_t steps = 0;                                 // >= 0, of each trajectory; count * steps < 2^63
-    std::int64_t every = 0;                                 // keep every such state; 0: the last one alone
-    int threads = 0;                                        // that compute; 0: as many as the machine runs at once
+    double step = 0;         // h; may be negative
+    double tolerance = 0;    // of a step's iteration; 0: to rounding
+    std::int64_t steps = 0;  // >= 0, of each trajectory; count * steps < 2^63
+    std::int64_t every = 0;  // keep every such state; 0: the last one alone
+    int threads = 0;         // that compute; 0: as many as the machine runs at once
+    // Whether a trajectory that reached the end counts in the statistics; nothing: all do. Called before the sink.
+    std::function<bool(const EnsembleTrajectory&)> counts;
     std::function<void(const EnsembleTrajectory&)> sink;    // in the order of the indices, in the thread of the caller
     std::function<void(std::int64_t steps_done)> progress;  // of all trajectories; about ten times a second, likewise
     const volatile int* interrupted = nullptr;              // stop once it is not zero; what is complete is handed over
 };
 
-// How a number is spread over the trajectories that reached the end; not numbers when none did.
+// How a number is spread over the trajectories that reached the end and count; not numbers when there is none.
 struct Spread {
     double least, largest, mean, rms;
 };

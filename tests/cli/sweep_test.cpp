@@ -105,6 +105,14 @@ double tolerance(const std::string& summary) {
     return contains(summary, "one trajectory at a time each") ? 0 : 1e-12;
 }
 
+// Not a number is the same as itself: the error of a state on the way.
+bool same_rows(const std::vector<std::vector<double>>& a, const std::vector<std::vector<double>>& b) {
+    const auto same = [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); };
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const auto& x, const auto& y) {
+        return std::equal(x.begin(), x.end(), y.begin(), y.end(), same);
+    });
+}
+
 }  // namespace
 
 TEST_CASE("a sweep says what it did and where its table is") {
@@ -122,6 +130,7 @@ TEST_CASE("a sweep says what it did and where its table is") {
         "  time per step           \\S+ [nu]s of a processor, for one trajectory\n"
         "  energy error            \\S+ at most, of trajectory \\d+, q = \\S+, omega = 2\n"
         "    at the end            \\S+ to \\S+, mean \\S+, rms \\S+\n"
+        "  measured error          \\S+ of the amplitude at most, of trajectory \\d+, q = \\S+, omega = \\S+\n"
         "  q at the end            \\S+ to \\S+, mean \\S+, rms \\S+\n"
         "  p_q at the end          \\S+ to \\S+, mean \\S+, rms \\S+\n"
         "  table                   \\S+/sweep.csv, 80 rows\n");
@@ -134,7 +143,7 @@ TEST_CASE("the grid has all combinations, the last name fastest, both ends exact
     const TrajectoryTable table = place.table(
         {pendulum, "--vary", "q'=-1:2:4", "--vary", "omega=0.1,pi,sqrt(4)", "--vary", "q=1:100:3:log", "--steps", "1"});
     CHECK(table.columns ==
-          Strings{"index", "q'(0)", "omega", "q(0)", "status", "steps", "t", "q", "p_q", "energy_error"});
+          Strings{"index", "q'(0)", "omega", "q(0)", "status", "steps", "t", "q", "p_q", "energy_error", "error"});
     REQUIRE(table.rows.size() == 36);
     const double velocity[] = {-1, 0, 1, 2}, omega[] = {0.1, 3.141592653589793, 2}, q[] = {1, 10, 100};
     for (std::size_t i = 0; i < 36; ++i) {
@@ -207,7 +216,7 @@ TEST_CASE("a table is the same file for any number of threads, in CSV and in Num
         CHECK(content("3", "binary", every) == binary);
         const TrajectoryTable array = read_npy(place.file());
         CHECK(array.columns == text.columns);
-        CHECK(array.rows == text.rows);
+        CHECK(same_rows(array.rows, text.rows));
         CHECK(text.rows.size() >= 2 * 17 * 31);
     }
 }
@@ -238,8 +247,8 @@ TEST_CASE("names of a scene are varied as it writes them, and columns never shar
                      "[run]\nstep = 0.1\nuntil = 1\n[output]\nmomenta = false\nenergy = false\n");
     const TrajectoryTable table = place.table({scene, "--vary", "x[2]=0.5,0.6", "--vary", "p_x_1=1", "--vary",
                                                "m[1]=3,4", "--vary", "index=7", "--steps", "3"});
-    CHECK(table.columns ==
-          Strings{"index_", "x[2](0)", "p_x_1(0)", "m[1]", "index(0)", "status", "steps_", "t", "x_1", "x_2", "index"});
+    CHECK(table.columns == Strings{"index_", "x[2](0)", "p_x_1(0)", "m[1]", "index(0)", "status", "steps_", "t", "x_1",
+                                   "x_2", "index", "error"});
     REQUIRE(table.rows.size() == 4);
     CHECK(table.rows[3][1] == 0.6);
     CHECK(table.rows[3][3] == 4);
@@ -398,8 +407,9 @@ TEST_CASE("trajectories that leave their Lagrangian are told from those that sta
     test::write_text(scene,
                      "title = \"D\"\ntime = \"t\"\nlagrangian = \"q'^2/2 + 100*cos(q) + 5*q*sin(t)\"\n[coordinates]\n"
                      "q = { position = 0.1, velocity = 0 }\n[method]\npoints = 4\n[run]\nstep = 0.32\nuntil = 40\n");
-    const test::Finished driven = place.sweep({scene, "--vary", "q=0.1,0.2"});
+    const test::Finished driven = place.sweep({scene, "--vary", "q=0.1,0.2", "--beyond-horizon"});
     CHECK(driven.exit_code == 0);
+    CHECK(place.sweep({scene, "--vary", "q=0.1,0.2"}).exit_code == 3);  // nothing of them is left
     CHECK(contains(driven.err,
                    "lobatto: warning: the step is beyond the linear stability limit, at most in trajectory "));
     CHECK(place.sweep({scene, "--vary", "q=0.1,0.2", "--step", "0.16"}).err.empty());
@@ -490,6 +500,33 @@ TEST_CASE("a machine that refuses to write is an error of exit code 4; a reader 
         test::run({"sh", "-c",
                    "'" LOBATTO_PROGRAM "' sweep '" + pendulum +
                        "' --quiet --vary q=0:3:1000000 --until 1 -o /dev/stdout | head -9 | tail -1"});
-    CHECK(head.out == "index,q(0),status,steps,t,q,p_q,energy_error\n");
+    CHECK(head.out == "index,q(0),status,steps,t,q,p_q,energy_error,error\n");
     CHECK(head.err == "lobatto: cannot write the table to /dev/stdout: Broken pipe. Its reader has gone\n");
+}
+
+TEST_CASE("a sweep measures the error of every trajectory; what is not resolved is no success and no statistic") {
+    const Place place;
+    const std::string scene = place.file("oscillator.toml");
+    test::write_text(scene,
+                     "lagrangian = \"q'^2/2 - w^2*q^2/2\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
+                     "[parameters]\nw = 1\n[method]\nfamily = \"gauss\"\nstages = 4\n[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished done = place.sweep({scene, "--vary", "w=1,10,20,50,62.8,100"});
+    CHECK(done.exit_code == 3);
+    CHECK(contains(done.err, "3 of 6 trajectories failed: 3 not resolved: the error is as large as the motion"));
+    CHECK(contains(done.out, "measured error"));
+    const TrajectoryTable table = read_trajectory(place.file());
+    CHECK(column(table, "status") == std::vector<double>{0, 0, 0, 8, 8, 8});
+    const std::vector<double> w = column(table, "w"), q = column(table, "q"), error = column(table, "error");
+    for (const std::size_t i : {1, 2}) {
+        const double truth = std::fabs(q[i] - std::cos(10 * w[i]));
+        CHECK(error[i] > truth / 2);
+        CHECK(error[i] < truth * 2);
+    }
+    // The statistics are of the three that are resolved.
+    const double mean = (q[0] + q[1] + q[2]) / 3;
+    CHECK_MESSAGE(contains(done.out, fmt::format("mean {:.6g}", mean)), done.out);
+    CHECK(place.sweep({scene, "--vary", "w=1,50", "--beyond-horizon"}).exit_code == 0);
+    const test::Finished unmeasured = place.sweep({scene, "--vary", "w=1,50", "--unmeasured"});
+    CHECK(unmeasured.exit_code == 0);
+    CHECK(!contains(unmeasured.out, "measured error"));
 }

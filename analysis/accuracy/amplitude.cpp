@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/amplitude.hpp"
+
+#include <cmath>
+#include <map>
+#include <string>
+
+namespace lobatto {
+
+namespace {
+
+constexpr double at_rest = 0x1p-40;  // of the place: what rounding moves it by
+
+}  // namespace
+
+std::vector<int> amplitude_groups(const Scene& scene) {
+    std::map<std::string, int> numbers;
+    std::vector<int> groups;
+    for (const Coordinate& coordinate : scene.coordinates) {
+        const std::string array = coordinate.written.substr(0, coordinate.written.find('['));
+        groups.push_back(numbers.try_emplace(array, static_cast<int>(numbers.size())).first->second);
+    }
+    return groups;
+}
+
+void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count) {
+    if (least.empty()) least.assign(row, row + count), most = least;
+    for (std::size_t i = 0; i < count; ++i) {
+        least[i] = std::fmin(least[i], row[i]);
+        most[i] = std::fmax(most[i], row[i]);
+    }
+}
+
+std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
+                                  const std::vector<int>& groups) {
+    const std::size_t n = groups.size();
+    std::vector<double> own(2 * n), shared(2 * n, 0.0);
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+        const double place = std::fmax(std::fabs(least[i]), std::fabs(most[i])), half = (most[i] - least[i]) / 2;
+        own[i] = half > at_rest * place ? half : 0;
+    }
+    for (std::size_t k = 0; k < n; ++k)
+        if (own[k] == 0) own[n + k] = 0;  // what rests has the momentum that rounding gives it
+    std::map<std::pair<bool, int>, double> largest;
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+        double& of_group = largest[{i < n, groups[i % n]}];
+        of_group = std::fmax(of_group, own[i]);
+    }
+    for (std::size_t i = 0; i < 2 * n; ++i) shared[i] = largest[{i < n, groups[i % n]}];
+    return shared;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What errors are measured by: how far each position and momentum moves.
+#pragma once
+
+#include <vector>
+
+#include "generator/scene/scene.hpp"
+
+namespace lobatto {
+
+constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
+
+// Coordinates whose errors are measured by one amplitude have the same number: those of an array.
+std::vector<int> amplitude_groups(const Scene& scene);
+
+// Takes a row of `count` numbers into a range.
+void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
+
+// Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding.
+std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
+                                  const std::vector<int>& groups);
+
+}  // namespace lobatto
