@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The program: its commands, and what each kind of error means for the exit code.
+#include <fcntl.h>
 #include <fmt/color.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -17,6 +18,7 @@
 #include <system_error>
 
 #include "cli/commands/commands.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
 
@@ -35,10 +37,9 @@ void flush_before_error() {
 int complain(Exit code, std::string_view message) {
     flush_before_error();
     const bool styled = isatty(STDERR_FILENO) && std::getenv("NO_COLOR") == nullptr;
-    fmt::print(
-        stderr, "{} {}\n",
-        fmt::styled("lobatto:", styled ? fmt::emphasis::bold | fmt::fg(fmt::terminal_color::red) : fmt::text_style()),
-        message);
+    tell("{} {}\n",
+         fmt::styled("lobatto:", styled ? fmt::emphasis::bold | fmt::fg(fmt::terminal_color::red) : fmt::text_style()),
+         message);
     return code;
 }
 
@@ -71,7 +72,16 @@ void describe(CommandLine& program) {
 
 }  // namespace
 
+// A closed standard stream would become the next file that is opened, and get what is told: nothing is written to it.
+// Output that goes nowhere stays an error.
+static void keep_streams_apart() {
+    for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        if (::fcntl(descriptor, F_GETFD) < 0)
+            static_cast<void>(::open("/dev/null", descriptor == STDERR_FILENO ? O_WRONLY : O_RDONLY));
+}
+
 int main(int argc, char** argv) {
+    keep_streams_apart();
     // `lobatto derive scene | head -1` ends quietly, even when the parent process ignores closed pipes.
     std::signal(SIGPIPE, SIG_DFL);
     std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write(2)
@@ -89,7 +99,7 @@ int main(int argc, char** argv) {
     } catch (const InputError& error) {
         // Begins with file:line:column, as editors expect of a compiler.
         flush_before_error();
-        fmt::print(stderr, "{}\n", error.what());
+        tell("{}\n", error.what());
         return wrong_input;
     } catch (const ComputationError& error) {
         return complain(failed_computation, error.what());

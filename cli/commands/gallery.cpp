@@ -12,6 +12,7 @@
 #include "cli/options/output_path.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/gallery_picture.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
@@ -114,7 +115,7 @@ void gallery(const GalleryCommand& options) {
             throw;
         } catch (const std::runtime_error& failure) {
             ++failed;
-            fmt::print(stderr, "{}\n", failure.what());
+            tell("{}\n", failure.what());
         }
     }
     write_whole(options.folder + "/README.md", "the page", page);

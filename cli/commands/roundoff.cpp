@@ -12,6 +12,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/interruption.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
@@ -122,10 +123,10 @@ void roundoff(const RoundoffCommand& options) {
         fmt::print("\n{}{} has all of it.\n", table, script.empty() ? "" : " and roundoff.svg beside it");
     }
     if (result.interrupted) {
-        fmt::print(stderr, "lobatto: interrupted {}\n",
-                   result.plain.rows.empty() ? "before anything could be told"
-                                             : fmt::format("after {} steps of {} trajectories; the table has these",
-                                                           result.steps, result.trajectories));
+        tell("lobatto: interrupted {}\n", result.plain.rows.empty()
+                                              ? "before anything could be told"
+                                              : fmt::format("after {} steps of {} trajectories; the table has these",
+                                                            result.steps, result.trajectories));
         throw ExitCode{interrupted_exit};
     }
     if (result.lost)

@@ -23,6 +23,7 @@
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"
@@ -340,9 +341,8 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, 
                               "other units, or energy = false under [output]. What was computed is in {}.",
                               scene.path, files.path()));
     if (result.interrupted) {
-        fmt::print(stderr, "lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time,
-                   files.path(),
-                   files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");
+        tell("lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, files.path(),
+             files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");
         throw ExitCode{interrupted_exit};
     }
 }
@@ -356,6 +356,7 @@ void run(const RunOptions& options) {
     const bool has_events = !scene.outputs.events.empty();
     keep_scene(scene.path, path);
     if (has_events) keep_scene(scene.path, event_path(options, scene));
+    if (!options.resume) keep_strangers(path);
     if (!options.quiet)
         fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, run.source.digest, run.derivation_seconds,
                    run.compiled.from_cache ? "found compiled in the cache"
@@ -392,7 +393,7 @@ void run(const RunOptions& options) {
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.derivation, run.kernel, request, result)))
             warnings.push_back(warning);
-    for (const std::string& warning : warnings) fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+    for (const std::string& warning : warnings) tell("lobatto: warning: {}.\n", warning);
     if (!options.quiet) {
         print_table(run.derivation, scene, stepper, request, result, observers.watch);
         if (error) print_row("measured error", text_of(*error, scene));

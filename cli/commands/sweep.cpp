@@ -20,6 +20,7 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/sweep_table.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/ensemble.hpp"
@@ -365,12 +366,10 @@ void sweep(const SweepOptions& options) {
         result = integrate(kernel, request);
     }
     table.finish();
-    if (const std::string warning = judges.watch.warning(); !warning.empty())
-        fmt::print(stderr, "lobatto: warning: {}.\n", warning);
+    if (const std::string warning = judges.watch.warning(); !warning.empty()) tell("lobatto: warning: {}.\n", warning);
 
     if (judges.worst_error > large_error)
-        fmt::print(
-            stderr,
+        tell(
             "lobatto: warning: the error of trajectory {}, {}, is {:.2g} of the amplitude; take a smaller step, or "
             "more points.\n",
             judges.worst, values_of(grid, judges.worst), judges.worst_error);
@@ -384,9 +383,9 @@ void sweep(const SweepOptions& options) {
     }
     const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || judges.refused[0] + judges.refused[1] > 0;
     if (result.interrupted) {
-        fmt::print(stderr, "lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n",
-                   result.trajectories, request.count, path);
-        if (failed) fmt::print(stderr, "{}\n", failures_text(scene, grid, result, judges, failures));
+        tell("lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n", result.trajectories,
+             request.count, path);
+        if (failed) tell("{}\n", failures_text(scene, grid, result, judges, failures));
         throw ExitCode{interrupted_exit};
     }
     if (failed)

@@ -11,6 +11,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
+#include "cli/print/tell.hpp"
 #include "cli/print/tradeoff_page.hpp"
 #include "cli/print/tradeoff_pictures.hpp"
 #include "cli/print/tradeoff_report.hpp"
@@ -61,8 +62,7 @@ void tradeoff(const TradeoffOptions& options) {
     }
     say.clear();
     if (interrupted && (!begun || begun->store().all().empty())) {
-        fmt::print(stderr,
-                   "lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
+        tell("lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
         throw ExitCode{interrupted_exit};
     }
     Experiment& experiment = *begun;
@@ -82,8 +82,7 @@ void tradeoff(const TradeoffOptions& options) {
         fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
                    fmt::join(pictures, ".svg, "));
     } else {
-        fmt::print(stderr,
-                   "lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
+        tell("lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
         throw ExitCode{interrupted_exit};
     }
 }

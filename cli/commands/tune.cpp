@@ -12,6 +12,7 @@
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
@@ -78,7 +79,7 @@ void tune(const TuneOptions& options) {
         }
     } catch (const Interrupted&) {
         say.clear();
-        fmt::print(stderr, "lobatto: interrupted; nothing was chosen.\n");
+        tell("lobatto: interrupted; nothing was chosen.\n");
         throw ExitCode{interrupted_exit};
     } catch (const ComputationError& failure) {
         throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));

@@ -39,7 +39,7 @@ std::string output_folder(const std::string& given, const std::string& name) {
 void keep_scene(const std::string& scene, const std::string& path) {
     std::error_code none;
     // Regular files only: a terminal is good as both.
-    for (const char* ending : {"", ".partial"})
+    for (const char* ending : {"", ".partial", ".checkpoint"})
         if (std::filesystem::is_regular_file(path + ending, none) &&
             std::filesystem::equivalent(path + ending, scene, none))
             throw InputError(

@@ -29,9 +29,20 @@ std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader
         exact_text(request.tolerance), std::filesystem::path(object).stem().string());
 }
 
+void keep_strangers(const std::string& trajectory) {
+    const std::string path = checkpoint_path(trajectory);
+    std::error_code none;
+    if (std::filesystem::exists(std::filesystem::symlink_status(path, none)) && !is_checkpoint(path))
+        throw InputError(
+            fmt::format("-o: {} is there, and Lobatto did not write it; a run to {} would put its checkpoint there. "
+                        "Move it away, or "
+                        "choose another place with -o",
+                        path, trajectory));
+}
+
 void remove_checkpoint(const std::string& trajectory) {
     std::error_code none;
-    std::filesystem::remove(checkpoint_path(trajectory), none);
+    if (is_checkpoint(checkpoint_path(trajectory))) std::filesystem::remove(checkpoint_path(trajectory), none);
 }
 
 std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std::string& run, const Kernel& kernel,

@@ -18,6 +18,8 @@ std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader
 inline std::string checkpoint_path(const std::string& trajectory) {
     return trajectory + ".checkpoint";
 }
+// InputError where a file that is no checkpoint of ours stands in the place of one.
+void keep_strangers(const std::string& trajectory);
 void remove_checkpoint(const std::string& trajectory);
 
 // The checkpoint beside the trajectory; nothing when there is none. InputError when it is another run's, MachineError

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/print/progress.hpp"
+#include "cli/print/tell.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -24,7 +25,7 @@ Progress::Progress(std::int64_t total)
     : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
-    if (shown_) fmt::print(stderr, "\r\033[K");
+    if (shown_) tell("\r\033[K");
 }
 
 void Progress::show(std::int64_t done) {
@@ -34,8 +35,8 @@ void Progress::show(std::int64_t done) {
     constexpr int width = 40;
     const double fraction = static_cast<double>(done) / static_cast<double>(total_);
     const int filled = static_cast<int>(fraction * width);
-    fmt::print(stderr, "\r\033[K[{:#<{}}{:.<{}}] {:3.0f} %, {} left", "", filled, "", width - filled,
-               std::floor(fraction * 100), duration(elapsed * (1 - fraction) / fraction));
+    tell("\r\033[K[{:#<{}}{:.<{}}] {:3.0f} %, {} left", "", filled, "", width - filled, std::floor(fraction * 100),
+         duration(elapsed * (1 - fraction) / fraction));
     std::fflush(stderr);
 }
 

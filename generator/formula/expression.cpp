@@ -150,14 +150,17 @@ private:
             }
             case Kind::inverse: {
                 const Operand a = operand(0);
+                require(DomainCondition::Kind::nonzero, a, "a division", formula);
                 return compute([&] { return arithmetic.invert(a); });
             }
             case Kind::power: {
                 const Operand base = operand(0), exponent = operand(1);
+                require_power(base, exponent, formula);
                 return compute([&] { return arithmetic.raise(base, exponent); });
             }
             case Kind::call: {
                 const Operand argument = operand(0);
+                require_call(formula.function->name, argument, formula);
                 return compute([&] { return arithmetic.call(*formula.function, argument); });
             }
             case Kind::series:
@@ -169,6 +172,28 @@ private:
                    b = whole(formula.operands[1], frame, "what mod divides by");
         if (b <= 0) fail(formula.operands[1].at, frame, fmt::format("mod divides by {}; it must be positive", b));
         return operand_of((a % b + b) % b);
+    }
+
+    // Of constants the arithmetic itself finds what has no value.
+    void require(DomainCondition::Kind kind, const Operand& part, const std::string& operation, const Syntax& formula) {
+        if (names_ != nullptr && names_->records && !part.value)
+            names_->conditions.push_back({kind, part.expression, operation, formula.at.at});
+    }
+
+    void require_power(const Operand& base, const Operand& exponent, const Syntax& formula) {
+        if (!exponent.value) return require(DomainCondition::Kind::positive, base, "a power", formula);
+        const bool negative = exponent.value->is_negative(), whole = exponent.value->is_integer();
+        if (whole && negative) require(DomainCondition::Kind::nonzero, base, "a negative power", formula);
+        if (!whole)
+            require(negative ? DomainCondition::Kind::positive : DomainCondition::Kind::nonnegative, base,
+                    "a broken power", formula);
+    }
+
+    void require_call(const std::string& function, const Operand& argument, const Syntax& formula) {
+        if (function == "sqrt") require(DomainCondition::Kind::nonnegative, argument, "a square root", formula);
+        if (function == "log") require(DomainCondition::Kind::positive, argument, "a logarithm", formula);
+        if (function == "asin" || function == "acos")
+            require(DomainCondition::Kind::within_one, argument, "an " + function, formula);
     }
 
     Operand folded(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic, Fold::Combine combine) {

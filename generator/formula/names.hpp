@@ -41,7 +41,19 @@ struct Spelling {
     std::string written, plain;
 };
 
+// What a formula asks of a part of it, as written: a formula may cancel what has no value, as in sqrt(a)^2 or a/a, and
+// still it is an error where it stands.
+struct DomainCondition {
+    enum class Kind : std::uint8_t { nonzero, nonnegative, positive, within_one };
+    Kind kind = Kind::nonzero;
+    GiNaC::ex expression;
+    std::string operation;  // "the square root"
+    Position at;
+};
+
 struct Names {
+    std::vector<DomainCondition> conditions;
+    bool records = true;  // conditions
     std::map<std::string, Name, std::less<>> all;
     Flow flow;
     Work work;

@@ -55,6 +55,7 @@ public:
         system_.read();
         read_method();
         read_run();
+        scene_.conditions = system_.conditions();
         read_output();
         system_.refuse_unused();
         return std::move(scene_);

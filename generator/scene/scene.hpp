@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "generator/formula/names.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/method/method.hpp"
 
@@ -79,6 +80,7 @@ struct Scene {
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;
+    std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
     Run run;
     Outputs outputs;

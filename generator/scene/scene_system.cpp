@@ -57,7 +57,9 @@ void SystemReader::read() {
     read_definitions();
     read_lagrangian();
     read_forces();
+    names_.records = false;
     read_places();
+    names_.records = true;
     read_initial_values();
 }
 

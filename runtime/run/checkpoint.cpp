@@ -7,8 +7,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -104,6 +107,14 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
     std::string bytes;
     Json::to_cbor(whole, bytes);
     write_whole(path, "the checkpoint", sha256(bytes) + '\n' + bytes);
+}
+
+bool is_checkpoint(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    char seal[seal_bytes];
+    return file.read(seal, sizeof seal) && seal[seal_bytes - 1] == '\n' &&
+           std::all_of(seal, seal + seal_bytes - 1,
+                       [](char c) { return std::isxdigit(static_cast<unsigned char>(c)); });
 }
 
 std::optional<Checkpoint> read_checkpoint(const std::string& path) {

@@ -24,6 +24,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 
 // Nothing when there is none. MachineError when it is damaged, or another user could have written it: what is in it
 // goes into the kernel's memory.
+bool is_checkpoint(const std::string& path);
 std::optional<Checkpoint> read_checkpoint(const std::string& path);
 
 // The first line in which `ours` differs from what stands in the checkpoint, for an error; empty when none does.

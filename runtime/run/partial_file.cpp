@@ -45,6 +45,15 @@ private:
     sigset_t signal_{}, before_{};
 };
 
+// Whether a file holds something else than what a killed run leaves: the beginning of a table, as text or of NumPy's.
+bool is_foreign(int descriptor) {
+    const std::string_view text = "# lobatto", numpy = "\x93NUMPY";
+    char begin[16];
+    const ssize_t count = ::pread(descriptor, begin, sizeof begin, 0);
+    const std::string_view there(begin, count < 0 ? 0 : static_cast<std::size_t>(count));
+    return !there.empty() && !there.starts_with(text) && !there.starts_with(numpy);
+}
+
 }  // namespace
 
 void fail_to_write(const std::string& what, const std::string& path, int error, const std::string& otherwise) {
@@ -62,7 +71,7 @@ void fail_to_write(const std::string& what, const std::string& path, int error, 
 
 void write_whole(const std::string& path, const std::string& what, std::string_view content,
                  const std::string& otherwise) {
-    PartialFile file(path, what, 0, otherwise);
+    PartialFile file(path, what, 0, otherwise, PartialFile::Place::free);
     try {
         file.write(content);
         if (file.is_regular()) file.sync();
@@ -74,7 +83,7 @@ void write_whole(const std::string& path, const std::string& what, std::string_v
 }
 
 PartialFile::PartialFile(const std::string& path, const std::string& what, std::int64_t kept,
-                         const std::string& otherwise)
+                         const std::string& otherwise, Place place)
     : path_(path), what_(what), otherwise_(otherwise) {
     struct stat status {};
     if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
@@ -86,7 +95,7 @@ PartialFile::PartialFile(const std::string& path, const std::string& what, std::
                                                             std::free);  // through symbolic links
         if (target) path_ = target.get();
         partial_ = path_ + ".partial";
-        descriptor_ = open_locked();
+        descriptor_ = place == Place::free ? open_free() : open_locked();
         keep(kept);
     }
 }
@@ -115,8 +124,27 @@ int PartialFile::open_locked() const {
         }, named{};
         const bool same = fstat(descriptor, &ours) == 0 && stat(partial_.c_str(), &named) == 0 &&
                           ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
-        if (same) return descriptor;
+        if (same) {
+            if (is_foreign(descriptor)) {
+                close(descriptor);
+                throw MachineError(
+                    fmt::format("cannot write {} to {}: {} is there, and Lobatto did not write it. Move it "
+                                "away, or {}",
+                                what_, path_, partial_, otherwise_));
+            }
+            return descriptor;
+        }
         close(descriptor);  // another run has just finished it under its final name: open a new one
+    }
+}
+
+int PartialFile::open_free() {
+    const std::string first = partial_;
+    for (int number = 1;; ++number) {
+        const int descriptor = open(partial_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+        if (descriptor >= 0) return descriptor;
+        if (errno != EEXIST || number > 1000) fail(partial_, errno);
+        partial_ = first + "." + std::to_string(number);
     }
 }
 

@@ -20,14 +20,18 @@ void write_whole(const std::string& path, const std::string& what, std::string_v
 
 // Until `finish` what is written stands in NAME.partial beside it, so that a killed run leaves a readable NAME.partial
 // and an earlier NAME untouched. Two runs cannot write the same file at once. A destination that exists and is no
-// regular file (a pipe, a device) is written to directly.
+// regular file (a pipe, a device) is written to directly. A NAME.partial that is not of Lobatto's making is never
+// touched: MachineError.
 class PartialFile {
 public:
+    // Whether it goes on with what a killed run left in NAME.partial, or takes the first NAME.partial, NAME.partial.1
+    // ... that is free.
+    enum class Place { resumable, free };
     // `what` it holds and what one can do `otherwise`, for errors: "the trajectory". `kept`: how many bytes of
     // NAME.partial, or else of NAME, stay, to go on after them. All functions throw MachineError, which names the path,
     // when the machine refuses; what stands in the file then ends where a `write` ended.
     PartialFile(const std::string& path, const std::string& what, std::int64_t kept = 0,
-                const std::string& otherwise = elsewhere);
+                const std::string& otherwise = elsewhere, Place place = Place::resumable);
     ~PartialFile();  // without `finish` or `discard`: NAME.partial stays
     PartialFile(const PartialFile&) = delete;
     PartialFile& operator=(const PartialFile&) = delete;
@@ -44,6 +48,7 @@ public:
 private:
     [[noreturn]] void fail(const std::string& path, int error) const;
     int open_locked() const;
+    int open_free();
     void keep(std::int64_t kept);
 
     std::string path_;     // the destination

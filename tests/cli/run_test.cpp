@@ -521,3 +521,73 @@ TEST_CASE("a run without shortcuts gives the same motion to rounding") {
     const std::vector<double> with = last({}), without = last({"--general"});
     for (std::size_t k = 0; k < with.size(); ++k) CHECK(with[k] == doctest::Approx(without[k]).epsilon(1e-11));
 }
+
+TEST_CASE("files that Lobatto did not write are never touched") {
+    const Place place;
+    const std::string out = place.file("w.csv");
+    const auto refused = [&](const std::string& neighbour, const std::string& content, int code) {
+        test::write_text(place.file(neighbour), content);
+        const test::Finished done = place.run({pendulum, "-o", out, "--until", "1"});
+        CAPTURE(neighbour);
+        CHECK(done.exit_code == code);
+        CHECK(contains(done.err, neighbour + " is there, and Lobatto did not write it"));
+        CHECK(test::read_file(place.file(neighbour)) == content);
+        std::filesystem::remove(place.file(neighbour));
+    };
+    for (const std::string& content : {std::string("my notes\n"), std::string(200, 'g'), std::string("{}")}) {
+        refused("w.csv.checkpoint", content, 2);
+        refused("w.csv.partial", content, 4);
+    }
+    // The scene itself under such a name.
+    for (const char* ending : {".checkpoint", ".partial"}) {
+        const std::string scene = place.file(std::string("w.csv") + ending), text = test::read_file(pendulum);
+        test::write_text(scene, text);
+        const test::Finished done = place.run({scene, "-o", out, "--until", "1"});
+        CHECK(done.exit_code == 2);
+        CHECK(contains(done.err, "the result would overwrite the scene"));
+        CHECK(test::read_file(scene) == text);
+        std::filesystem::remove(scene);
+    }
+    // A whole file takes another name for its own beginning.
+    test::write_text(place.file("t.json.partial"), "mine");
+    CHECK(place.run({pendulum, "-o", out, "--until", "1"}).exit_code == 0);
+}
+
+TEST_CASE("what cannot be told on standard error changes neither the run nor its exit code") {
+    const Place place;
+    const auto shell = [&](const std::string& arguments, const std::string& streams) {
+        return test::run(
+                   {"sh", "-c", "'" LOBATTO_PROGRAM "' run " + arguments + " -o '" + place.file() + "' " + streams})
+            .exit_code;
+    };
+    const std::string good = "'" + pendulum + "' --until 1",
+                      warned = "'" + pendulum + "' --points 2 --step 0.4 --until 4", wrong = "no-such-scene.toml";
+    for (const char* streams : {"2>/dev/full", "2>&-", "2>&- </dev/null", "2>&1 | true"}) {
+        CAPTURE(streams);
+        const bool piped = std::string(streams).find('|') != std::string::npos;
+        CHECK(shell(good, streams) == 0);
+        if (!piped) CHECK(shell(wrong, streams) == 2);
+        if (!piped) CHECK(shell(warned, streams) == shell(warned, "2>/dev/null"));
+    }
+    // What is told does not end up in the trajectory.
+    CHECK(shell(warned, "2>&-") != 134);
+    CHECK(!contains(test::read_file(place.file()), "warning"));
+}
+
+TEST_CASE("a momentum without an inverse at rest has a velocity where it has one") {
+    const Place place;
+    for (const char* lagrangian : {"q'^4/4 - q^2/2", "q'^4/4 + q'^6/6 - q^2/2", "(1 + q^2)*q'^4 - q^4"}) {
+        const std::string scene = place.file("scene.toml");
+        test::write_text(scene,
+                         fmt::format("lagrangian = \"{}\"\n[coordinates]\nq = {{ position = 0, velocity = 0.1 }}\n"
+                                     "[method]\npoints = 4\n[run]\nstep = 0.001\nuntil = 0.05\n",
+                                     lagrangian));
+        const test::Finished done = place.run({scene, "-o", place.file(), "--quiet"});
+        CAPTURE(lagrangian);
+        CAPTURE(done.err);
+        CHECK(done.exit_code == 0);
+        // It moves with nearly its velocity at first.
+        const TrajectoryTable table = read_trajectory(place.file());
+        CHECK(table.rows[10][1] == doctest::Approx(0.001).epsilon(0.05));
+    }
+}

@@ -155,29 +155,46 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
                 for (int k = 0; k < n; ++k) a.residual[k] = momentum[k] - a.p[k];
                 return is_finite(not_finite_part(a.residual, n) + not_finite_part(a.entries, K::mass_entries));
             };
-            for (int k = 0; k < n; ++k) v[k] = real(0);
-            if (!look_at(v)) {
-                if (!has_history) return Status::not_finite;
-                polynomial(real(1), a.trial, v);
+            const auto solve_from = [&]() -> Status {
                 if (!look_at(v)) return Status::not_finite;
-            }
-            for (int iteration = 0; iteration < 100; ++iteration) {
-                if (iteration > 0 && is_near(a, momentum, v, real(2) * Limits<real>::epsilon)) return Status::ok;
-                a.matrix.clear();
-                for (int e = 0; e < K::mass_entries; ++e)
-                    a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.entries[e];
-                if (!a.matrix.factor()) return Status::singular_mass;
-                const real length = solve_mass(a, a.increment);
-                const bool next_is_rounding = iteration > 0 && is_near(a, momentum, v, Limits<real>::root_epsilon);
-                for (real part = real(1);; part *= real(0.5)) {
-                    if (part < Limits<real>::epsilon) return Status::not_converged;
-                    for (int k = 0; k < n; ++k) a.trial[k] = v[k] + part * a.increment[k];
-                    if (next_is_rounding || (look_at(a.trial) && solve_mass(a, a.next) <= length)) break;
+                for (int iteration = 0; iteration < 100; ++iteration) {
+                    if (iteration > 0 && is_near(a, momentum, v, real(2) * Limits<real>::epsilon)) return Status::ok;
+                    a.matrix.clear();
+                    for (int e = 0; e < K::mass_entries; ++e)
+                        a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.entries[e];
+                    if (!a.matrix.factor()) return Status::singular_mass;
+                    const real length = solve_mass(a, a.increment);
+                    const bool next_is_rounding = iteration > 0 && is_near(a, momentum, v, Limits<real>::root_epsilon);
+                    for (real part = real(1);; part *= real(0.5)) {
+                        if (part < Limits<real>::epsilon) return Status::not_converged;
+                        for (int k = 0; k < n; ++k) a.trial[k] = v[k] + part * a.increment[k];
+                        if (next_is_rounding || (look_at(a.trial) && solve_mass(a, a.next) <= length)) break;
+                    }
+                    for (int k = 0; k < n; ++k) v[k] = a.trial[k];
+                    if (next_is_rounding) return Status::ok;
                 }
-                for (int k = 0; k < n; ++k) v[k] = a.trial[k];
-                if (next_is_rounding) return Status::ok;
+                return Status::not_converged;
+            };
+            for (int k = 0; k < n; ++k) v[k] = real(0);
+            Status status = solve_from();
+            if (status != Status::ok && has_history) {
+                polynomial(real(1), a.trial, v);
+                status = solve_from();
             }
-            return Status::not_converged;
+            if (status == Status::ok) return status;
+            // At rest there is no inverse, as of v^4: from the multiple of the momentum whose own momentum is nearest.
+            const Status at_rest = status;
+            real best = real(0), nearest = -real(1);
+            for (real scale = real(0x1p-40); scale <= real(0x1p40); scale *= real(2)) {
+                for (int k = 0; k < n; ++k) v[k] = scale * momentum[k];
+                if (!look_at(v)) continue;
+                real apart = real(0);
+                for (int k = 0; k < n; ++k) apart += a.residual[k] * a.residual[k];
+                if (nearest < real(0) || apart < nearest) best = scale, nearest = apart;
+            }
+            for (int k = 0; k < n; ++k) v[k] = best * momentum[k];
+            status = solve_from();
+            return status == Status::ok ? status : at_rest;
         });
     }
 

@@ -91,3 +91,26 @@ TEST_CASE("a momentum that no velocity has is refused where it is given") {
               .starts_with("scene.toml:5:32: no velocity has this momentum: p_y = dL/dy' = y'/sqrt(y'^2 + 1) comes no "
                            "nearer to -3 than -"));
 }
+
+TEST_CASE("what has no value where it stands is an error, also where the rest of the formula cancels it") {
+    const std::string one = "x = { position = 1, velocity = 0.5 }\n", mk = "m = 1\nk = 1\n";
+    const auto begins_at = [&](const std::string& position) {
+        return refusal("m*x'^2/2 - k*x^2/2", "x = { position = \"" + position + "\", velocity = 0 }\n", mk);
+    };
+    CHECK(begins_at("sqrt(m-2)^2") ==
+          "scene.toml:4:19: a square root has no value at the start: it is of m - 2 = -1, "
+          "with m = 1; start elsewhere, or mend the formula");
+    CHECK(begins_at("(m-k)/(m-k)").find("a division has no value at the start: it is of m - k = 0") !=
+          std::string::npos);
+    CHECK(begins_at("0*log(m-k)").find("a logarithm has no value") != std::string::npos);
+    CHECK(begins_at("((m-3)^0.5)^2").find("a broken power has no value") != std::string::npos);
+    CHECK(begins_at("sin(asin(m+k))").find("an asin has no value") != std::string::npos);
+    CHECK(begins_at("(m-k)^(-2)*(m-k)^2").find("has no value") != std::string::npos);
+    CHECK(begins_at("sqrt(m)^2 + log(k) + m/k") == "accepted");
+    for (const char* lagrangian : {"m*x'^2/2 - k*(sqrt(x-3))^2", "m*x'^2/2 - k*exp(log(x-3))",
+                                   "m*x'^2/2 - k*cos(acos(x*3))", "m*x'^2/2 - k*x*(x-1)/(x-1)"})
+        CHECK_MESSAGE(refusal(lagrangian, one, mk).find("has no value at the start") != std::string::npos, lagrangian);
+    for (const char* lagrangian :
+         {"m*x'^2/2 - k*sqrt(x^2)", "m*x'^2/2 - k*(sqrt(x))^2", "m*x'^2/2 - k*x/x", "m*x'^2/2 - k*exp(log(x))"})
+        CHECK_MESSAGE(refusal(lagrangian, one, mk) == "accepted", lagrangian);
+}
