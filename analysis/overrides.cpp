@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "generator/formula/expression.hpp"
 #include "generator/formula/suggest.hpp"
@@ -11,6 +12,8 @@
 namespace lobatto {
 
 namespace {
+
+constexpr std::int64_t most_every = 9'000'000'000'000'000;  // the steps that a run can have
 
 [[noreturn]] void fail_unknown(const Source& source, const Scene& scene, const std::string& name) {
     for (const Parameter& constant : scene.constants) {
@@ -71,9 +74,17 @@ Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
 }
 
 void apply(const Overrides& overrides, Scene& scene) {
-    for (const std::string& argument : overrides.set) set_parameter(argument, scene);
+    std::set<std::string> names;
+    for (const std::string& argument : overrides.set) {
+        const std::string name = argument.substr(0, argument.find('='));
+        if (!names.insert(name).second)
+            throw InputError(fmt::format("--set: '{}' is set twice; leave one of both out", name));
+        set_parameter(argument, scene);
+    }
     if (!overrides.step.empty()) scene.run.step = in_parameters("--step", overrides.step, "the step", scene);
     if (!overrides.until.empty()) scene.run.until = in_parameters("--until", overrides.until, "the end time", scene);
+    if (overrides.every && *overrides.every > most_every)
+        throw InputError(fmt::format("--every: {} is more than a run has steps; at most 9e15", *overrides.every));
     if (overrides.every && *overrides.every < 1)
         throw InputError(fmt::format(
             "--every: {} is not a number of states; give 1 to keep each, 10 to keep every tenth", *overrides.every));

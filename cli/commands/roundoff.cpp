@@ -102,7 +102,7 @@ void roundoff(const RoundoffCommand& options) {
     scene.method.tolerance = 0;
     const std::string name = scene.method.name(), path = scene.path;
     const std::string step = fmt::format("{:.6g}", step_of(scene, options.overrides).to_double());
-    const std::string folder = output_folder(options.output, scene.name + "_roundoff"),
+    const std::string folder = output_folder(options.output, result_name(scene.path) + "_roundoff"),
                       table = folder + "/roundoff.csv";
     keep_scene(path, table);
     const Interruption interruption;

@@ -137,7 +137,7 @@ std::string event_path(const RunOptions& options, const Scene& scene) {
     std::error_code ignored;
     const bool beside = options.output.empty() || !std::filesystem::exists(options.output, ignored) ||
                         std::filesystem::is_regular_file(options.output, ignored);
-    std::string path = output_path(beside ? options.output : "", scene.name + ".csv");
+    std::string path = output_path(beside ? options.output : "", result_name(scene.path) + ".csv");
     if (path.ends_with(".csv")) path.resize(path.size() - 4);
     return path + ".events.csv";
 }
@@ -222,7 +222,7 @@ class Files {
 public:
     Files(const RunOptions& options, const Prepared& run, const TrajectoryHeader& header,
           const std::optional<Checkpoint>& from)
-        : path_(output_path(options.output, run.scene.name + ".csv")),
+        : path_(output_path(options.output, result_name(run.scene.path) + ".csv")),
           trajectory_(path_, header, from ? from->files[0] : Written()) {
         if (!run.scene.outputs.events.empty()) {
             event_path_ = event_path(options, run.scene);
@@ -352,7 +352,7 @@ void run(const RunOptions& options) {
     const Scene& scene = run.scene;
     LoadedStepper<double> stepper(run.kernel);
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
-    const std::string path = output_path(options.output, scene.name + ".csv");
+    const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
     const bool has_events = !scene.outputs.events.empty();
     keep_scene(scene.path, path);
     if (has_events) keep_scene(scene.path, event_path(options, scene));

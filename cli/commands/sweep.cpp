@@ -271,6 +271,15 @@ void print_table(const Derivation& derivation, const Scene& scene, const Grid& g
         print_row("p_" + scene.coordinates[k].name + " at the end", spread_text(result.p[k]));
 }
 
+// A name has one value or many.
+void refuse_both(const SweepOptions& options) {
+    const auto name_of = [](const std::string& argument) { return argument.substr(0, argument.find('=')); };
+    for (const std::string& set : options.overrides.set)
+        for (const std::string& varied : options.vary)
+            if (name_of(set) == name_of(varied))
+                throw InputError(fmt::format("--set: '{}' is varied too; leave one of both out", name_of(set)));
+}
+
 // The one step size and number of steps of all trajectories.
 Steps steps_of(const SweepOptions& options, Scene& scene) {
     if (!options.steps) return steps_of(scene, options.overrides);
@@ -323,6 +332,7 @@ void sweep(const SweepOptions& options) {
     const Scene as_written = scene;  // one kernel serves all values
     scene.outputs.dense = 0;
     apply(options.overrides, scene);
+    refuse_both(options);
     const Grid grid(scene, options.vary);
     const Steps steps = steps_of(options, scene);
 
@@ -338,8 +348,8 @@ void sweep(const SweepOptions& options) {
     refuse_too_much(grid, kernel, request);
 
     const SweepTable::Format format = format_of(options);
-    const std::string path =
-        output_path(options.output, scene.name + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
+    const std::string path = output_path(
+        options.output, result_name(scene.path) + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
     keep_scene(scene.path, path);
     SweepTable table(path, format, comments_of(scene, source, request, grid),
                      columns_of(scene, grid, !options.unmeasured));

@@ -40,7 +40,7 @@ void tradeoff(const TradeoffOptions& options) {
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);
-    const std::string folder = output_folder(options.output, scene.name + ".tradeoff");
+    const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
 
     const Interruption interruption;
     Say say;

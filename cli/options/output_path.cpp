@@ -36,6 +36,10 @@ std::string output_folder(const std::string& given, const std::string& name) {
     return folder;
 }
 
+std::string result_name(const std::string& scene) {
+    return std::filesystem::path(scene).stem().string();
+}
+
 void keep_scene(const std::string& scene, const std::string& path) {
     std::error_code none;
     // Regular files only: a terminal is good as both.

@@ -12,6 +12,9 @@ std::string output_path(const std::string& given, const std::string& name);
 // The same for a folder of results, which is made, and in which files can be made: before they are computed.
 std::string output_folder(const std::string& given, const std::string& name);
 
+// How the scene's results are named by default: as its file, without the ending.
+std::string result_name(const std::string& scene);
+
 // InputError when `path`, where a result is to go, is the scene itself.
 void keep_scene(const std::string& scene, const std::string& path);
 

@@ -126,6 +126,12 @@ private:
             source_.fail(text.at.front(), fmt::format("the number of values is {:.10g}; it must be a whole number from "
                                                       "1 to {}",
                                                       count.to_double(), most_values));
+        if (nearest == 1 && axis_.given[0] != axis_.given[1])
+            source_.fail(text.at.front(),
+                         fmt::format("one value does not lead from {:.6g} to {:.6g}: give a count of 2 or "
+                                     "more, or {}={:.6g}",
+                                     axis_.given[0].to_double(), axis_.given[1].to_double(), axis_.name,
+                                     axis_.given[0].to_double()));
         axis_.values.resize(at(static_cast<std::int64_t>(nearest)));
         for (std::int64_t i = 0; i < axis_.count(); ++i) axis_.values[at(i)] = axis_.exact(i).to_double();
     }

@@ -190,10 +190,14 @@ private:
             widest = std::max(widest, lines.back().size());
         }
         for (std::size_t i = 0; i < lines.size(); ++i) {
-            const std::string unit = comment_safe(d_.scene.parameters[i].unit);
+            const Parameter& parameter = d_.scene.parameters[i];
+            std::string unit = comment_safe(parameter.unit);
+            if (!unit.empty()) unit = "[" + unit + "]";
+            if (identifier(parameter.name) != parameter.name)  // C++ or <complex.h> has that name
+                unit += (unit.empty() ? "" : " ") + ("the scene's " + parameter.name);
             text += unit.empty()
                         ? fmt::format("        {}\n", lines[i])
-                        : fmt::format("        {:<{}}  // [{}]\n", lines[i], std::min<std::size_t>(widest, 60), unit);
+                        : fmt::format("        {:<{}}  // {}\n", lines[i], std::min<std::size_t>(widest, 60), unit);
         }
         text += "    };\n    static real& parameter(Parameters& p, int index) {\n";
         if (d_.scene.parameters.empty()) {

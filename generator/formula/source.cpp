@@ -96,6 +96,10 @@ Source Source::read(const std::string& path) {
     };
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
+    if (path.empty()) throw InputError("the scene has an empty name: give a file, such as scenes/pendulum.toml");
+    if (error == std::errc::too_many_symbolic_link_levels) refuse("its symbolic links lead to one another in a circle");
+    if (error && error != std::errc::no_such_file_or_directory && error != std::errc::not_a_directory)
+        refuse(error.message());
     if (!std::filesystem::exists(status)) refuse("there is no such file");
     if (std::filesystem::is_directory(status)) refuse("it is a directory");
     if (std::filesystem::is_socket(status)) refuse("it is a socket");

@@ -75,7 +75,8 @@ private:
 
     Token read_token() {
         const char c = at(0);
-        if (is_digit(c) || (c == '.' && is_digit(at(1)))) return read_number();
+        if (c == '.' && is_digit(at(1))) fail(next_, "a number begins with a digit: write 0.5, not .5");
+        if (is_digit(c)) return read_number();
         if (is_letter(c)) return read_name();
         if (c == '*' && at(1) == '*') fail(next_, "'**' is not an operator: write ^ for powers");
         const bool range = c == '.' && at(1) == '.';
@@ -87,7 +88,7 @@ private:
         return token(Token::Kind::sign);
     }
 
-    // 12, 0.5, .5, 1.5e-3, not the points of 1..n; the e belongs to the number only when digits follow.
+    // 12, 0.5, 1.5e-3, not the points of 1..n; the e belongs to the number only when digits follow.
     Token read_number() {
         const auto skip_digits = [&] {
             while (is_digit(at(0))) ++next_;

@@ -144,7 +144,11 @@ std::string explanation(std::string_view description) {
     if (description.starts_with(prefix)) description.remove_prefix(prefix.size());
     const bool formula = description.find("could not determine value type") != std::string_view::npos ||
                          description.find("expected digit") != std::string_view::npos;
-    return fmt::format("not valid TOML: {}{}", description, formula ? "; a formula must stand in quotes" : "");
+    const bool point = description.find("expected decimal digit, saw '.'") != std::string_view::npos;
+    return fmt::format("not valid TOML: {}{}", description,
+                       point     ? "; a number begins with a digit: write 0.5, not .5"
+                       : formula ? "; a formula must stand in quotes"
+                                 : "");
 }
 
 }  // namespace

@@ -239,9 +239,12 @@ void CacheEntry::publish(const std::string& file) const {
     ::close(descriptor);
     // The key last: until it is there, the object is not valid.
     write_file(building_path() + "/key", seal_of(*object) + key_);
+    // A folder in the place of either cannot be replaced by a file.
+    std::error_code ignored;
+    for (const std::string& path : {object_path(), stem_ + ".key"})
+        if (fs::is_directory(fs::symlink_status(path, ignored))) fs::remove_all(path, ignored);
     rename_file(built, object_path());
     rename_file(building_path() + "/key", stem_ + ".key");
-    std::error_code ignored;
     fs::remove_all(failed_path(), ignored);
 }
 

@@ -106,7 +106,7 @@ TEST_CASE("numbers are exact") {
     CHECK(parse("0.1").is_equal(numeric(1, 10)));
     CHECK(parse("1.5e-3").is_equal(numeric(3, 2000)));
     CHECK(parse("2E2").is_equal(200));
-    CHECK(parse(".5").is_equal(numeric(1, 2)));
+    CHECK_THROWS_WITH_AS(parse(".5"), doctest::Contains("write 0.5, not .5"), lobatto::InputError);
     CHECK(parse("007").is_equal(7));
     CHECK(parse("1/3 + 1/6").is_equal(numeric(1, 2)));
     CHECK(parse("sqrt(5)^2").is_equal(5));
