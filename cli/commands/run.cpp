@@ -324,10 +324,11 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
 
 // Ends the command with the error that the run deserves, if any.
 void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, const TrajectoryResult& result,
-                          const std::string& departure, const Files& files) {
+                          const std::string& departure, const Files& files, const Kernel& kernel) {
     if (result.status != LOBATTO_OK)
-        throw ComputationError(
-            fmt::format("{}: {} What was computed is in {}.", scene.path, explain_stop(result, request), files.path()));
+        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path,
+                                           explain_stop(result, request, passing_step(kernel, request, result)),
+                                           files.path()));
     if (!departure.empty())
         throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, files.path()));
     if (scene.outputs.energy && !std::isfinite(result.energy_error_largest))
@@ -403,7 +404,7 @@ void run(const RunOptions& options) {
         if (!run.steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
-    fail_where_it_failed(scene, request, result, departure, files);
+    fail_where_it_failed(scene, request, result, departure, files, run.kernel);
 }
 
 }  // namespace

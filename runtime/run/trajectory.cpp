@@ -101,6 +101,9 @@ private:
     double pause_ = checkpoint_seconds;
 };
 
+constexpr int most_halvings = 14;    // of a step that could not be taken
+constexpr double same_place = 0.01;  // of the way
+
 }  // namespace
 
 std::string list_text(const std::vector<double>& values) {
@@ -189,8 +192,41 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     return result;
 }
 
-std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request) {
-    const std::string smaller = fmt::format("a smaller step, such as h = {:.6g}", request.step / 2);
+double passing_step(const Kernel& kernel, const TrajectoryRequest& request, const TrajectoryResult& result) {
+    const bool in_a_step = result.status == LOBATTO_NOT_CONVERGED || result.status == LOBATTO_NOT_FINITE ||
+                           result.status == LOBATTO_SINGULAR_JACOBIAN;
+    if (!result.started || !in_a_step) return 0;
+    LoadedStepper<double> stepper(kernel);
+    std::vector<double> before, q, p;
+    double time = 0;
+    for (int halvings = 1; halvings <= most_halvings + 1; ++halvings) {
+        const double step = std::ldexp(request.step, -halvings);
+        lobatto_advance call{};
+        call.steps = std::int64_t(1) << halvings;
+        call.tolerance = request.tolerance;
+        const bool passes = stepper.prepare(request.parameters, step) == LOBATTO_OK &&
+                            stepper.start(result.time, result.q, result.p) == LOBATTO_OK &&
+                            stepper.advance(call) == LOBATTO_OK;
+        if (!passes) {
+            before.clear();
+            continue;
+        }
+        stepper.state(time, q, p);
+        double apart = 0, moved = 0;
+        for (std::size_t k = 0; k < q.size() && !before.empty(); ++k) {
+            apart = std::fmax(apart, std::fabs(q[k] - before[k]));
+            moved = std::fmax(moved, std::fabs(q[k] - result.q[k]));
+        }
+        if (!before.empty() && apart < same_place * moved) return 2 * step;
+        before = q;
+    }
+    return 0;
+}
+
+std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request, double passing) {
+    const std::string smaller =
+        passing != 0 ? fmt::format("a smaller step, such as h = {:.6g}, with which the motion goes on there", passing)
+                     : fmt::format("a smaller step, such as h = {:.6g}", request.step / 2);
     std::string why, advice;
     switch (result.status) {
         case LOBATTO_OK:

@@ -591,3 +591,29 @@ TEST_CASE("a momentum without an inverse at rest has a velocity where it has one
         CHECK(table.rows[10][1] == doctest::Approx(0.001).epsilon(0.05));
     }
 }
+
+TEST_CASE("a step too long for a contact is told as that, with a length that would do") {
+    const Place place;
+    int stopped = 0;
+    for (const char* lagrangian :
+         {"x'^2/2 - 9.81*x - exp(-x*2000)", "x'^2/2 - 9.81*x - 1e-20/x^8", "x'^2/2 - 9.81*x - exp(-x*300)"}) {
+        const std::string scene = place.file("scene.toml");
+        test::write_text(scene, fmt::format("lagrangian = \"{}\"\n[coordinates]\nx = {{ position = 1, velocity = 0 }}\n"
+                                            "[method]\npoints = 6\n[run]\nstep = 0.05\nuntil = 0.6\n",
+                                            lagrangian));
+        const test::Finished done = place.run({scene, "-o", place.file(), "--quiet"});
+        CAPTURE(lagrangian);
+        CAPTURE(done.err);
+        if (done.exit_code == 0) continue;  // soft enough
+        REQUIRE(done.exit_code == 3);
+        const std::string told = "Try a smaller step, such as h = ";
+        const std::size_t at = done.err.find(told);
+        if (contains(done.err, "the run left its motion")) continue;  // it went on, but elsewhere
+        ++stopped;
+        CHECK(contains(done.err, ", with which the motion goes on there"));
+        const std::string step = done.err.substr(at + told.size(), done.err.find(',', at) - at - told.size());
+        CHECK(place.run({scene, "-o", place.file(), "--quiet", "--unmeasured", "--step", step, "--until", "0.5"})
+                  .exit_code == 0);
+    }
+    CHECK(stopped > 0);
+}

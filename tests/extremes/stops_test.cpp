@@ -66,7 +66,7 @@ const Extremes table(
                  "q = { position = 1.5, velocity = 0.25 }",
                  four,
                  run_of("20", "2000"),
-                 {"stopped in its first step, at t = 0", "did not converge", "Try a smaller step, such as h = 10"},
+                 {"stopped in its first step, at t = 0", "did not converge", "Try a smaller step, such as h = 1.25, with which the motion goes on there"},
                  1}),
         stopped("oscillator, h omega = 3.2: just beyond the stability limit 3.1127", "beyond stability, by the energy",
                 {"q'^2/2 - q^2/2",

@@ -510,3 +510,20 @@ TEST_CASE("a compiler that cannot be started is named with the reason") {
     CHECK(message_of<MachineError>([] { compile(answer); }) ==
           "cannot run " + compiler.string() + ": exec: No such file or directory");
 }
+
+TEST_CASE("a folder in the place of a compiled kernel is replaced") {
+    const KernelBuilder builder;
+    for (const char* ending : {".so", ".key"}) {
+        REQUIRE(compile(answer).object != "");
+        for (const auto& file : fs::directory_iterator(builder.folder / "cache"))
+            if (file.path().extension() == ending) {
+                const fs::path path = file.path();
+                fs::remove(path);
+                fs::create_directories(path / "something");
+                break;
+            }
+        const Compiled compiled = compile(answer);
+        CHECK(fs::is_regular_file(compiled.object));
+        CHECK(compile(answer).from_cache);
+    }
+}
