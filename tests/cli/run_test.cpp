@@ -611,7 +611,8 @@ TEST_CASE("a step too long for a contact is told as that, with a length that wou
         if (contains(done.err, "the run left its motion")) continue;  // it went on, but elsewhere
         ++stopped;
         CHECK(contains(done.err, ", with which the motion goes on there"));
-        const std::string step = done.err.substr(at + told.size(), done.err.find(',', at) - at - told.size());
+        const std::size_t begin = at + told.size();
+        const std::string step = done.err.substr(begin, done.err.find(',', begin) - begin);
         CHECK(place.run({scene, "-o", place.file(), "--quiet", "--unmeasured", "--step", step, "--until", "0.5"})
                   .exit_code == 0);
     }
