@@ -103,7 +103,7 @@ const std::vector<Room> rooms = {
     {"cli/print", {"analysis", "generator", "runtime"}},
     {"cli/paper", {"analysis", "generator", "runtime", "cli/print"}},
     {"cli/commands", {"analysis", "generator", "runtime", "cli/options", "cli/paper", "cli/print"}},
-    {"cli", {"cli/commands", "generator/formula", "runtime"}},
+    {"cli", {"cli/commands", "cli/print", "generator/formula", "runtime"}},
 };
 
 // Those of the two halves may be named as a whole by the folders that stand on both.

@@ -119,8 +119,8 @@ std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<cl
     for (const Id id : graph.topological(roots))
         for (const Id operand : graph[id].operands) {
             hidden[static_cast<std::size_t>(id)].merge(std::set<Id>(hidden[static_cast<std::size_t>(operand)]));
-            const bool is_small = graph[id].op == Op::add && !of(operand).vanishes() &&
-                                  Sized{of(operand).value, of(id).size}.vanishes();
+            const bool is_small =
+                graph[id].op == Op::add && !of(operand).vanishes() && Sized{of(operand).value, of(id).size}.vanishes();
             const bool is_flat = (graph[id].op == Op::exp && cln::zerop(of(id).value)) ||
                                  (graph[id].op == Op::tanh && Sized{1 - cln::abs(of(id).value), 1}.vanishes());
             if (!is_small && !is_flat) continue;

@@ -78,8 +78,8 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
 // (1.25, -3); of long lists the beginning and the number.
 std::string list_text(const std::vector<double>& values);
 
-// Of a run that stopped in a step: the longest step h/2, h/4 ... that takes the motion through the same time, and to the
-// same place as half of it; 0: there is none down to h/2^14, or the run stopped for another reason.
+// Of a run that stopped in a step: the longest step h/2, h/4 ... that takes the motion through the same time, and to
+// the same place as half of it; 0: there is none down to h/2^14, or the run stopped for another reason.
 double passing_step(const Kernel& kernel, const TrajectoryRequest& request, const TrajectoryResult& result);
 
 // What to tell a person when a run stopped: step, time, state, residual, why, and what to try. One paragraph.

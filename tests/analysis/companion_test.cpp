@@ -57,17 +57,17 @@ TEST_CASE("the measured error is the true one within a factor of two, by any met
     const Place exact(scene_of(lagrangian, coordinates, "points = 10", 0.02, 20));
     REQUIRE(exact.run().exit_code == 0);
     const std::vector<double> truth = exact.end();
-    for (const auto& [method, step] :
-         std::vector<std::pair<std::string, double>>{{"points = 2", 0.02},
-                                                     {"points = 4", 0.2},
-                                                     {"points = 4", 0.5},
-                                                     {"points = 6", 1},
-                                                     {"family = \"gauss\"\nstages = 2", 0.2},
-                                                     {"family = \"splitting\"\nstages = 11", 0.4}}) {
-        const Place place(scene_of(lagrangian, coordinates, method, step, 20));
+    struct Row {
+        std::string method;
+        double step;
+    };
+    for (const Row& row :
+         {Row{"points = 2", 0.02}, Row{"points = 4", 0.2}, Row{"points = 4", 0.5}, Row{"points = 6", 1},
+          Row{"family = \"gauss\"\nstages = 2", 0.2}, Row{"family = \"splitting\"\nstages = 11", 0.4}}) {
+        const Place place(scene_of(lagrangian, coordinates, row.method, row.step, 20));
         const test::Finished done = place.run();
-        CAPTURE(method);
-        CAPTURE(step);
+        CAPTURE(row.method);
+        CAPTURE(row.step);
         REQUIRE(done.exit_code == 0);
         const std::vector<double> end = place.end();
         const double error = std::fmax(std::fabs(end[1] - truth[1]), std::fabs(end[2] - truth[2]));

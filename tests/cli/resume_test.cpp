@@ -35,7 +35,8 @@ const Subject subjects[] = {
      {}},
     {"general",
      "lagrangian = \"a'^2 + b'^2/2 + a'*b'*cos(a - b) + 2*cos(a) + cos(b)\"\n[coordinates]\n"
-     "a = { position = 1, velocity = 0 }\nb = { position = 2, velocity = 0 }\n[run]\nstep = 0.05\nuntil = 20000\nbeyond_horizon = true\n"
+     "a = { position = 1, velocity = 0 }\nb = { position = 2, velocity = 0 }\n[run]\nstep = 0.05\nuntil = "
+     "20000\nbeyond_horizon = true\n"
      "[output]\nevery = 10\n",
      {}},
     {"linear",

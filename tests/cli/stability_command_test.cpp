@@ -261,7 +261,7 @@ TEST_CASE("mistakes on the command line are refused before anything is computed"
           "--chart x.png: the chart is an SVG file; give it a name that ends in .svg\n");
     CHECK(refusal({oscillator, "--chart", "no/such/x.svg"}) ==
           "--chart no/such/x.svg: there is no folder no/such; make it first\n");
-    CHECK(contains(refusal({""}), "cannot read the scene"));
+    CHECK(refusal({""}) == "the scene has an empty name: give a file, such as scenes/pendulum.toml\n");
     for (const auto& option : {std::vector<std::string>{"--tolerance", "1e-9"}, {"--arithmetic", "clean"}})
         CHECK(refusal(option) == "--tolerance and --arithmetic belong to a scene; name one\n");
     CHECK(refusal({"--step", "0.1"}) == "--chart, --step and --set belong to a scene; name one\n");
