@@ -13,6 +13,10 @@ constexpr double at_rest = 0x1p-40;  // of the place: what rounding moves it by
 
 }  // namespace
 
+double beside(double start) {
+    return start + 4 * (std::nextafter(start, HUGE_VAL) - start);
+}
+
 std::vector<int> amplitude_groups(const Scene& scene) {
     std::map<std::string, int> numbers;
     std::vector<int> groups;

@@ -10,6 +10,10 @@ namespace lobatto {
 
 constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
 
+// Where a companion begins: a few units in the last place beside the start, so that it leaves it where nearby
+// trajectories diverge, also when the motion itself stands still in rounding.
+double beside(double start);
+
 // Coordinates whose errors are measured by one amplitude have the same number: those of an array.
 std::vector<int> amplitude_groups(const Scene& scene);
 

@@ -176,7 +176,7 @@ void Companion::compute() {
     if (done == 0) {
         std::vector<double> moved = place.q;
         for (double& x : moved)
-            if (x != 0) x = std::nextafter(x, std::numeric_limits<double>::infinity());
+            if (x != 0) x = beside(x);
         if (place.stepper.prepare(request_.parameters, request_.step) == LOBATTO_OK &&
             place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
             place.q = moved;  // else the start is at the edge of where the Lagrangian is real

@@ -5,7 +5,7 @@
 //
 // Where explicit time makes short pulses, which steps may miss, the companion takes short ones.
 //
-// The companion begins one unit in the last place beside the start: what no number of steps can know, and what grows
+// The companion begins four units in the last place beside the start: what no number of steps can know, and what grows
 // where nearby trajectories diverge, is an error too.
 #pragma once
 

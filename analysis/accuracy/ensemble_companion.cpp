@@ -32,7 +32,7 @@ void EnsembleCompanion::compute(std::int64_t first) {
     companion.start = [&](std::int64_t index, EnsembleStart& start) {
         request_.start(first + index, start);
         for (double& x : start.q)
-            if (x != 0) x = std::nextafter(x, std::numeric_limits<double>::infinity());
+            if (x != 0) x = beside(x);
     };
     companion.step = request_.step * static_cast<double>(request_.steps) / static_cast<double>(taken_);
     companion.steps = taken_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The errors of the trajectories of a sweep, measured as those of a run (companion.hpp): each against the same motion
-// in 3/2 of the steps, from a start that is one unit in the last place away.
+// in 3/2 of the steps, from a start that is four units in the last place away.
 #pragma once
 
 #include <cstdint>

@@ -51,6 +51,10 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
                                                      found.best->candidate);
         if (error <= request.error * (1 - uncertainty / request.error)) break;
         goal *= 0.8 * request.error / error;
+        if (experiment.left() < 0) {
+            found.complete = false;
+            break;
+        }
     }
     if (!found.best || !(error <= request.error)) {
         const double least = std::fmax(found.least_error, found.best ? error : 0);

@@ -27,6 +27,7 @@ constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
 constexpr double rough = 1e-6;            // tolerance of the first look
 constexpr double precise_factor = 6;      // what the precise way takes longer, at most, about
 constexpr double half = 0.5;              // of the seconds, for a first way; the rest is for finer steps
+constexpr double overtime = 1.25;         // of the seconds: then it is given up
 constexpr double radians_of_step = 0.75;  // h omega of the family's first run
 constexpr int most_refinements = 4;
 constexpr int frequency_looks = 24;
@@ -148,7 +149,7 @@ private:
             check_interruption();
             if (!way.advance_to(static_cast<real>(request_.until) * real(i) / real(samples))) return std::nullopt;
             states.insert(states.end(), way.state().begin(), way.state().end());
-            if (seconds_since(began_) > (quick ? half : 2) * request_.seconds_limit)
+            if (seconds_since(began_) > (quick ? half : overtime) * request_.seconds_limit)
                 fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
         }
         evaluations_ = way.evaluations();

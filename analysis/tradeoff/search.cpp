@@ -16,7 +16,8 @@ namespace {
 constexpr double fine_ratio = 1.06;  // of the steps in the end
 constexpr double hopeless = 1.6;     // times the best: a crossing that polishing will not save
 constexpr std::size_t most_finalists = 4;
-constexpr double close = 1.08;  // two numbers of steps between which nothing is looked for
+constexpr double too_long = 0.3;  // of the budget: a crossing that took so much more is left, once it has an error
+constexpr double close = 1.08;    // two numbers of steps between which nothing is looked for
 
 // Of an iteration that ends so many digits beyond the goal.
 double fitting_tolerance(double goal, double digits) {
@@ -53,6 +54,7 @@ Attempt cross(Experiment& experiment, const Member& member, double goal) {
             bad = m;
             if (stagnating >= 3) break;
         }
+        if (experiment.left() < -too_long * experiment.request().seconds && std::isfinite(result.least_error)) break;
         double next = 0;
         if (good && bad && good->candidate.steps > bad->candidate.steps) {
             if (static_cast<double>(good->candidate.steps) <= static_cast<double>(bad->candidate.steps) * close) break;
@@ -263,7 +265,7 @@ Search search(Experiment& experiment, double goal) {
             result.least_error = std::min(result.least_error, tried[member].least_error);
         } else if (!queue.empty()) {
             if (experiment.left() < reserve && best_cost() < infinity) break;
-            if (experiment.left() < -reserve) break;
+            if (experiment.left() < -reserve && !tried.empty()) break;
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
             continue;
         }

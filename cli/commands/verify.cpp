@@ -149,7 +149,7 @@ Row reversal(const Kernel& kernel, const Start<real>& start, const std::string& 
 // What the compiled steps leave in the equations that they were derived from, whatever iteration found them.
 void taken_steps(std::vector<Row>& rows, const Derivation& derivation, const Kernel& kernel, const Kernel& exact_kernel,
                  const Start<double>& start, const Start<__float128>& exact) {
-    constexpr double bound = 16;  // roundings
+    constexpr double bound = 64;  // roundings
     const std::string claim = "steps solve the discrete Euler-Lagrange equations: ",
                       meaning =
                           "the steps that were taken do not solve their equations; the step is too long, or the "

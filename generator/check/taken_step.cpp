@@ -21,8 +21,10 @@ public:
         path_ = step.positions;
         if (is_straight_)
             follow_straight_path();
-        else if (path_.size() < controls())
-            solve_for_inside();
+        else if (path_.size() < controls()) {
+            is_solved_ = true;
+            path_ = path_between(path_.front(), path_.back());
+        }
     }
 
     double defect() {
@@ -40,6 +42,7 @@ public:
             Numbers p0 = step_.p0, p1 = step_.p1;
             for (Numbers& positions : moved)
                 for (std::size_t k = 0; k < n_; ++k) positions[k] = rounded(positions[k], size[k]);
+            if (is_solved_) moved = path_between(moved.front(), moved.back());
             for (std::size_t k = 0; k < n_; ++k) {
                 p0[k] = rounded(p0[k], p0[k]);
                 p1[k] = rounded(p1[k], p1[k]);
@@ -85,9 +88,8 @@ private:
         path_.back() = end;
     }
 
-    // The positions inside of a linear system: its equations are affine in them.
-    void solve_for_inside() {
-        const Numbers start = path_.front(), end = path_.back();
+    // With the positions inside of a linear system: its equations are affine in them.
+    Path path_between(const Numbers& start, const Numbers& end) {
         const std::size_t inside = controls() - 2, N = inside * n_;
         const auto path_through = [&](const Numbers& positions) {
             Path path = {start};
@@ -116,11 +118,13 @@ private:
             for (std::size_t r = 0; r < N; ++r) matrix[r * N + c] = (there[r] - at_zero[r]) / unit;
             right.push_back(-at_zero[c]);
         }
-        path_ = path_through(N > 0 ? solve(matrix, right) : Numbers{});
+        return path_through(N > 0 ? solve(matrix, right) : Numbers{});
     }
 
     const TakenStep& step_;
     Path path_;
+    bool is_solved_ =
+        false;  // inside, from both ends: what these lose by rounding, the path loses as that amplifies it
 };
 
 }  // namespace

@@ -59,7 +59,7 @@ struct ExportEnsemble {
 template <class K, class E = NoEnsemble>
 struct Export {
     using real = typename K::real;
-    using S = Stepper<K>;
+    using S = std::conditional_t<(K::events > 0), WatchedStepper<K>, Stepper<K>>;
     static constexpr int n = K::coordinates;
     static constexpr bool has_dense = K::form != Form::linear_map;
 
@@ -74,6 +74,7 @@ struct Export {
         S* const fresh = new (stepper) S;
         if (*in(step) == real(0)) return LOBATTO_TIME_STANDS_STILL;
         if (!is_finite(*in(step))) return LOBATTO_NOT_FINITE;
+        if constexpr (K::events > 0) fresh->parameters = values;
         return code(fresh->prepare(values, *in(step)));
     }
 
@@ -98,12 +99,26 @@ struct Export {
     }
 
     static Status advance_in(S& stepper, lobatto_advance& call) {
+        if constexpr (K::events > 0) {
+            if (call.events != nullptr) {
+                Events<K> events(stepper);
+                return take_steps(stepper, call, &events);
+            }
+        }
+        return take_steps(stepper, call, static_cast<NoEvents*>(nullptr));
+    }
+
+    struct NoEvents {};
+    template <class AnyEvents>
+    static Status take_steps(S& stepper, lobatto_advance& call, AnyEvents* events) {
+        constexpr bool has_events = !std::is_same_v<AnyEvents, NoEvents>;
         stepper.tolerance = static_cast<real>(call.tolerance);
         std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
         for (std::int64_t i = 0; i < call.steps; ++i) {
             if (until_record == 1 && call.records_written + call.dense >= call.capacity) break;
-            if constexpr (K::events > 0) {
-                if (call.events != nullptr && call.events_written + Events<K>::most > call.event_capacity) break;
+            if constexpr (has_events) {
+                if (call.events_written + AnyEvents::most > call.event_capacity) break;
+                events->keep(stepper);
             }
             const Status status = stepper.step();
             if (status != Status::ok) {
@@ -117,10 +132,10 @@ struct Export {
                 if (static_cast<double>(stepper.increment) > call.increment_largest)
                     call.increment_largest = static_cast<double>(stepper.increment);
             }
-            if constexpr (K::events > 0) {
-                if (call.events != nullptr)
-                    call.events_written +=
-                        Events<K>::look(stepper, out(call.events) + call.events_written * Events<K>::columns);
+            if constexpr (has_events) {
+                real* const rows = out(call.events) + call.events_written * AnyEvents::columns;
+                const Status looked = events->look(stepper, rows, call.events_written);
+                if (looked != Status::ok) return looked;
             }
             if (--until_record == 0) {
                 if constexpr (has_dense) {

@@ -66,9 +66,10 @@ std::vector<std::string> command(const Subject& subject, const std::filesystem::
     return words;
 }
 
-// What the program says of the run, without what it measured of the time.
+// What the program says of the run, without what it measured of the time, and of the error: the companion of a resumed
+// run rounds otherwise.
 std::string said(const std::string& out) {
-    const std::regex own("  (time per step|resumed|trajectory) .*\n|, in .*");
+    const std::regex own("  (time per step|resumed|trajectory|measured error) .*\n|, in .*");
     return std::regex_replace(out.substr(out.find('\n')), own, "");
 }
 

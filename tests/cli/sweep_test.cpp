@@ -444,7 +444,7 @@ TEST_CASE("an interrupted sweep keeps complete rows, says so and returns 130; a 
                         out.c_str(), nullptr);
                 ::_exit(127);
             }
-            for (int tries = 0; tries < 3000; ++tries) {
+            for (int tries = 0; tries < 30000; ++tries) {
                 if (std::filesystem::exists(partial) && std::filesystem::file_size(partial) > 10000) break;
                 std::this_thread::sleep_for(std::chrono::milliseconds(10));
             }

@@ -123,6 +123,33 @@ TEST_CASE("correct code passes at rest, far from zero and near it, and where ene
     }
 }
 
+TEST_CASE("right kernels are not accused where the equations of a step are badly conditioned, or nothing can be told") {
+    const TemporaryFolder folder;
+    struct Motion {
+        const char *lagrangian, *start, *method, *step;
+        const char* says;
+    };
+    const char* const gauss_4 = "family = \"gauss\"\nstages = 4";
+    for (const Motion& motion : std::vector<Motion>{
+             // h omega = 141, 500 and 44
+             {"q'^2/2 - 5000*q^2", "q = { position = 1, velocity = 0 }", gauss_4, "1.41", "ok"},
+             {"q'^2/2 - 125000*q^2", "q = { position = 1, velocity = 0.3 }", "family = \"gauss\"\nstages = 2", "1",
+              "not decided  with all steps the error is as large as the motion"},
+             {"x'^2/2 + y'^2/2 - 1000*(x - y)^2 - x^2/2 - y^4/4",
+              "x = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }", gauss_4, "1", "ok"},
+             // a mass that vanishes at rest
+             {"q'^4/4 - q^2/2", "q = { position = 0.1, velocity = 1 }", "points = 4", "0.01", "ok"}}) {
+        write_text(folder / "scene.toml", std::string("lagrangian = \"") + motion.lagrangian + "\"\n[coordinates]\n" +
+                                              motion.start + "\n[method]\n" + motion.method +
+                                              "\n[run]\nstep = " + motion.step + "\nuntil = 10\n");
+        const Finished result = verify({(folder / "scene.toml").string()});
+        INFO(motion.lagrangian << "\n" << result.out << result.err);
+        CHECK(result.exit_code == 0);
+        CHECK(!contains(result.out, "FAILED"));
+        CHECK(contains(result.out, motion.says));
+    }
+}
+
 TEST_CASE("a check that fails ends with exit code 3, the check's name and what it means") {
     const TemporaryFolder folder;
     // A step fifty times the period of the motion's fastest oscillation: a long way beyond stability.

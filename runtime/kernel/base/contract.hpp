@@ -122,7 +122,7 @@ struct Motion {
     real q[n]{};                      // position
     std::int32_t iterations{};        // of the last step
     real increment{};                 // last increment of the last step that looked, relative to its displacement
-    real event_values[event_room]{};  // at the last state looked at (steppers/events.hpp)
+    real event_values[event_room]{};  // the last of each that was not zero (steppers/events.hpp)
 
     real time() const { return start_time + real(steps) * step_size; }
     real next_time() const { return start_time + real(steps + 1) * step_size; }

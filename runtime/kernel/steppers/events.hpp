@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
-// States between two steps, on the polynomial of the last step: dense output, and where event functions change sign.
+// Between two steps: states on the polynomial of the last step, and where event functions change their sign.
+//
+// An event of g(t, q, q') = 0 happens where the sign of g changes. Its places are isolated on the step's polynomial: g
+// is sampled at twice as many pieces as the step has nodes, and between samples where |g| is least. What decides is
+// not the polynomial, of lower order than the steps, but g at the end of a step of the same method from the same
+// start, shortened to theta h: the signs, and the root between them.
 #ifndef LOBATTO_KERNEL_EVENTS_HPP
 #define LOBATTO_KERNEL_EVENTS_HPP
 
@@ -30,90 +35,295 @@ struct Between {
     }
 };
 
+// A stepper that knows its parameters, for steps of other lengths.
+template <class K>
+struct WatchedStepper : Stepper<K> {
+    typename K::Parameters parameters{};
+};
+
 template <class K>
 struct Events {
     using real = typename K::real;
-    using S = Stepper<K>;
-    static constexpr int pieces = S::nodes;  // of a step, looked at for one change of sign each
+    using S = WatchedStepper<K>;
+    static constexpr int n = K::coordinates, pieces = 2 * S::nodes;
+    static constexpr int grid_size = pieces + 3;     // the ends of pieces, and a place next to each end of the step
+    static constexpr int room = grid_size + pieces;  // samples of one function
     static constexpr int columns = 1 + Between<K>::columns;
-    static constexpr int most = K::events * pieces;  // rows of one step
+    static constexpr int most = K::events * room;  // rows of one step
+    static constexpr real rounding = real(2) * Limits<real>::epsilon;
 
-    // The values of all events at t + theta h of the last step.
-    static void values(const S& stepper, real theta, real* value) {
-        real q[K::coordinates], velocity[K::coordinates];
-        stepper.polynomial(theta, q, velocity);
-        Formulas<K>::event(stepper.coefficients, Between<K>::time(stepper, theta), q, velocity, value);
+    struct Sample {
+        real theta, value;
+        bool is_exact;
+    };
+
+    explicit Events(const S& stepper) : partial(new S(stepper)) {}
+    Events(const Events&) = delete;
+    Events& operator=(const Events&) = delete;
+    ~Events() { delete partial; }
+
+    // Before each step: the state that it starts from.
+    void keep(const S& stepper) {
+        time = stepper.time();
+        for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
+        stepper.momentum(p);
     }
 
-    // Where event e vanishes between a and b, to the rounding of theta: secants, with the value of an end that stays
-    // halved (the Illinois method), and every third time the middle.
-    static real locate(const S& stepper, int e, real a, real value_a, real b, real value_b) {
-        real value[K::events];
+    // Adds rows of event number, t, q[n], p[n] of the step taken since keep, in the order of the motion. Where a
+    // shortened step fails, its status.
+    Status look(S& stepper, real* rows, std::int64_t& count) {
+        step = &stepper;
+        status = Status::ok;
+        for (int i = 0; i < grid_size; ++i) {
+            grid[i] = i == 0               ? real(0)
+                      : i == 1             ? real(1) / real(1024 * pieces)
+                      : i == grid_size - 2 ? real(1) - grid[1]
+                                           : real(i == grid_size - 1 ? pieces : i - 1) / real(pieces);
+            on_polynomial(grid[i], grid_values[i]);
+        }
+        int found = 0;
+        for (int e = 0; e < K::events && status == Status::ok; ++e) look_for(e, rows, found);
+        if (status == Status::ok) count += found;
+        return status;
+    }
+
+private:
+    S* step{};
+    S* partial;  // the shortened step
+    Status status{};
+    real time{}, q[n]{}, p[n]{};
+    real grid[grid_size]{}, grid_values[grid_size][K::events]{}, thetas[most]{};
+    Sample samples[room]{};
+    int sample_count{};
+
+    static bool has_sign(real value) { return is_finite(value) && value != real(0); }
+    static bool changes(real a, real b) { return has_sign(a) && has_sign(b) && (a > real(0)) != (b > real(0)); }
+
+    void on_polynomial(real theta, real* values) const {
+        real position[n], velocity[n];
+        step->polynomial(theta, position, velocity);
+        Formulas<K>::event(step->coefficients, Between<K>::time(*step, theta), position, velocity, values);
+    }
+    real on_polynomial(real theta, int e) const {
+        real values[K::events];
+        on_polynomial(theta, values);
+        return values[e];
+    }
+
+    // t, q, p at t + theta h, by a step of that length.
+    void state_at(real theta, real* row) {
+        row[0] = Between<K>::time(*step, theta);
+        real* const momentum = row + 1 + n;
+        if (theta == real(1)) {
+            for (int k = 0; k < n; ++k) row[1 + k] = step->q[k];
+            step->momentum(momentum);
+            return;
+        }
+        for (int k = 0; k < n; ++k) {
+            row[1 + k] = q[k];
+            momentum[k] = p[k];
+        }
+        const real length = theta * step->step_size;
+        if (time + length == time) return;
+        Status done = partial->prepare(step->parameters, length);
+        partial->tolerance = step->tolerance;
+        if (done == Status::ok) done = partial->start(time, q, p);
+        if (done == Status::ok) done = partial->step();
+        if (done != Status::ok) {
+            status = done;
+            return;
+        }
+        for (int k = 0; k < n; ++k) row[1 + k] = partial->q[k];
+        partial->momentum(momentum);
+    }
+    real exactly(real theta, int e) {
+        real row[1 + 2 * n], velocity[n], values[K::events];
+        state_at(theta, row);
+        if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
+        if (status != Status::ok) return real(0);
+        Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
+        return values[e];
+    }
+
+    void insert(int place, Sample sample) {
+        if (sample_count == room) return;
+        for (int i = sample_count++; i > place; --i) samples[i] = samples[i - 1];
+        samples[place] = sample;
+    }
+    void make_exact(Sample& sample, int e) {
+        if (!sample.is_exact) sample = {sample.theta, exactly(sample.theta, e), true};
+    }
+
+    void look_for(int e, real* rows, int& found) {
+        sample_count = grid_size;
+        for (int i = 0; i < grid_size; ++i) samples[i] = {grid[i], grid_values[i][e], false};
+        const auto exact = [&](real theta) { return exactly(theta, e); };
+        const auto polynomial = [&](real theta) { return on_polynomial(theta, e); };
+        reach_undefined(false, polynomial);
+        for (int i = 1; i + 1 < sample_count; ++i) i += look_between(i, polynomial, exact);
+        make_exact(samples[0], e);
+        make_exact(samples[sample_count - 1], e);
+        decide_signs(e);
+        reach_undefined(true, exact);  // where the motion, not only its polynomial, leaves the domain of g
+        walk(e, rows, found);
+    }
+
+    // From a sample where g is defined towards a place where it is not: the last sample before its domain ends, or one
+    // where its sign has changed.
+    template <class G>
+    static Sample last_defined(Sample inside, real outside, const G& g) {
+        const real start = inside.value;
+        while (fabs(outside - inside.theta) > rounding && !changes(inside.value, start)) {
+            const real middle = real(0.5) * (inside.theta + outside), value = g(middle);
+            if (is_finite(value))
+                inside = {middle, value, inside.is_exact};
+            else
+                outside = middle;
+        }
+        return inside;
+    }
+
+    // In pieces at one end of which g is not defined: a sample where its domain ends, and one half way to it.
+    template <class G>
+    void reach_undefined(bool is_exact, const G& g) {
+        for (int i = 0; i + 1 < sample_count; ++i) {
+            const bool is_first = is_finite(samples[i].value);
+            const Sample inside = samples[is_first ? i : i + 1], outside = samples[is_first ? i + 1 : i];
+            if (is_first == is_finite(samples[i + 1].value) || (is_exact && !(inside.is_exact && outside.is_exact)))
+                continue;
+            const Sample last = last_defined(inside, outside.theta, g);
+            const real half = real(0.5) * (inside.theta + last.theta);
+            if (half == inside.theta || half == last.theta) continue;
+            const Sample between{half, g(half), is_exact};
+            insert(i + 1, is_first ? last : between);
+            insert(i + 1, is_first ? between : last);
+            i += 2;
+        }
+    }
+
+    // Around sample i, where |g| may be least without a change of sign at the samples: a sample there, if the sign
+    // changes. How many were inserted.
+    template <class Polynomial, class Exact>
+    int look_between(int i, const Polynomial& polynomial, const Exact& exact) {
+        const Sample a = samples[i - 1], middle = samples[i], b = samples[i + 1];
+        if (!has_sign(a.value) || !has_sign(middle.value) || !has_sign(b.value)) return 0;
+        if (changes(a.value, middle.value) || changes(middle.value, b.value)) return 0;
+        if (!(fabs(middle.value) <= fabs(a.value) && fabs(middle.value) < fabs(b.value))) return 0;
+        Sample least = least_between(a, middle, b, polynomial);
+        const real there = exact(least.theta), error = fabs(there - least.value);
+        // So near to zero that the polynomial cannot tell.
+        const bool is_near = !changes(there, a.value) && fabs(there) <= real(8) * error;
+        least = {least.theta, there, true};
+        if (is_near) least = least_between(a, least, b, exact);
+        least.is_exact = true;
+        if (!changes(least.value, a.value)) return 0;
+        insert(least.theta < middle.theta ? i : i + 1, least);
+        return 1;
+    }
+
+    // The least |g| between a and b by golden sections, or the first place found where the sign is another.
+    template <class G>
+    static Sample least_between(const Sample& a, Sample middle, const Sample& b, const G& g) {
+        real low = a.theta, high = b.theta;
+        for (int i = 0; i < 48 && !changes(middle.value, a.value) && high - low > Limits<real>::root_epsilon; ++i) {
+            const bool is_above = high - middle.theta > middle.theta - low;
+            const real theta = middle.theta + real(0.381966) * (is_above ? high - middle.theta : low - middle.theta);
+            const real value = g(theta);
+            if (changes(value, a.value) || fabs(value) < fabs(middle.value)) {
+                (is_above ? low : high) = middle.theta;
+                middle = {theta, value, middle.is_exact};
+            } else {
+                (is_above ? high : low) = theta;
+            }
+        }
+        return middle;
+    }
+
+    // Exact values at both ends of each piece along which the sign changes, as far as that moves the changes.
+    void decide_signs(int e) {
+        for (bool is_done = false; !is_done;) {
+            is_done = true;
+            for (int i = 0; i + 1 < sample_count; ++i) {
+                Sample &a = samples[i], &b = samples[i + 1];
+                const bool is_change = changes(a.value, b.value) || a.value == real(0) || b.value == real(0);
+                if (!is_change || (a.is_exact && b.is_exact)) continue;
+                make_exact(a, e);
+                make_exact(b, e);
+                is_done = status != Status::ok;
+            }
+        }
+    }
+
+    // The changes of sign along the samples. A zero at a sample is one if the sign beyond it is another: else g only
+    // touches zero. Where g is not defined in between, nothing has happened.
+    void walk(int e, real* rows, int& found) {
+        real& last = step->event_values[e];  // that is not zero
+        real zero = -real(1);
+        for (int i = 0; i < sample_count && status == Status::ok; ++i) {
+            const real value = samples[i].value;
+            if (!is_finite(value)) {
+                last = real(0);
+                zero = -real(1);
+            } else if (value == real(0)) {
+                if (zero < real(0)) zero = samples[i].theta;
+            } else {
+                if (changes(last, value)) {
+                    const int direction = ((value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
+                    if (K::event_direction[e] * direction >= 0) {
+                        bool is_root = true;
+                        const real root = zero >= real(0) ? zero : locate(e, samples[i - 1], samples[i], is_root);
+                        if (is_root) add(e, root, rows, found);
+                    }
+                }
+                last = value;
+                zero = -real(1);
+            }
+        }
+    }
+
+    // The root between a and b, to the rounding of theta: secants, with the value of an end that stays halved (the
+    // Illinois method), and every third time the middle. None where g grows: its sign changes at a pole.
+    real locate(int e, Sample a, Sample b, bool& is_root) {
+        const real largest = fabs(a.value) < fabs(b.value) ? fabs(b.value) : fabs(a.value);
+        Sample nearest = fabs(a.value) < fabs(b.value) ? a : b;
+        real weight_a = real(1), weight_b = real(1);
         int stays = 0;  // the end that the last secant left in place: -1 is a, 1 is b
-        for (int iteration = 1; b - a > Limits<real>::epsilon; ++iteration) {
-            const real middle = a + real(0.5) * (b - a);
-            real theta = iteration % 3 == 0 ? middle : b - value_b * ((b - a) / (value_b - value_a));
-            if (!(theta > a && theta < b)) theta = middle;
-            values(stepper, theta, value);
-            if (value[e] == real(0)) return theta;
-            if ((value[e] > real(0)) == (value_b > real(0))) {
-                b = theta;
-                value_b = value[e];
-                if (stays == -1) value_a *= real(0.5);
+        for (int iteration = 1; b.theta - a.theta > rounding && status == Status::ok; ++iteration) {
+            const real left = weight_a * a.value, right = weight_b * b.value;
+            const real middle = a.theta + real(0.5) * (b.theta - a.theta);
+            real theta = iteration % 3 == 0 ? middle : b.theta - right * ((b.theta - a.theta) / (right - left));
+            if (theta < a.theta + rounding) theta = a.theta + rounding;
+            if (theta > b.theta - rounding) theta = b.theta - rounding;
+            if (!(theta > a.theta && theta < b.theta)) theta = middle;
+            const Sample there{theta, exactly(theta, e), true};
+            if (!is_finite(there.value)) break;
+            nearest = there;
+            if (there.value == real(0)) break;
+            if (changes(there.value, a.value)) {
+                b = there;
+                weight_b = real(1);
+                weight_a = stays == -1 ? real(0.5) * weight_a : real(1);
                 stays = -1;
             } else {
-                a = theta;
-                value_a = value[e];
-                if (stays == 1) value_b *= real(0.5);
+                a = there;
+                weight_a = real(1);
+                weight_b = stays == 1 ? real(0.5) * weight_b : real(1);
                 stays = 1;
             }
         }
-        return b;
+        is_root = is_finite(nearest.value) && fabs(nearest.value) <= largest;
+        return nearest.theta;
     }
 
-    // Rows of event number, t, q[n], p[n] of the last step, in the order of the motion; how many. Values before are
-    // those that the last look ended with: the velocity of two steps' polynomials differs where they meet.
-    static int look(S& stepper, real* rows) {
-        int count = 0;
-        real before[K::events], thetas[most];
-        for (int e = 0; e < K::events; ++e) before[e] = stepper.event_values[e];
-        real theta_before = real(0);
-        for (int piece = 1; piece <= pieces; ++piece) {
-            const real theta = real(piece) / real(pieces);
-            real after[K::events];
-            values(stepper, theta, after);
-            for (int e = 0; e < K::events; ++e) {
-                const bool rises = before[e] < real(0) && after[e] >= real(0);
-                const bool falls = before[e] > real(0) && after[e] <= real(0);
-                const int direction = (rises == (stepper.step_size > real(0))) ? 1 : -1;  // with growing time
-                real root = theta;
-                bool is_root = (rises || falls) && K::event_direction[e] * direction >= 0;
-                if (is_root && after[e] != real(0)) {
-                    real start[K::events], there[K::events];
-                    values(stepper, theta_before, start);
-                    const bool has_changed = start[e] == real(0) || (start[e] > real(0)) == (after[e] > real(0));
-                    root = has_changed ? theta_before : locate(stepper, e, theta_before, start[e], theta, after[e]);
-                    values(stepper, root, there);
-                    // At a pole the sign changes through infinity.
-                    const bool grows = fabs(there[e]) > fabs(start[e]) && fabs(there[e]) > fabs(after[e]);
-                    is_root = has_changed || (is_finite(after[e]) && !grows);
-                }
-                if (is_root) {
-                    int place = count++;
-                    for (; place > 0 && thetas[place - 1] > root; --place) {
-                        thetas[place] = thetas[place - 1];
-                        for (int k = 0; k < columns; ++k) rows[place * columns + k] = rows[(place - 1) * columns + k];
-                    }
-                    thetas[place] = root;
-                    rows[place * columns] = real(e);
-                    Between<K>::row(stepper, root, rows + place * columns + 1);
-                }
-                before[e] = after[e];
-            }
-            theta_before = theta;
+    void add(int e, real root, real* rows, int& found) {
+        int place = found++;
+        for (; place > 0 && thetas[place - 1] > root; --place) {
+            thetas[place] = thetas[place - 1];
+            for (int k = 0; k < columns; ++k) rows[place * columns + k] = rows[(place - 1) * columns + k];
         }
-        for (int e = 0; e < K::events; ++e) stepper.event_values[e] = before[e];
-        return count;
+        thetas[place] = root;
+        rows[place * columns] = real(e);
+        state_at(root, rows + place * columns + 1);
     }
 };
 

@@ -82,8 +82,8 @@ TEST_CASE("emitted kernels of every form fulfil the contract") {
                                                                    {"stiff_fput", lobatto_4},
                                                                    {"kapitza_pendulum", lobatto_4},
                                                                    {"triple_pendulum", gauss_3}};
-    for (const auto& [scene, method] : rows) {
-        INFO(scene << " " << method);
-        CHECK(complaints(scene, method) == "");
+    for (const auto& row : rows) {
+        INFO(row.first << " " << row.second);
+        CHECK(complaints(row.first, row.second) == "");
     }
 }

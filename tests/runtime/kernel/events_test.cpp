@@ -43,7 +43,7 @@ struct Row {
 // Runs in calls of `block` steps, with room for `capacity` events in each.
 template <class K>
 std::vector<Row> events_of(double h, double q, double p, int steps, int block, int capacity = 64) {
-    Stepper<K> stepper;
+    typename Export<K>::S stepper;
     std::vector<double> rows(static_cast<std::size_t>(capacity) * 4);
     const double time = 0, parameters[2] = {1, 1};
     REQUIRE(Export<K>::prepare(&stepper, parameters, &h) == LOBATTO_OK);
@@ -75,14 +75,14 @@ TEST_CASE("events of the pendulum are found once each, in order, at their times"
         CHECK(row.t >= before);
         before = row.t;
         if (row.event == 0) {
-            CHECK(std::fabs(row.t - (3 + 4 * rising) * quarter) < 2e-8);  // 3.3e-9 measured
+            CHECK(std::fabs(row.t - (3 + 4 * rising) * quarter) < 1e-8);
             CHECK(std::fabs(row.q) < 1e-15);
             CHECK(row.p > 0);
             ++rising;
         } else if (row.event == 1) {
             ++turning;
-            CHECK(std::fabs(row.t - 4 * turning * quarter) < 2e-5);  // the polynomial's velocity: 3.3e-6 measured
-            CHECK(std::fabs(row.p) < 1e-13);
+            CHECK(std::fabs(row.t - 4 * turning * quarter) < 1e-8);
+            CHECK(std::fabs(row.p) < 1e-15);
             CHECK(row.q > 0);
         } else {
             CHECK(std::fabs(std::fabs(row.q) - 1) < 4e-16);
@@ -107,7 +107,8 @@ TEST_CASE("a change of sign at a pole is no event") {
 TEST_CASE("events do not depend on how steps are grouped, nor on the room for them") {
     const std::vector<Row> once = events_of<Swing>(0.3, 2, 0.1, 500, 500, 1000);
     REQUIRE(once.size() > 50);
-    for (const auto& other : {events_of<Swing>(0.3, 2, 0.1, 500, 1), events_of<Swing>(0.3, 2, 0.1, 500, 17, 12)}) {
+    for (const auto& other :
+         {events_of<Swing>(0.3, 2, 0.1, 500, 1), events_of<Swing>(0.3, 2, 0.1, 500, 17, Events<Swing>::most)}) {
         REQUIRE(other.size() == once.size());
         for (std::size_t i = 0; i < once.size(); ++i) {
             CHECK(other[i].event == once[i].event);
@@ -133,12 +134,12 @@ TEST_CASE("backwards in time an event that rises with time is still the rising o
 }
 
 TEST_CASE("a start on an event is none") {
-    for (const Row& row : events_of<Swing>(0.1, 0, 1, 5, 5)) CHECK(row.event != 0);
+    for (const Row& row : events_of<Swing>(0.1, 0, 1, 5, 5, 200)) CHECK(row.event != 0);
 }
 
 TEST_CASE("dense rows lie on the step's polynomial, between the records") {
     using K = Swing;
-    Stepper<K> stepper;
+    typename Export<K>::S stepper;
     const double time = 0, h = 0.2, q = 2, p = 0, parameters[2] = {1, 1};
     REQUIRE(Export<K>::prepare(&stepper, parameters, &h) == LOBATTO_OK);
     REQUIRE(Export<K>::start(&stepper, &time, &q, &p) == LOBATTO_OK);
@@ -177,7 +178,7 @@ TEST_CASE("dense rows lie on the step's polynomial, between the records") {
 
 TEST_CASE("a conserved momentum is the same between steps") {
     using K = HandwrittenSphericalPendulum<double, LobattoFour<double>, true>;
-    Stepper<K> stepper;
+    typename Export<K>::S stepper;
     const double q[2] = {0.9, 0.4}, p[2] = {0.2, 0.7};
     REQUIRE(stepper.prepare({}, 0.2) == Status::ok);
     REQUIRE(stepper.start(0, q, p) == Status::ok);

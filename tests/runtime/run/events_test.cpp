@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Events of whole runs: of the order of the steps by every method, and none lost near a tangent, beside a place where
+// the event's function is not defined, or on the end of a step.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "runtime/run/output.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+struct Motion {
+    std::string lagrangian, start, method;
+    double step, until;
+};
+
+// The times of each event of the list, in the order of the motion.
+std::vector<std::vector<double>> times_of(const Motion& motion, const std::vector<std::string>& events,
+                                          const std::string& option = "--quiet") {
+    const test::TemporaryFolder folder;
+    std::string list;
+    for (const std::string& event : events) list += fmt::format("\"{}\", ", event);
+    test::write_text(folder / "scene.toml",
+                     fmt::format("time = \"t\"\nlagrangian = \"{}\"\n[coordinates]\nx = {{ {} }}\n[method]\n{}\n"
+                                 "[run]\nstep = {}\nuntil = {}\n[output]\nevents = [{}]\n",
+                                 motion.lagrangian, motion.start, motion.method, motion.step, motion.until, list));
+    const test::Finished done = test::run(
+        {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--beyond-horizon", option});
+    INFO(done.err);
+    REQUIRE(done.exit_code == 0);
+    std::vector<std::vector<double>> times(events.size());
+    double before = -1;
+    for (const std::vector<double>& row : read_trajectory(folder / "run.events.csv").rows) {
+        CHECK(row[1] >= before);
+        before = row[1];
+        times.at(static_cast<std::size_t>(row[0]) - 1).push_back(row[1]);
+    }
+    return times;
+}
+
+// The times until the end at which cos t is the value.
+std::vector<double> times_of_cosine(double value, double until) {
+    std::vector<double> times;
+    for (int k = 0; k < until; ++k)
+        for (const int side : {-1, 1}) {
+            const double t = 2 * std::numbers::pi * k + side * std::acos(value);
+            if (t > 0 && t < until) times.push_back(t);
+        }
+    return times;
+}
+
+}  // namespace
+
+TEST_CASE("events have the order of the steps, on positions and on velocities, by every method") {
+    struct Row {
+        std::string method, option;
+        int order;
+        double step;
+    };
+    const double quarter = std::comp_ellint_1(std::sin(1.0));
+    for (const Row& row : {Row{"points = 3", "--quiet", 4, 0.2}, Row{"points = 4", "--quiet", 6, 0.4},
+                           Row{"points = 4", "--general", 6, 0.4}, Row{"points = 6", "--general", 10, 1.2},
+                           Row{"family = \"gauss\"\nstages = 2", "--quiet", 4, 0.2},
+                           Row{"family = \"gauss\"\nstages = 3", "--general", 6, 0.4},
+                           Row{"family = \"splitting\"\nstages = 11", "--quiet", 6, 0.3}}) {
+        double errors[2][2]{};
+        for (const int halving : {0, 1}) {
+            const auto times =
+                times_of({"x'^2/2 + cos(x)", "position = 2, velocity = 0", row.method, row.step / (1 + halving), 30},
+                         {"x = 0", "x' = 0"}, row.option);
+            REQUIRE(times[0].size() >= 6);
+            REQUIRE(times[1].size() >= 3);
+            errors[0][halving] = std::fabs(times[0].back() - (2 * static_cast<double>(times[0].size()) - 1) * quarter);
+            errors[1][halving] = std::fabs(times[1].back() - 2 * static_cast<double>(times[1].size()) * quarter);
+        }
+        for (const auto& error : errors) {
+            INFO(row.method << " " << row.option << ": " << error[0] << ", " << error[1]);
+            CHECK(error[0] < 1e-4);
+            CHECK(std::log2(error[0] / error[1]) > row.order - 1);
+        }
+    }
+}
+
+TEST_CASE("events within a step are found however near to a tangent, and where their function ends") {
+    const std::vector<double> values{0.9, 0.9999, 0.999999999, -0.99999, 0.49, std::exp(-3) - 0.9};
+    for (const double step : {0.3, 1.0, 2.5, 3.1}) {
+        const double until = step * std::floor(200 / step);
+        const auto times = times_of({"x'^2/2 - x^2/2", "position = 1, velocity = 0", "points = 12", step, until},
+                                    {"x = 0.9", "x = 0.9999", "x = 0.999999999", "x = -0.99999", "sqrt(0.5 - x) = 0.1",
+                                     "log(x + 0.9) = -3", "x = 1.0001", "1/(x - 0.3) = 0"});
+        for (std::size_t e = 0; e < values.size(); ++e) {
+            const std::vector<double> expected = times_of_cosine(values[e], until);
+            INFO("h = " << step << ", event " << e + 1);
+            REQUIRE(times[e].size() == expected.size());
+            // Near a tangent a rounding of x moves the time by its square root.
+            const double bound = 1e-11 / std::sqrt(1 - values[e] * values[e]);
+            for (std::size_t i = 0; i < expected.size(); ++i) CHECK(std::fabs(times[e][i] - expected[i]) < bound);
+        }
+        CHECK(times[6].empty());
+        CHECK(times[7].empty());
+    }
+}
+
+TEST_CASE("a touch of zero is no event, also on the end of a step; a passage there is one") {
+    // x = t/2 - 1, exactly, which is 0 at t = 2, 1 at t = 4.
+    const auto times = times_of({"x'^2/2", "position = -1, velocity = 0.5", "points = 3", 0.25, 6},
+                                {"x^2 = 0", "-x^2 = 0", "x^3 = 0", "sqrt(x^2) = 0 rising", "x = 0 falling",
+                                 "x*(x - 1) = 0", "x^2*(x - 1) = 0 rising"});
+    CHECK(times[0].empty());
+    CHECK(times[1].empty());
+    CHECK(times[2] == std::vector<double>{2});
+    CHECK(times[3].empty());
+    CHECK(times[4].empty());
+    CHECK(times[5] == std::vector<double>{2, 4});
+    CHECK(times[6] == std::vector<double>{4});
+}
