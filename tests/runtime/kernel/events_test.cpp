@@ -146,7 +146,7 @@ TEST_CASE("dense rows lie on the step's polynomial, between the records") {
     double between, velocity;
     const double half = 0.5;
     CHECK(Export<K>::dense(&stepper, &half, &between, &velocity) == LOBATTO_UNSUPPORTED);  // no step yet
-    Stepper<K> fine;
+    Export<K>::S fine;
     const double h_fine = 0.05;
     REQUIRE(Export<K>::prepare(&fine, parameters, &h_fine) == LOBATTO_OK);
     REQUIRE(Export<K>::start(&fine, &time, &q, &p) == LOBATTO_OK);
