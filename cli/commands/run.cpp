@@ -24,6 +24,7 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
+#include "generator/mechanics/start.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"
@@ -162,6 +163,7 @@ Prepared prepare(const RunOptions& options) {
     const KernelSource source = emit(derivation);
     const double derivation_seconds = seconds_since(start);
     apply(options.overrides, scene);  // after the derivation: one kernel serves all values
+    if (!options.overrides.set.empty()) check_domains(scene, derivation.system);
     const Steps steps = steps_of(scene, options.overrides);
     Compiled compiled;
     const Kernel kernel = kernel_of(source, Precision::double_, &compiled);

@@ -21,6 +21,7 @@
 #include "cli/print/summary.hpp"
 #include "cli/print/sweep_table.hpp"
 #include "cli/print/tell.hpp"
+#include "generator/mechanics/start.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/ensemble.hpp"
@@ -337,6 +338,7 @@ void sweep(const SweepOptions& options) {
     const Steps steps = steps_of(options, scene);
 
     Derivation derivation = derive(as_written);
+    if (!options.overrides.set.empty()) check_domains(scene, derivation.system);
     if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const KernelSource source = emit(derivation);
     EnsembleRequest request = request_of(options, scene, grid, steps);

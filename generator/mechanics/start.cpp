@@ -50,6 +50,32 @@ public:
         mass_ = start_.convert(mass_values_);
     }
 
+    // What formulas ask for as they are written, though they may have lost it since: a/a, sqrt(a)^2.
+    void require_domains() {
+        for (const DomainCondition& condition : scene_.conditions) {
+            const bool moves = scene_.start == Start::momentum &&
+                               std::any_of(system_.v.begin(), system_.v.end(),
+                                           [&](const auto& v) { return condition.expression.has(v); });
+            if (moves) continue;  // velocities are not known yet
+            std::string found;
+            try {
+                const cln::cl_R value = start_({condition.expression}).front();
+                using Kind = DomainCondition::Kind;
+                const bool holds = condition.kind == Kind::nonzero       ? !cln::zerop(value)
+                                   : condition.kind == Kind::nonnegative ? !cln::minusp(value)
+                                   : condition.kind == Kind::positive    ? cln::plusp(value)
+                                                                         : cln::abs(value) <= 1;
+                if (holds) continue;
+                found = cln::zerop(value) ? "0" : decimal(value, 6);
+            } catch (const DomainError& error) {
+                found = error.what();
+            }
+            scene_.source.fail(condition.at,
+                               fmt::format("{} has no value at the start: it is of {} = {}{}", condition.operation,
+                                           short_text(condition.expression), found, start_text(condition.expression)));
+        }
+    }
+
     void run() {
         require_values();
         require_domains();
@@ -85,31 +111,6 @@ private:
         return text + (shown > 6 ? ", ..." : "");
     }
 
-    // What formulas ask for as they are written, though they may have lost it since: a/a, sqrt(a)^2.
-    void require_domains() {
-        for (const DomainCondition& condition : scene_.conditions) {
-            const bool moves = scene_.start == Start::momentum &&
-                               std::any_of(system_.v.begin(), system_.v.end(),
-                                           [&](const auto& v) { return condition.expression.has(v); });
-            if (moves) continue;  // velocities are not known yet
-            std::string found;
-            try {
-                const cln::cl_R value = start_({condition.expression}).front();
-                using Kind = DomainCondition::Kind;
-                const bool holds = condition.kind == Kind::nonzero       ? !cln::zerop(value)
-                                   : condition.kind == Kind::nonnegative ? !cln::minusp(value)
-                                   : condition.kind == Kind::positive    ? cln::plusp(value)
-                                                                         : cln::abs(value) <= 1;
-                if (holds) continue;
-                found = cln::zerop(value) ? "0" : decimal(value, 6);
-            } catch (const DomainError& error) {
-                found = error.what();
-            }
-            scene_.source.fail(condition.at,
-                               fmt::format("{} has no value at the start: it is of {} = {}{}", condition.operation,
-                                           short_text(condition.expression), found, start_text(condition.expression)));
-        }
-    }
     std::string start_text(const ex& expression) const {
         const std::string values = values_in(expression);
         return (values.empty() ? "" : ", with " + values) + "; start elsewhere, or mend the formula";
@@ -278,6 +279,10 @@ private:
 
 void check_start(const Scene& scene, const System& system) {
     StartCheck(scene, system).run();
+}
+
+void check_domains(const Scene& scene, const System& system) {
+    StartCheck(scene, system).require_domains();
 }
 
 }  // namespace lobatto

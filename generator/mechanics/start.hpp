@@ -10,4 +10,7 @@ namespace lobatto {
 // dp/dv has an inverse, and where the scene gives momenta there are velocities with p = dL/dv. Else InputError.
 void check_start(const Scene& scene, const System& system);
 
+// That part of it which formulas cannot tell after they were simplified, for values set since: sqrt(a)^2 with a < 0.
+void check_domains(const Scene& scene, const System& system);
+
 }  // namespace lobatto

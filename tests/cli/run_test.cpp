@@ -618,3 +618,24 @@ TEST_CASE("a step too long for a contact is told as that, with a length that wou
     }
     CHECK(stopped > 0);
 }
+
+TEST_CASE("a value that is set is refused where the formula as written has no value for it, though it cancels") {
+    const test::TemporaryFolder folder;
+    const std::string scene = folder / "scene.toml";
+    test::write_text(
+        scene,
+        "lagrangian = \"x'^2/2 - sqrt(m - 2)^2*x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+        "[parameters]\nm = 3\n[run]\nstep = 0.1\nuntil = 1\n");
+    for (const bool sweeps : {false, true}) {
+        const auto with = [&](const std::string& value) {
+            std::vector<std::string> words{
+                LOBATTO_PROGRAM, sweeps ? "sweep" : "run", scene, "-o", folder / "out.csv", "--set", value};
+            if (sweeps) words.insert(words.end(), {"--vary", "x=1,2"});
+            return test::run(words);
+        };
+        CHECK(with("m=2.5").exit_code == 0);
+        const test::Finished refused = with("m=1");
+        CHECK(refused.exit_code == 2);
+        CHECK(contains(refused.err, "a square root has no value at the start: it is of m - 2 = -1"));
+    }
+}
