@@ -19,6 +19,7 @@ constexpr double short_run = 1;                // seconds: of these the companio
 constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
 constexpr int most_coupled = 16;               // coordinates of which that is looked for
 constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double by_chance = 0.1;   // of the amplitude: errors that grow exponentially do not come back from beyond it
 constexpr double exponential = 30;  // times more than errors that grow with the square of the time
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -311,6 +312,12 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         const double part = std::log(middle->second / first->second) / std::log(growth);
         if (growth > exponential * times * times && part > 0.2 && part < 0.8)
             error.doubling = (last->first - first->first) / std::log2(growth);
+    }
+    // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
+    const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
+    if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
+        const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
+        lose(error, request_.time + static_cast<double>(point.steps) * request_.step, point.row);
     }
     error.at_end = error.end;
     if (!error.complete && !course.empty()) {

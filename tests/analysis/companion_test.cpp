@@ -76,6 +76,16 @@ TEST_CASE("the measured error is the true one within a factor of two, by any met
     }
 }
 
+TEST_CASE("two motions that diverged and meet again by chance are not taken for the same") {
+    // The true motion has made a turn less at the end; the companion's is where the run's is, to 2e-5.
+    const Place place(scene_of("x'^2/2 + cos(x)",
+                               "x = { position = 3.1415926535905676, velocity = 4.3581281856073072e-10 }", "points = 9",
+                               0.20696647360042109, 88.788617174580651));
+    const test::Finished done = place.run();
+    INFO(done.out << done.err);
+    CHECK(done.exit_code == 3);
+}
+
 TEST_CASE("a run of which nothing is left returns 3 and says so, also when it is quiet") {
     struct Row {
         std::string lagrangian, coordinates, method;
