@@ -21,6 +21,7 @@
 #include "iteration/galerkin_newton.hpp"
 #include "iteration/neighbours.hpp"
 #include "iteration/newton.hpp"
+#include "iteration/stage_coefficients.hpp"
 #include "iteration/stage_equations.hpp"
 #include "iteration/stage_map.hpp"
 #include "iteration/tangent.hpp"

@@ -70,47 +70,29 @@ struct Limits<__float128> {
     static constexpr __float128 largest = __float128(std::numeric_limits<long double>::max());
     static constexpr __float128 root_epsilon = __float128(1) / __float128(1ull << 57);
 };
-inline __float128 acos(__float128 x) {
-    return acosq(x);
-}
-inline __float128 asin(__float128 x) {
-    return asinq(x);
-}
-inline __float128 atan(__float128 x) {
-    return atanq(x);
-}
-inline __float128 cos(__float128 x) {
-    return cosq(x);
-}
-inline __float128 cosh(__float128 x) {
-    return coshq(x);
-}
-inline __float128 exp(__float128 x) {
-    return expq(x);
-}
-inline __float128 fabs(__float128 x) {
-    return fabsq(x);
-}
-inline __float128 log(__float128 x) {
-    return logq(x);
-}
+#define LOBATTO_FUNCTION(f)             \
+    inline __float128 f(__float128 x) { \
+        return f##q(x);                 \
+    }
+LOBATTO_FUNCTION(acos)
+LOBATTO_FUNCTION(asin)
+LOBATTO_FUNCTION(atan)
+LOBATTO_FUNCTION(cos)
+LOBATTO_FUNCTION(cosh)
+LOBATTO_FUNCTION(exp)
+LOBATTO_FUNCTION(fabs)
+LOBATTO_FUNCTION(log)
+LOBATTO_FUNCTION(sin)
+LOBATTO_FUNCTION(sinh)
+LOBATTO_FUNCTION(sqrt)
+LOBATTO_FUNCTION(tan)
+LOBATTO_FUNCTION(tanh)
+#undef LOBATTO_FUNCTION
 inline __float128 pow(__float128 x, __float128 y) {
     return powq(x, y);
 }
-inline __float128 sin(__float128 x) {
-    return sinq(x);
-}
-inline __float128 sinh(__float128 x) {
-    return sinhq(x);
-}
-inline __float128 sqrt(__float128 x) {
-    return sqrtq(x);
-}
-inline __float128 tan(__float128 x) {
-    return tanq(x);
-}
-inline __float128 tanh(__float128 x) {
-    return tanhq(x);
+inline __float128 rounded_once(__float128 x, __float128 y, __float128 z) {
+    return fmaq(x, y, z);
 }
 #endif
 
@@ -126,11 +108,6 @@ inline bool is_finite(reals... x) {
     return ((x - x == reals(0)) && ...);
 }
 
-#ifdef LOBATTO_USE_FLOAT128
-inline __float128 rounded_once(__float128 a, __float128 b, __float128 c) {
-    return fmaq(a, b, c);
-}
-#endif
 }  // namespace lobatto
 
 #endif

@@ -156,49 +156,32 @@ LOBATTO_INLINE bool all(Truths truths) {
 }
 
 // x86: g++ does not find these instructions in the loops above.
+#define LOBATTO_ROOT(type, root)              \
+    LOBATTO_INLINE type square_root(type a) { \
+        return root(a);                       \
+    }
+#define LOBATTO_SIGNS(real, width, type, signs)                     \
+    LOBATTO_INLINE bool any(Register<real, width>::Truths truths) { \
+        return signs((type)truths) != 0;                            \
+    }                                                               \
+    LOBATTO_INLINE bool all(Register<real, width>::Truths truths) { \
+        return signs((type)truths) == (1 << width) - 1;             \
+    }
 #ifdef __SSE2__
 using Double2 = Register<double, 2>::Values;
 using Float4 = Register<float, 4>::Values;
-LOBATTO_INLINE Double2 square_root(Double2 a) {
-    return __builtin_ia32_sqrtpd(a);
-}
-LOBATTO_INLINE Float4 square_root(Float4 a) {
-    return __builtin_ia32_sqrtps(a);
-}
-LOBATTO_INLINE bool any(Register<double, 2>::Truths truths) {
-    return __builtin_ia32_movmskpd((Double2)truths) != 0;
-}
-LOBATTO_INLINE bool all(Register<double, 2>::Truths truths) {
-    return __builtin_ia32_movmskpd((Double2)truths) == 3;
-}
-LOBATTO_INLINE bool any(Register<float, 4>::Truths truths) {
-    return __builtin_ia32_movmskps((Float4)truths) != 0;
-}
-LOBATTO_INLINE bool all(Register<float, 4>::Truths truths) {
-    return __builtin_ia32_movmskps((Float4)truths) == 15;
-}
+LOBATTO_ROOT(Double2, __builtin_ia32_sqrtpd)
+LOBATTO_ROOT(Float4, __builtin_ia32_sqrtps)
+LOBATTO_SIGNS(double, 2, Double2, __builtin_ia32_movmskpd)
+LOBATTO_SIGNS(float, 4, Float4, __builtin_ia32_movmskps)
 #endif
 #ifdef __AVX__
 using Double4 = Register<double, 4>::Values;
 using Float8 = Register<float, 8>::Values;
-LOBATTO_INLINE Double4 square_root(Double4 a) {
-    return __builtin_ia32_sqrtpd256(a);
-}
-LOBATTO_INLINE Float8 square_root(Float8 a) {
-    return __builtin_ia32_sqrtps256(a);
-}
-LOBATTO_INLINE bool any(Register<double, 4>::Truths truths) {
-    return __builtin_ia32_movmskpd256((Double4)truths) != 0;
-}
-LOBATTO_INLINE bool all(Register<double, 4>::Truths truths) {
-    return __builtin_ia32_movmskpd256((Double4)truths) == 15;
-}
-LOBATTO_INLINE bool any(Register<float, 8>::Truths truths) {
-    return __builtin_ia32_movmskps256((Float8)truths) != 0;
-}
-LOBATTO_INLINE bool all(Register<float, 8>::Truths truths) {
-    return __builtin_ia32_movmskps256((Float8)truths) == 255;
-}
+LOBATTO_ROOT(Double4, __builtin_ia32_sqrtpd256)
+LOBATTO_ROOT(Float8, __builtin_ia32_sqrtps256)
+LOBATTO_SIGNS(double, 4, Double4, __builtin_ia32_movmskpd256)
+LOBATTO_SIGNS(float, 8, Float8, __builtin_ia32_movmskps256)
 #endif
 #if defined(__FMA__) && defined(__SSE2__)
 LOBATTO_INLINE Double2 fused(Double2 a, Double2 b, Double2 c) {
@@ -240,19 +223,12 @@ LOBATTO_INLINE Float16 square_root(Float16 a) {
     return __builtin_ia32_sqrtps512_mask(a, a, static_cast<unsigned short>(-1), current_rounding);
 }
 #endif
-LOBATTO_INLINE bool any(Register<double, 8>::Truths truths) {
-    return __builtin_ia32_cvtq2mask512((Long8)truths) != 0;
-}
-LOBATTO_INLINE bool all(Register<double, 8>::Truths truths) {
-    return __builtin_ia32_cvtq2mask512((Long8)truths) == 255;
-}
-LOBATTO_INLINE bool any(Register<float, 16>::Truths truths) {
-    return __builtin_ia32_cvtd2mask512(truths) != 0;
-}
-LOBATTO_INLINE bool all(Register<float, 16>::Truths truths) {
-    return __builtin_ia32_cvtd2mask512(truths) == 65535;
-}
+LOBATTO_SIGNS(double, 8, Long8, __builtin_ia32_cvtq2mask512)
+using Truths16 = Register<float, 16>::Truths;
+LOBATTO_SIGNS(float, 16, Truths16, __builtin_ia32_cvtd2mask512)
 #endif
+#undef LOBATTO_ROOT
+#undef LOBATTO_SIGNS
 
 }  // namespace registers
 

@@ -209,12 +209,13 @@ private:
     // Fixed-point iterations with W + S (Y - X) in place of W(Y), until what is left of an increment, e times its ratio
     // to the one before, is rounding; then that is what W is at the nodes.
     LOBATTO_INLINE bool carry(real e, real e_before, real least, real small, Arrays& a) {
+        const Convergence<real, 1, NoisyPace> rule{small};
         real ignored;
         bool still = !(e * e <= small * e_before && e * least <= small);
         for (int i = 0; i < carried_limit && still; ++i) {
             const real next = iterate<true>(a, ignored);
             const bool stands = next >= real(0.5) * e && next > real(0);  // rounding, or no convergence
-            if (stands && next > real(64) * small) return false;
+            if (stands && !rule.is_noise(next)) return false;
             still = !stands && !(next * next <= small * e && next * least <= small);
             e = next;
         }

@@ -18,6 +18,7 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "convergence.hpp"
 #include "stage_map.hpp"
 
 namespace lobatto {
@@ -192,17 +193,16 @@ private:
             kappa_now[c] = kappa[c];
         }
         if constexpr (K::angles > 0) look_around(k, time, q, a);
-        const T small = T(least);
+        // Velocities are kept, positions are made of them: more rounding, and ratios that tell less.
+        const Convergence<T, 1, Pace<4, 90, 32>> rule{T(real(2) * least)};
         ActiveMask solved = active & !active;
         T e_before = T(Limits<real>::largest);
         evaluations = T(real(0));
         for (int evaluation = 1; evaluation <= evaluation_limit; ++evaluation) {
             evaluations = select(active, evaluations + T(real(1)), evaluations);
             const T e = iterate(k, time, q, p, kappa_now, a);
-            if (evaluation > 4) active = active & ((e < T(real(0.9)) * e_before) | (e <= T(real(16)) * small));
-            // Or no longer shrinking: the rounding of what it is computed from.
-            const ActiveMask done =
-                active & ((e <= T(real(2)) * small) | ((e <= T(real(64)) * small) & (e >= T(real(0.5)) * e_before)));
+            if (evaluation > rule.judged_after) active = active & rule.contracts(e, e_before);
+            const ActiveMask done = active & (rule.is_small(e) | rule.stagnates(e, e_before));
             if (any(done)) {
                 increment = select(done, e, increment);
                 solved = solved | finish(q, p, kappa_now, done, a);

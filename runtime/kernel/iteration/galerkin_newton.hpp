@@ -7,6 +7,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "convergence.hpp"
 #include "galerkin_equations.hpp"
 
 namespace lobatto {
@@ -20,7 +21,7 @@ struct GalerkinNewton : GalerkinEquations<K> {
         Equations::workspace;
     using typename Equations::real, typename Equations::Arrays, typename Equations::Matrix, typename Equations::Layout,
         typename Equations::Tables;
-    static constexpr int iteration_limit = 40;
+    using Rule = NewtonConvergence<real>;
 
 protected:
     using Equations::apply_node_map, Equations::node_variables, Equations::evaluate_nodes, Equations::sum_over_nodes,
@@ -111,12 +112,10 @@ private:
         }
     }
 
-    // Newton's iteration. Convergence is quadratic, e_next = C e^2, so it stops as soon as the NEXT increment would be
-    // below rounding; the slopes are then carried to first order, which errs by the same e^2.
+    // Newton's iteration. At its end the slopes are carried to first order, which errs by the same e^2 as the unknowns.
     Status newton(Arrays& a) {
-        constexpr real last = Limits<real>::root_epsilon;
         real previous = Limits<real>::largest;
-        for (int iteration = 1; iteration <= iteration_limit; ++iteration) {
+        for (int iteration = 1; iteration <= Rule::iteration_limit; ++iteration) {
             evaluate_nodes(this->time(), q, p, a.Y, a);
             if (iteration == 1) scale_kappas(a);
             if (!is_finite(not_finite_part(a.g, r * Z))) return Status::not_finite;
@@ -127,9 +126,7 @@ private:
             const real e = apply_increment(a.matrix, a);
             increment = e;
             if (!is_finite(e)) return Status::not_finite;
-            if (e <= last ||
-                (iteration > 1 && e < previous && (e / previous) * (e / previous) * e <= Limits<real>::epsilon) ||
-                (iteration > 2 && e >= real(0.5) * previous && is_rounding(a))) {
+            if (Rule::reached(iteration, e, previous) || (Rule::stagnates(iteration, e, previous) && is_rounding(a))) {
                 carry_increment(a.H, entry_room, a);
                 return Status::ok;
             }
@@ -160,7 +157,7 @@ private:
             most = fabs(rounding[i]) > most ? fabs(rounding[i]) : most;
             largest = fabs(a.delta[i]) > largest ? fabs(a.delta[i]) : largest;
         }
-        return largest <= real(64) * Limits<real>::epsilon * most;
+        return largest <= real(Rule::noise) * Limits<real>::epsilon * most;
     }
 
     // A linear system: the frozen Jacobian is the Jacobian.

@@ -18,6 +18,7 @@
 #include "../base/rows.hpp"
 #include "../base/shifts.hpp"
 #include "convergence.hpp"
+#include "stage_coefficients.hpp"
 
 namespace lobatto {
 
@@ -87,20 +88,11 @@ struct NeighbourFixedPoint {
         h = step_size;
         forget();
         for (int i = 0; i < m; ++i) {
-            real row_sum = real(0);
-            for (int j = 0; j < m; ++j) {
-                const real entry = -h * h * K::A[i * m + j];
-                inner[i][j] = entry;
-                row_sum += entry;
-            }
-            simple[i] = row_sum;
-            for (int l = 0; l < s; ++l) {
-                real entry = real(0);
-                for (int j = 0; j < m; ++j) entry += -h * h * K::A[i * m + j] * K::E[j * s + l];
-                before[i][l] = entry;
-            }
+            for (int j = 0; j < m; ++j) inner[i][j] = -h * h * stage_coefficients<K>.map[i][j];
+            for (int l = 0; l < s; ++l) before[i][l] = -h * h * stage_coefficients<K>.before[i][l];
+            simple[i] = -h * h * stage_coefficients<K>.sum[i];
+            arrival[i] = -h * h * stage_coefficients<K>.map[m][i];
             on_velocity[i] = h * K::c[i + 1];
-            arrival[i] = -h * h * (K::b[i + 1] * (real(1) - K::c[i + 1]));
         }
         for (int i = 0; i < s; ++i) weight[i] = -h * K::b[i];
     }

@@ -10,6 +10,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "convergence.hpp"
 #include "stage_equations.hpp"
 
 namespace lobatto {
@@ -21,7 +22,8 @@ struct NewtonIteration {
     using Matrix = typename Stages::Matrix;
     using Coefficients = typename K::Coefficients;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, N = n * m;
-    static constexpr int room = N > 0 ? N : 1, entry_room = K::entries > 0 ? K::entries : 1, iteration_limit = 40;
+    static constexpr int room = N > 0 ? N : 1, entry_room = K::entries > 0 ? K::entries : 1;
+    using Rule = NewtonConvergence<real>;
     static constexpr bool is_frozen = N > 0 && (K::linear || K::absorbed);
 
     struct Arrays {
@@ -115,7 +117,7 @@ private:
 
     // Whether increments that no longer shrink are within `roundings` of what they are computed from: positions and
     // accelerations. S is that of the nodes, `stride` apart.
-    static bool is_rounding(real h, const Arrays& a, const real* S, int stride, real roundings) {
+    static bool is_rounding(real h, const Arrays& a, const real* S, int stride, int roundings) {
         for (int i = 0; i < m; ++i) {
             real size[n];
             for (int k = 0; k < n; ++k) size[k] = fabs(a.W[i * n + k]);
@@ -123,18 +125,18 @@ private:
                 size[K::entry_row[e]] += fabs(S[i * stride + e] * a.Q[i * n + K::entry_column[e]]);
             for (int k = 0; k < n; ++k) {
                 const real sum = fabs(a.Q[i * n + k]) + fabs(a.base[i * n + k]) + h * h * size[k];
-                if (!(fabs(a.delta[i * n + k]) <= roundings * Limits<real>::epsilon * sum)) return false;
+                if (!(fabs(a.delta[i * n + k]) <= real(roundings) * Limits<real>::epsilon * sum)) return false;
             }
         }
         return true;
     }
 
-    // Convergence is quadratic, e_next = C e^2, so the iteration stops as soon as the NEXT increment would be below
-    // rounding; the accelerations are then carried to the final positions to first order, which errs by the same e^2.
+    // At the end the accelerations are carried to the final positions to first order, which errs by the same e^2 as the
+    // positions.
     static void newton(const Coefficients& k, real h, real time, Arrays& a, Outcome& outcome) {
         const Stages stages(h);
         real previous = Limits<real>::largest;
-        for (int iteration = 1; iteration <= iteration_limit; ++iteration) {
+        for (int iteration = 1; iteration <= Rule::iteration_limit; ++iteration) {
             for (int i = 0; i < m; ++i)
                 Formulas<K>::node(k, node_time(time, h, i), static_cast<const real*>(a.Q + i * n), a.W + i * n,
                                   a.S + i * K::entries);
@@ -149,11 +151,8 @@ private:
                 outcome.status = Status::not_finite;
                 return;
             }
-            const bool next_is_rounding =
-                K::linear || e <= Limits<real>::root_epsilon ||
-                (iteration > 1 && e < previous && (e / previous) * (e / previous) * e <= Limits<real>::epsilon);
-            if (next_is_rounding ||
-                (iteration > 2 && e >= real(0.5) * previous && is_rounding(h, a, a.S, K::entries, real(64)))) {
+            if (K::linear || Rule::reached(iteration, e, previous) ||
+                (Rule::stagnates(iteration, e, previous) && is_rounding(h, a, a.S, K::entries, Rule::noise))) {
                 stages.carry(a.S, K::entries, a.delta, a.W);
                 outcome.status = Status::ok;
                 return;
@@ -188,25 +187,23 @@ private:
         if (outcome.status == Status::ok) Stages(h).carry(frozen_.S, 0, a.delta, a.W);
     }
 
-    // The frozen Jacobian holds the constant part of S only, so that increments shrink by a factor rho; what is still
-    // to come is e rho / (1 - rho). Where rho exceeds 0.1 Newton's iteration is cheaper: not_converged.
+    // The frozen Jacobian holds the constant part of S only. Where that is too slow: not_converged.
     void chord(const Coefficients& k, real h, real time, Arrays& a, Outcome& outcome) const {
+        using Chord = ChordConvergence<real>;
         real previous = Limits<real>::largest;
-        for (int iteration = 1; iteration <= iteration_limit; ++iteration) {
+        for (int iteration = 1; iteration <= Rule::iteration_limit; ++iteration) {
             const real e = outcome.increment = frozen_increment(k, h, time, a, outcome);
             if (!is_finite(e)) {
                 outcome.status = Status::not_finite;
                 return;
             }
-            const real rho = e / previous;
-            const bool rest_is_rounding =
-                e == real(0) || (iteration > 1 && rho < real(1) && e * rho <= Limits<real>::epsilon * (real(1) - rho));
-            if (rest_is_rounding || (iteration > 1 && rho > real(0.1) && is_rounding(h, a, frozen_.S, 0, real(4)))) {
+            const bool is_slow = Chord::is_slow(iteration, e, previous);
+            if (Chord::reached(iteration, e, previous) || (is_slow && is_rounding(h, a, frozen_.S, 0, Chord::noise))) {
                 Stages(h).carry(frozen_.S, 0, a.delta, a.W);
                 outcome.status = Status::ok;
                 return;
             }
-            if (iteration > 1 && rho > real(0.1)) return;
+            if (is_slow) return;
             previous = e;
         }
     }

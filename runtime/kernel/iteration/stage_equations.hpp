@@ -9,22 +9,9 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/solve.hpp"
+#include "stage_coefficients.hpp"
 
 namespace lobatto {
-
-// A E of (D15): from the accelerations of the step before to the stage map's sums.
-template <class K>
-struct ExtrapolatedStages {
-    typename K::real entry[(K::points > 2 ? K::points - 2 : 1) * K::points]{};
-    constexpr ExtrapolatedStages() {
-        constexpr int s = K::points, m = s - 2;
-        for (int i = 0; i < m; ++i)
-            for (int j = 0; j < s; ++j)
-                for (int l = 0; l < m; ++l) entry[i * s + j] += K::A[i * m + l] * K::E[l * s + j];
-    }
-};
-template <class K>
-constexpr ExtrapolatedStages<K> extrapolated_stages{};
 
 // Loops over nodes and coordinates with the kernel's tables c, b, A and E.
 template <class K>
@@ -47,9 +34,8 @@ struct StageEquations {
     // (D14) Q_i = base_i - h^2 (sum_j A_ij) W0.
     void simple_start(const real* base, const real* W0, real* Q) const {
         for (int i = 0; i < m; ++i) {
-            real sum = real(0);
-            for (int j = 0; j < m; ++j) sum += K::A[i * m + j];
-            for (int k = 0; k < n; ++k) Q[i * n + k] = base[i * n + k] - h * h * sum * W0[k];
+            const real factor = h * h * stage_coefficients<K>.sum[i];
+            for (int k = 0; k < n; ++k) Q[i * n + k] = base[i * n + k] - factor * W0[k];
         }
     }
 
@@ -58,7 +44,7 @@ struct StageEquations {
         for (int i = 0; i < m; ++i) {
             for (int k = 0; k < n; ++k) Q[i * n + k] = base[i * n + k];
             for (int j = 0; j < s; ++j) {
-                const real factor = h * h * extrapolated_stages<K>.entry[i * s + j];
+                const real factor = h * h * stage_coefficients<K>.before[i][j];
                 for (int k = 0; k < n; ++k) Q[i * n + k] -= factor * W_before[j * n + k];
             }
         }
@@ -123,7 +109,7 @@ struct StageEquations {
     void arrive(const real* base, const real* W, real* q1) const {
         for (int k = 0; k < n; ++k) q1[k] = base[m * n + k];
         for (int j = 0; j < m; ++j) {
-            const real factor = h * h * (K::b[j + 1] * (real(1) - K::c[j + 1]));
+            const real factor = h * h * stage_coefficients<K>.map[m][j];
             for (int k = 0; k < n; ++k) q1[k] -= factor * W[j * n + k];
         }
     }

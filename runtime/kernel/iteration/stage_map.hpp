@@ -16,6 +16,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "../base/solve.hpp"
+#include "stage_coefficients.hpp"
 
 namespace lobatto {
 
@@ -106,7 +107,7 @@ struct StageMap {
             const bool inner = i < m, end = with_end && i == m;
             put(node_time, i, lane, h * K::c[(i < count ? i : count - 1) + 1]);
             put(weight, i, lane, inner || end ? -h * K::b[i + 1] : real(0));
-            put(arrival, i, lane, inner ? -h * h * (K::b[i + 1] * (real(1) - K::c[i + 1])) : real(0));
+            put(arrival, i, lane, inner ? -h * h * row(m, i) : real(0));
         }
         if constexpr (in_lanes)
             usable = good;
@@ -143,7 +144,7 @@ struct StageMap {
     const Map& map_of(int c) const { return map[absorbs ? c : 0]; }
 
     // Rows of the map: those of A, then the end of the step.
-    static real row(int i, int j) { return i < m ? K::A[i * m + j] : K::b[j + 1] * (real(1) - K::c[j + 1]); }
+    static real row(int i, int j) { return stage_coefficients<K>.map[i][j]; }
 
 private:
     static void put(V* values, int i, int lane, real x) {
@@ -159,12 +160,9 @@ private:
         real J[inner_room * inner_room], X[(m + 1) * columns];
         for (int i = 0; i <= m; ++i) {
             real* const x = X + i * columns;
-            for (int j = 0; j < columns; ++j) x[j] = real(0);
-            for (int j = 0; j < m; ++j) {
-                x[j] = -h * h * row(i, j);
-                x[m + s] += x[j];
-                for (int l = 0; l < s; ++l) x[m + l] += x[j] * K::E[j * s + l];
-            }
+            for (int j = 0; j < m; ++j) x[j] = -h * h * row(i, j);
+            for (int l = 0; l < s; ++l) x[m + l] = -h * h * stage_coefficients<K>.before[i][l];
+            x[m + s] = -h * h * stage_coefficients<K>.sum[i];
             x[m + s + 1] = real(1);
             x[m + s + 2] = h * K::c[i + 1];
         }

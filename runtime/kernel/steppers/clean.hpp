@@ -24,6 +24,8 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "../iteration/convergence.hpp"
+#include "../iteration/stage_coefficients.hpp"
 #include "../iteration/stage_map.hpp"
 #include "separable.hpp"
 
@@ -119,7 +121,7 @@ struct CleanFixedPoint {
     using Layout = NodeLayout<real, real, m>;
     using V = typename Layout::V;
     static constexpr int width = Layout::width, evaluation_limit = 30, correction_limit = 12, patience = 8;
-    static constexpr real noise = real(64) * Limits<real>::epsilon;  // changes below may stay as they are
+    static constexpr Convergence<real, 1, NoisyPace> rule{Limits<real>::epsilon};  // noise may stay as it is
     static constexpr int parts = m > 0 ? Layout::parts_of(m) : 1;
 
     struct Arrays {
@@ -163,15 +165,10 @@ struct CleanFixedPoint {
             put(gamma, g[row]);
             put(node_time, h * K::c[row + 1]);
             put(weight, i < m ? impulse[i + 1] : real(0));
-            real sum = real(0), extrapolated[s] = {};
-            for (int j = 0; j < m; ++j) {
-                const real stage = impulse[j + 1] * e[row * m + j];
-                put(eta[j], e[row * m + j]);
-                sum += stage;
-                for (int l = 0; l < s; ++l) extrapolated[l] += stage * K::E[j * s + l];
-            }
-            put(simple, sum);
-            for (int l = 0; l < s; ++l) put(before[l], extrapolated[l]);
+            for (int j = 0; j < m; ++j) put(eta[j], e[row * m + j]);
+            // Where iterations begin need not be on the grid.
+            put(simple, -h * h * stage_coefficients<K>.sum[row]);
+            for (int l = 0; l < s; ++l) put(before[l], -h * h * stage_coefficients<K>.before[row][l]);
         }
         return Status::ok;
     }
@@ -221,10 +218,10 @@ struct CleanFixedPoint {
             ++evaluations;
             const Change<real> change = iterate(q, q_rest, a);
             increment = change.size;
-            if (change.none || (change.back && change.own <= noise)) return true;
-            noisy += change.own <= noise ? 1 : 0;
+            if (change.none || (change.back && rule.is_noise(change.own))) return true;
+            noisy += rule.is_noise(change.own) ? 1 : 0;
             if (noisy > patience) return true;  // in a longer cycle
-            if (evaluations > 3 && change.size > noise && !(change.size < real(0.8) * last)) return false;
+            if (evaluations > rule.judged_after && !rule.contracts(change.size, last)) return false;
             last = change.size;
         }
         return false;
