@@ -245,9 +245,9 @@ times (no vector registers) and gives three more digits; __float128 is for refer
 
 `lobatto tune` chooses in double precision, since that is what `lobatto run` computes in: below some 1e-14 it says what is the least, and that `lobatto tradeoff` and `lobatto emit --precision` have more digits.
 
-## The error that a run estimates
+## The error of a run
 
-`lobatto run` says what the error probably is, and `lobatto tradeoff` calibrates another estimate: [how, and how well](estimate.md).
+`lobatto run` measures its error, by a second run beside it: [how, and how well](errors.md).
 )",
         fmt::arg("head", head), fmt::arg("winners", tables.winners), fmt::arg("pictures", tables.pictures),
         fmt::arg("long_steps", fmt::join(long_steps, " | ")), fmt::arg("dashes", dashes),

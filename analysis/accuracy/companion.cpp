@@ -18,8 +18,8 @@ constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for it
 constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
 constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
 constexpr int most_coupled = 16;               // coordinates of which that is looked for
-constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
-constexpr double by_chance = 0.1;   // of the amplitude: errors that grow exponentially do not come back from beyond it
+constexpr double graded = 8;       // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double by_chance = 0.1;  // of the amplitude: what is apart by more may meet again, and is no small error then
 constexpr double exponential = 30;  // times more than errors that grow with the square of the time
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -277,6 +277,10 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     MeasuredError error;
     error.companion_stopped = stopped_;
     std::vector<std::pair<double, double>> course;  // time, largest error until then
+    struct {
+        double end = 0, absolute = 0;
+        std::size_t coordinate = 0;
+    } worst;
     const std::size_t count = std::min(run_.size(), companion_.size());
     for (std::size_t j = 0; j < count; ++j) {
         const Segment part = segment(j);
@@ -294,6 +298,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
             error.coordinate = i;
             error.absolute = of_run * difference;
         }
+        if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
         error.largest = std::fmax(error.largest, error.end);
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
         if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, run_[j].row);
@@ -318,6 +323,13 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
         const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
         lose(error, request_.time + static_cast<double>(point.steps) * request_.step, point.row);
+    }
+    // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
+    // difference is what is known.
+    if (error.largest > by_chance) {
+        error.end = worst.end;
+        error.absolute = worst.absolute;
+        error.coordinate = worst.coordinate;
     }
     error.at_end = error.end;
     if (!error.complete && !course.empty()) {

@@ -17,14 +17,13 @@ constexpr int looks = 16, closer = 60;   // at the way of a step; then golden se
 constexpr double golden = 0.6180339887498949;
 
 // Of the `every` states from `state` on, the one from which a step goes furthest.
-template <class real>
-std::vector<real> before_furthest(LoadedStepper<real>& stepper, const std::vector<real>& state, std::int64_t every,
-                                  const std::vector<double>& scale) {
-    std::vector<real> furthest = state, here = state;
+std::vector<double> before_furthest(LoadedStepper<double>& stepper, const std::vector<double>& state,
+                                    std::int64_t every, const std::vector<double>& scale) {
+    std::vector<double> furthest = state, here = state;
     if (every == 1 || start_at(stepper, state) != LOBATTO_OK) return furthest;
     double largest = 0;
     for (std::int64_t i = 0; i < every; ++i) {
-        const std::vector<real> next = state_after(stepper, 1);
+        const std::vector<double> next = state_after(stepper, 1);
         if (next.empty()) break;
         if (const double moved = distance(next, here, scale); moved > largest) {
             largest = moved;
@@ -35,25 +34,32 @@ std::vector<real> before_furthest(LoadedStepper<real>& stepper, const std::vecto
     return furthest;
 }
 
+// After `steps` steps from each state; empty where one fails.
+States<double> ends_of(LoadedStepper<double>& stepper, const States<double>& states, std::int64_t steps) {
+    States<double> ends(states.size());
+    for (std::size_t i = 0; i < states.size(); ++i)
+        if (start_at(stepper, states[i]) == LOBATTO_OK) ends[i] = state_after(stepper, steps);
+    return ends;
+}
+
 // Whether on the straight way from one state to the next a velocity or a force is far larger than at both ends and in
 // between: a singularity, or a barrier, that no node of the step has met.
-template <class real>
-bool jumps_over(LoadedStepper<real>& stepper, const std::vector<real>& from, const std::vector<real>& to, real step,
-                const std::vector<double>& scale) {
+bool jumps_over(LoadedStepper<double>& stepper, const std::vector<double>& from, const std::vector<double>& to,
+                double step, const std::vector<double>& scale) {
     const std::size_t n = from.size() / 2;
     if (n > spike_limit) return false;
     // |q'|, |p'| at a part of the way; nothing where there are none.
     const auto rates = [&](double part) {
-        std::vector<real> q(n), p(n), v, Lv, Lq;
+        std::vector<double> q(n), p(n), v, Lv, Lq;
         const auto between = [&](std::size_t k) {
-            return from[1 + k] + static_cast<real>(part) * (to[1 + k] - from[1 + k]);
+            return from[1 + k] + static_cast<double>(part) * (to[1 + k] - from[1 + k]);
         };
         for (std::size_t k = 0; k < n; ++k) q[k] = between(k), p[k] = between(n + k);
         std::vector<double> sizes;
         if (stepper.velocity(from[0], q, p, v) != LOBATTO_OK) return sizes;
         stepper.slopes(from[0], q, v, Lv, Lq);
-        for (const std::vector<real>* part_of : {&v, &Lq})
-            for (const real rate : *part_of) sizes.push_back(std::fabs(static_cast<double>(rate)));
+        for (const std::vector<double>* part_of : {&v, &Lq})
+            for (const double rate : *part_of) sizes.push_back(std::fabs(static_cast<double>(rate)));
         return sizes;
     };
     const std::vector<double> first = rates(0), last = rates(1);
@@ -65,8 +71,7 @@ bool jumps_over(LoadedStepper<real>& stepper, const std::vector<real>& from, con
     }
     for (std::size_t k = 0; k < 2 * n; ++k) {
         if (std::isinf(scale[k])) continue;
-        const double mean = std::fabs(static_cast<double>((to[1 + k] - from[1 + k]) / step)),
-                     ordinary = std::max({first[k], last[k], mean});
+        const double mean = std::fabs((to[1 + k] - from[1 + k]) / step), ordinary = std::max({first[k], last[k], mean});
         const auto most =
             std::max_element(inside.begin(), inside.end(), [k](const auto& x, const auto& y) { return x[k] < y[k]; });
         if (!((*most)[k] > 2 * ordinary)) continue;
@@ -84,14 +89,12 @@ bool jumps_over(LoadedStepper<real>& stepper, const std::vector<real>& from, con
 
 }  // namespace
 
-template <class real>
-HardestSteps<real>::HardestSteps() : places_(2 * shared + 1) {}
+HardestSteps::HardestSteps() : places_(2 * shared + 1) {}
 
-template <class real>
-void HardestSteps<real>::observe(const std::vector<real>& state, real energy) {
+void HardestSteps::observe(const std::vector<double>& state, double energy) {
     const std::size_t n = state.size() / 2;
-    const auto consider = [&](std::size_t place, real change) {
-        if (change < real(0)) change = -change;
+    const auto consider = [&](std::size_t place, double change) {
+        if (change < 0) change = -change;
         if (change > places_[place].change) places_[place] = {change, before_};
     };
     if (!before_.empty()) {
@@ -105,9 +108,8 @@ void HardestSteps<real>::observe(const std::vector<real>& state, real energy) {
     energy_before_ = energy;
 }
 
-template <class real>
-States<real> HardestSteps<real>::states() const {
-    States<real> states;
+States<double> HardestSteps::states() const {
+    States<double> states;
     for (const Place& place : places_)
         if (!place.state.empty()) states.push_back(place.state);
     std::sort(states.begin(), states.end());
@@ -115,22 +117,20 @@ States<real> HardestSteps<real>::states() const {
     return states;
 }
 
-template <class real>
-std::vector<real> HardestSteps<real>::save() const {
+std::vector<double> HardestSteps::save() const {
     if (before_.empty()) return {};
-    std::vector<real> all = before_;
+    std::vector<double> all = before_;
     all.push_back(energy_before_);
     for (std::size_t i = 0; i < places_.size(); ++i) {
         if (places_[i].state.empty()) continue;
-        all.push_back(static_cast<real>(i));
+        all.push_back(static_cast<double>(i));
         all.push_back(places_[i].change);
         all.insert(all.end(), places_[i].state.begin(), places_[i].state.end());
     }
     return all;
 }
 
-template <class real>
-void HardestSteps<real>::restore(const std::vector<real>& seen, std::size_t columns) {
+void HardestSteps::restore(const std::vector<double>& seen, std::size_t columns) {
     if (seen.empty()) return;
     const auto width = static_cast<std::ptrdiff_t>(columns);
     auto at = seen.begin();
@@ -140,40 +140,28 @@ void HardestSteps<real>::restore(const std::vector<real>& seen, std::size_t colu
         places_[static_cast<std::size_t>(at[0])] = {at[1], {at + 2, at + 2 + width}};
 }
 
-template <class real>
-SingleSteps single_steps(LoadedStepper<real>& stepper, const States<real>& states, std::int64_t every, real end,
-                         const std::vector<real>& parameters, real step, const std::vector<double>& scale) {
+std::optional<double> first_unresolved(LoadedStepper<double>& stepper, const States<double>& states, std::int64_t every,
+                                       double end, const std::vector<double>& parameters, double step,
+                                       const std::vector<double>& scale) {
     const double work = static_cast<double>(every) * static_cast<double>(states.size() * scale.size());
-    States<real> hardest = states;
+    States<double> hardest = states;
     if (every > 1 && work <= step_work)
-        for (std::vector<real>& state : hardest) {
-            const std::int64_t left = std::llround(static_cast<double>((end - state[0]) / step));
+        for (std::vector<double>& state : hardest) {
+            const std::int64_t left = std::llround((end - state[0]) / step);
             state = before_furthest(stepper, state, std::min(every, left), scale);
         }
-    SingleSteps seen;
-    const std::vector<Halved<real>> steps = halved(stepper, hardest, parameters, step, scale);
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-        const Halved<real>& one = steps[i];
-        if (one.end.empty()) continue;
-        seen.error = std::fmax(seen.error, std::fmin(1, one.difference));
-        if (!seen.unresolved && (!(one.difference <= grossly * distance(one.end, hardest[i], scale)) ||
-                                 jumps_over(stepper, hardest[i], one.end, step, scale)))
-            seen.unresolved = static_cast<double>(hardest[i][0]);
+    const States<double> whole = ends_of(stepper, hardest, 1);
+    if (stepper.prepare(parameters, step / 2) != LOBATTO_OK) return {};
+    const States<double> halved = ends_of(stepper, hardest, 2);
+    stepper.prepare(parameters, step);
+    for (std::size_t i = 0; i < hardest.size(); ++i) {
+        if (whole[i].empty()) continue;
+        const double difference = halved[i].empty() ? HUGE_VAL : distance(halved[i], whole[i], scale);
+        if (!(difference <= grossly * distance(whole[i], hardest[i], scale)) ||
+            jumps_over(stepper, hardest[i], whole[i], step, scale))
+            return hardest[i][0];
     }
-    return seen;
+    return {};
 }
-
-template class HardestSteps<float>;
-template class HardestSteps<double>;
-template class HardestSteps<long double>;
-template class HardestSteps<__float128>;
-template SingleSteps single_steps(LoadedStepper<float>&, const States<float>&, std::int64_t, float,
-                                  const std::vector<float>&, float, const std::vector<double>&);
-template SingleSteps single_steps(LoadedStepper<double>&, const States<double>&, std::int64_t, double,
-                                  const std::vector<double>&, double, const std::vector<double>&);
-template SingleSteps single_steps(LoadedStepper<long double>&, const States<long double>&, std::int64_t, long double,
-                                  const std::vector<long double>&, long double, const std::vector<double>&);
-template SingleSteps single_steps(LoadedStepper<__float128>&, const States<__float128>&, std::int64_t, __float128,
-                                  const std::vector<__float128>&, __float128, const std::vector<double>&);
 
 }  // namespace lobatto

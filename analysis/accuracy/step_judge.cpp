@@ -136,11 +136,9 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
         const double way = (most_[k] - least_[k]) / 2, place = std::max(std::fabs(most_[k]), std::fabs(least_[k]));
         if (!(way > still * place)) moving[k] = moving[n + k] = std::numeric_limits<double>::infinity();
     }
-    const SingleSteps single =
-        single_steps(stepper, hardest_.states(), request.every, result.time, request.parameters, request.step, moving);
-    if (single.unresolved)
-        judgement.unresolved = {1 + std::llround((*single.unresolved - request.time) / request.step),
-                                *single.unresolved};
+    const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,
+                                                              request.parameters, request.step, moving);
+    if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};
     return judgement;
 }
 

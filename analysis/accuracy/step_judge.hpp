@@ -49,7 +49,7 @@ private:
         std::vector<double> row;  // t, q, p
     };
     std::map<std::uint64_t, State> some_;  // by a scrambled number: those with the smallest
-    HardestSteps<double> hardest_;
+    HardestSteps hardest_;
     std::int64_t seen_ = 0;
     void keep(std::int64_t number, std::vector<double> row);
 };

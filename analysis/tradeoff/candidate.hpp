@@ -69,9 +69,6 @@ struct Measurement {
     double drift = 0;            // the slope of a straight line through it, per unit of time
     double momentum_error = 0;   // the largest change of a conserved momentum; not a number where none is known
     double defect = 0;           // symplectic, of the first step; not a number where it is not promised or left out
-    double jump = 0;             // between the polynomials of neighbouring steps (Evidence); 0: none
-    double growth = 0;           // how many times further apart than at the start a neighbour gets; 0: not looked at
-    double estimate = 0;         // of the error, as `lobatto run` finds it (ErrorEstimate); 0: none
     double seconds = 0;          // of processor time, for the whole motion
     double iterations = 0;       // a step
     double gradients = 0;        // of V, or of L, for the whole motion

@@ -14,16 +14,13 @@ namespace lobatto {
 namespace {
 
 using Column = std::pair<const char*, double Measurement::*>;
-constexpr std::array<Column, 14> columns = {{{"error_end", &Measurement::error_end},
+constexpr std::array<Column, 11> columns = {{{"error_end", &Measurement::error_end},
                                              {"error", &Measurement::error},
                                              {"reaches", &Measurement::reaches},
                                              {"energy_error", &Measurement::energy_error},
                                              {"drift", &Measurement::drift},
                                              {"momentum_error", &Measurement::momentum_error},
                                              {"symplectic_defect", &Measurement::defect},
-                                             {"polynomial_jump", &Measurement::jump},
-                                             {"growth", &Measurement::growth},
-                                             {"estimated_error", &Measurement::estimate},
                                              {"seconds", &Measurement::seconds},
                                              {"iterations", &Measurement::iterations},
                                              {"gradients", &Measurement::gradients},

@@ -6,10 +6,8 @@
 #include <ctime>
 #include <limits>
 #include <numeric>
-#include <set>
 #include <string>
 
-#include "analysis/accuracy/hardest_steps.hpp"
 #include "analysis/gradients.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/measure/extrapolation.hpp"
@@ -18,10 +16,8 @@ namespace lobatto {
 
 namespace {
 
-constexpr double lost = 0.01;           // of the amplitude: the motion is another one
-constexpr std::int64_t energies = 128;  // samples at which the energy is looked at
-constexpr int estimate_states = 64;     // that the estimate looks at
-constexpr double golden = 0.6180339887498949;
+constexpr double lost = 0.01;            // of the amplitude: the motion is another one
+constexpr std::int64_t energies = 128;   // samples at which the energy is looked at
 constexpr std::int64_t looks = 1500;     // steps whose error is looked at
 constexpr int defect_limit = 32;         // coordinates; tangent maps of more take long
 constexpr double timing_seconds = 4e-3;  // of repetitions in all
@@ -226,38 +222,6 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
     run.stepper.prepare(run.start.parameters, run.h);
     if (kernel->has_tangent != 0 && static_cast<int>(n) <= defect_limit && conserves_ && candidate.tolerance == 0)
         result.defect = static_cast<double>(symplectic_defect(run.stepper, run.start.q, run.start.p));
-    // As `lobatto run` does it: the start and some other states, at distances that do not go along with the motion's
-    // own.
-    run.stepper.prepare(run.start.parameters, run.h);
-    std::set<std::int64_t> places = {0};
-    for (int i = 1; i < estimate_states; ++i)
-        places.insert(static_cast<std::int64_t>(std::fmod(i * golden, 1.0) * static_cast<double>(run.meetings + 1)));
-    States<real> states;
-    const auto row_at = [&](std::int64_t meeting) {
-        state_at(meeting);
-        std::vector<real> row{run.h * static_cast<real>(meeting * run.every)};
-        for (const auto* part : {&q, &p})
-            for (const Wide value : *part) row.push_back(static_cast<real>(value));
-        return row;
-    };
-    for (const std::int64_t meeting : places) states.push_back(row_at(meeting));
-    const std::pair kind(candidate.member.family, candidate.member.points);
-    if (estimates_.count(kind) == 0) estimates_.emplace(kind, quadrature_of(candidate.member.method()));
-    const ErrorEstimate& estimate = estimates_.at(kind);
-    const bool energy_tells = conserves_ && candidate.member.family == Family::lobatto;
-    Evidence evidence = evidence_of(
-        run.stepper, states, run.start.parameters, run.h, reference_.scale, error_power(candidate.member.method()),
-        conserves_ ? energies_of(run.stepper, states) : std::vector<double>(), energy_tells);
-    HardestSteps<real> hardest;
-    for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) hardest.observe(row_at(meeting), std::nanf(""));
-    evidence.certain = std::fmax(
-        evidence.certain, single_steps(run.stepper, hardest.states(), run.every, static_cast<real>(reference_.until),
-                                       run.start.parameters, run.h, reference_.scale)
-                              .error);
-    result.jump = evidence.jump;
-    result.growth = evidence.growth;
-    result.estimate = std::fmin(1, estimate.after(static_cast<double>(candidate.steps), reference_.until, evidence,
-                                                  rounding_of(candidate.member.precision) + candidate.tolerance));
     return result;
 }
 

@@ -2,12 +2,10 @@
 // A candidate, run and compared with the reference.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "analysis/accuracy/error_estimate.hpp"
 #include "analysis/exact_start.hpp"
 #include "analysis/tradeoff/candidate.hpp"
 #include "analysis/tradeoff/reference.hpp"
@@ -29,7 +27,7 @@ public:
     Measurer(const Reference& reference, const ExactStart& start, Kernel exact, bool conserves,
              const volatile int* interrupted);
 
-    // Errors and time. With `all` also energy, momenta, drift, defect and estimate, which take a moment longer.
+    // Errors and time. With `all` also energy, momenta, drift and defect, which take a moment longer.
     Measurement measure(const Kernel& kernel, const Candidate& candidate, bool all) const;
     // The largest error at the candidate's own steps, some 1500 of them, against explicit extrapolation that lands on
     // each; infinite when either fails. Between the samples of the reference the error may be larger than at them.
@@ -59,7 +57,6 @@ private:
     bool conserves_;
     const volatile int* interrupted_;
     std::vector<Symmetry> symmetries_;
-    mutable std::map<std::pair<Family, int>, ErrorEstimate> estimates_;  // made when first needed
 };
 
 }  // namespace lobatto

@@ -75,7 +75,6 @@ void tradeoff(const TradeoffOptions& options) {
     write(folder + "/tradeoff.csv", csv_of(experiment));
     const std::string json = json_of(experiment);
     write(folder + "/tradeoff.json", json);
-    fmt::print("\n{}", calibration_text(calibration_of(experiment)));
     if (!interrupted) {
         const std::vector<std::string> pictures = draw_pictures(experiment, folder);
         write(folder + "/report.html", report_page(experiment, folder, pictures, json));

@@ -52,12 +52,6 @@ std::vector<Measurement> front_rows_of(const Experiment& experiment) {
     return rows;
 }
 
-Calibration calibration_of(const Experiment& experiment) {
-    std::vector<Measurement> measurements;
-    for (const auto& [key, m] : experiment.store().all()) measurements.push_back(m);
-    return calibrate(telling(measurements, std::fmax(1e-12, 100 * experiment.reference().disagreement.back())));
-}
-
 std::string front_table(const Experiment& experiment) {
     const double until = experiment.until();
     const auto optional = [](double value) {
@@ -91,13 +85,6 @@ std::string json_of(const Experiment& experiment) {
     nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
     for (const auto& [key, m] : experiment.store().all()) measurements.push_back(json_of(m));
     for (const Measurement& m : pareto_front(experiment)) front.push_back(json_of(m));
-    nlohmann::ordered_json calibration = nlohmann::ordered_json::array();
-    for (const Calibration::Law& law : calibration_of(experiment).laws)
-        calibration.push_back({{"family", word_of(law.member.family)},
-                               {"points", law.member.points},
-                               {"factor", law.factor},
-                               {"power", law.power},
-                               {"runs", law.runs}});
     const nlohmann::ordered_json json = {{"scene", experiment.scene().name},
                                          {"title", experiment.scene().title},
                                          {"until", experiment.until()},
@@ -109,7 +96,6 @@ std::string json_of(const Experiment& experiment) {
                                            {"samples", reference.samples},
                                            {"frequency", reference.frequency}}},
                                          {"chaotic", experiment.is_chaotic()},
-                                         {"calibration", calibration},
                                          {"front", front},
                                          {"measurements", measurements}};
     return json.dump(1) + '\n';

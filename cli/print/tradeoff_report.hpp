@@ -5,16 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "analysis/tradeoff/calibration.hpp"
 #include "analysis/tradeoff/experiment.hpp"
 
 namespace lobatto {
 
 // What is to be said before any number: what the errors are errors of.
 std::string reference_text(const Experiment& experiment);
-
-// How the estimates of the error follow the true one here.
-Calibration calibration_of(const Experiment& experiment);
 
 // Pareto's front, thinned to about two rows a decade.
 std::vector<Measurement> front_rows_of(const Experiment& experiment);

@@ -14,10 +14,8 @@
 #include <set>
 #include <thread>
 
-#include "analysis/accuracy/error_estimate.hpp"
 #include "analysis/kernel_of.hpp"
 #include "analysis/stability/limit.hpp"
-#include "analysis/tradeoff/calibration.hpp"
 #include "analysis/tradeoff/experiment.hpp"
 #include "analysis/tradeoff/measurement_json.hpp"
 #include "analysis/tradeoff/measurement_store.hpp"
@@ -138,36 +136,6 @@ TEST_CASE("numbers of steps meet the samples of a reference often") {
         CHECK(static_cast<double>(ladder.next(steps)) <= 1.35 * static_cast<double>(steps) + 1);
         CHECK(ladder.at_most(static_cast<double>(steps)) == steps);
     }
-}
-
-TEST_CASE(
-    "of an oscillation the polynomials' jump has the order of the polynomials, the phase error that of the method") {
-    for (const int points : {3, 4, 6}) {
-        const ErrorEstimate estimate(lobatto_with(points));
-        const double z = 0.2;
-        // Measured: 2.99, 4.01, 6.01 and 5.01, 7.00, 11.0.
-        CHECK(std::log2(estimate.jump(2 * z) / estimate.jump(z)) == doctest::Approx(points).epsilon(0.03));
-        CHECK(std::log2(estimate.phase(4 * z) / estimate.phase(2 * z)) ==
-              doctest::Approx(2 * points - 1).epsilon(0.03));
-        // From the jump back to the error that goes with it.
-        CHECK(estimate.of_oscillation(1000, estimate.jump(4 * z)) ==
-              doctest::Approx(1000 * estimate.phase(4 * z)).epsilon(1e-6));
-    }
-    const ErrorEstimate estimate(lobatto_with(4));
-    // The phase error of order 22 at z = 1/10 is 2.5e-53, from docs/stability.md; far below rounding.
-    CHECK(ErrorEstimate(lobatto_with(12)).phase(0.1) ==
-          doctest::Approx(1e-23 / 4.01210477187192350504e29).epsilon(0.01));
-    CHECK(estimate.of_oscillation(10, 1e9) == 0);  // no oscillation jumps so far
-    CHECK(estimate.of_oscillation(10, 0) == 0);
-    // The larger of two laws; further where neighbours part faster than in proportion to time.
-    const double jump = estimate.jump(0.5), by_jump = 100 * estimate.phase(0.5);
-    CHECK(estimate.after(100, 50, {jump, 0, 2, 0, 0, 0}) == doctest::Approx(by_jump).epsilon(1e-6));
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 0}) == doctest::Approx(0.25 * 1e-2 * 2 * 50).epsilon(1e-12));
-    CHECK(estimate.after(100, 50, {jump, 0, 2, 1e-2, 0, 0}) == doctest::Approx(1).epsilon(1e-12));
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0.3, 0}) == 0.3);
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 99}) == estimate.after(100, 50, {jump, 1e-2, 2, 0, 0}));
-    CHECK(estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 300}) ==
-          doctest::Approx(3 * estimate.after(100, 50, {jump, 1e-2, 2, 0, 0, 0})).epsilon(1e-12));
 }
 
 TEST_CASE("explicit extrapolation follows the pendulum to 1e-15, and its frequency at rest is that of small swings") {
@@ -389,99 +357,7 @@ TEST_CASE("run warns beyond the linear stability limit") {
             .err == "");
 }
 
-// The largest and the least of true error over estimate, of some members with some steps.
-struct Ratios {
-    double least = 1e300, most = 0;
-    int runs = 0;
-};
-
-Ratios ratios_on(const std::string& name, const std::vector<Member>& members) {
-    const Scene scene = read_scene(LOBATTO_SOURCE_DIR "/scenes/" + name + ".toml");
-    ExperimentRequest wish;
-    wish.seconds = 120;
-    wish.wanted = 1e-10;
-    wish.first = members;
-    Experiment experiment(derive(scene), scene, wish);
-    const double until = experiment.until(), omega = experiment.reference().frequency;
-    const StepLadder ladder(experiment.reference().samples, 1.1);
-    Ratios ratios;
-    for (const Member& member : members)
-        for (const double radians : {2.0, 1.0, 0.5, 0.25, 0.1}) {
-            const Measurement m = experiment.measure({member, ladder.at_least(until * omega / radians), 0});
-            if (!m.complete || m.growth == 0) continue;
-            if (!(m.error > std::fmax(1e-11, 100 * experiment.reference().disagreement.back()) && m.error < 0.1))
-                continue;
-            CAPTURE(name);
-            CAPTURE(m.candidate.name());
-            CAPTURE(m.candidate.steps);
-            CAPTURE(m.error);
-            CAPTURE(m.estimate);
-            ratios.least = std::min(ratios.least, m.error / m.estimate);
-            ratios.most = std::max(ratios.most, m.error / m.estimate);
-            ++ratios.runs;
-        }
-    return ratios;
-}
-
-TEST_CASE("the error that a run estimates is near the true one, on regular and chaotic motions and with forces") {
-    const Place place;
-    const Member verlet{Family::lobatto, 2}, eight{Family::lobatto, 8}, gauss{Family::gauss, 3};
-    // Measured: 0.4 ... 1.9, 0.02 ... 0.9, 0.4 ... 20.
-    for (const auto& example : std::map<std::string, std::vector<Member>>{
-             {"henon_heiles", {verlet, eight}}, {"double_pendulum", {eight}}, {"driven_damped_pendulum", {gauss}}}) {
-        const Ratios ratios = ratios_on(example.first, example.second);
-        CAPTURE(example.first);
-        CHECK(ratios.runs >= 2);
-        CHECK(ratios.least > 1e-3);
-        CHECK(ratios.most < 1e2);
-    }
-}
-
-TEST_CASE("a calibration finds the factor of each member, and leaves out what rounding hides") {
-    std::vector<Measurement> measurements;
-    const auto add = [&](const Member& member, double factor, std::int64_t steps, double jump) {
-        Measurement m;
-        m.complete = true;
-        m.candidate = {member, steps, 0};
-        m.jump = jump;
-        m.error = factor * static_cast<double>(steps) * std::pow(jump, error_power(member.method()));
-        m.estimate = m.error / 2;
-        measurements.push_back(m);
-    };
-    for (const double jump : {1e-3, 1e-4, 1e-5}) {
-        add({Family::lobatto, 4}, 0.5, 100, jump);
-        add({Family::gauss, 2}, 7, 100, jump);
-    }
-    add({Family::gauss, 3}, 1, 100, 1e-3);   // one run is no calibration
-    add({Family::gauss, 4}, 1, 100, 1e-10);  // rounding, which hides all below 30 times as much
-    CHECK(error_power({Family::lobatto, 4, 0}) == 7.0 / 4);
-    CHECK(error_power({Family::gauss, 2, 0}) == 5.0 / 3);
-    const Calibration calibration = calibrate(telling(measurements, 1e-12));
-    REQUIRE(calibration.laws.size() == 2);
-    CHECK(calibration.laws[0].factor == doctest::Approx(0.5));
-    CHECK(calibration.laws[1].factor == doctest::Approx(7));
-    CHECK(calibration.by_run.front() == doctest::Approx(2));
-    for (const double ratio : calibration.by_laws) CHECK(ratio == doctest::Approx(1));
-    CHECK(telling(measurements, 1e-13).size() == 7);
-    measurements.back().error *= 1e8;
-    CHECK(telling(measurements, 1e-13).size() < 7);
-}
-
 TEST_SUITE("slow") {
-    TEST_CASE(
-        "over the library no run that keeps what is asked for is warned of, and none that misses it by 1e6 is not") {
-        const Place place;
-        const Member eight{Family::lobatto, 8}, three{Family::lobatto, 3};
-        // Of these members and steps; docs/estimate.md has all.
-        bool turn = false;
-        for (const char* const name :
-             {"arenstorf", "coupled_oscillators", "figure_eight", "fput_beta", "harmonic_oscillator", "kepler",
-              "lagrange_top", "magnetic_bottle", "mathews_lakshmanan", "morse", "pendulum", "relativistic_oscillator",
-              "spherical_pendulum", "stiff_fput", "swinging_atwood", "swinging_spring", "toda_lattice",
-              "triple_pendulum", "two_pendulums"})
-            ratios_on(name, {(turn = !turn) ? three : eight});
-    }
-
     TEST_CASE("a chaotic motion is not promised further than it is known") {
         const Place place;
         test::Finished refused;
