@@ -35,10 +35,13 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
         throw ComputationError(fmt::format(
             "an error of {:.2g} cannot be promised to t = {:.6g}: there two references in {} differ by {:.1g}. {}",
             request.error, reference.until, precision_name(reference.precision), uncertainty,
-            known > 0 ? fmt::format("The motion is chaotic, or needs more time (--budget). They agree to t = {:.4g}: "
-                                    "try --until {:.4g}",
-                                    known, known)
-                      : std::string("Give more time with --budget")));
+            (reference.is_late
+                 ? fmt::format("The {:.3g} s of the budget do not make them better: give more with --budget",
+                               request.seconds)
+                 : std::string("It is their rounding, which the motion makes so large: it is chaotic, or "
+                               "comes near a singularity")) +
+                (known > 0 ? fmt::format(". They agree to t = {:.4g}: try --until {:.4g}", known, known)
+                           : std::string())));
     }
     // Between the samples of the reference the error may be larger: then a smaller one is aimed at.
     Search found;
@@ -62,7 +65,7 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
             throw ComputationError(fmt::format(
                 "nothing could be measured within {:.3g} s; give more time with --budget", request.seconds));
         throw ComputationError(fmt::format(
-            "an error of {:.2g} to t = {:.6g} is not reached: {:.1g} is the least of the {} members of the family that "
+            "an error of {:.2g} to t = {:.6g} is not reached: {:.2g} is the least of the {} members of the family that "
             "were "
             "tried in double precision{}. Ask for a larger error or an earlier end; `lobatto tradeoff` measures long "
             "double "

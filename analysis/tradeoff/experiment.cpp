@@ -76,20 +76,30 @@ Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequ
     wish.wanted = request_.wanted;
     wish.groups = amplitude_groups(scene_);
     wish.interrupted = request_.interrupted;
-    const auto compute = [&] {
-        request_.say("compiling the reference in " + precision_name(reference.precision));
+    const auto compute = [&](Precision precision) {
+        reference.precision = precision;
+        request_.say("compiling the reference in " + precision_name(precision));
         const Kernel exact = kernels_.kernel(reference);
-        request_.say("computing the reference in " + precision_name(reference.precision));
+        request_.say("computing the reference in " + precision_name(precision));
         wish.seconds_limit = reference_share * std::max(left(), request_.seconds / 4);
         reference_ = compute_reference(exact, start_, wish);
         measurer_.emplace(reference_, start_, exact, conserves_, request_.interrupted);
     };
+    const Precision first = reference.precision;
     try {
-        compute();
+        compute(first);
     } catch (const TooSlow&) {
-        if (reference.precision == Precision::extended) throw;
-        reference.precision = Precision::extended;
-        compute();
+        if (first == Precision::extended) throw;
+        compute(Precision::extended);
+        reference_.is_late = true;
+    }
+    // What rounding has grown to: with more digits, if there is the time.
+    if (first == Precision::extended && reference_.disagreement.back() > request_.wanted && !reference_.is_late) {
+        try {
+            compute(Precision::quadruple);
+        } catch (const TooSlow&) {
+            reference_.is_late = true;
+        }
     }
 }
 

@@ -77,6 +77,27 @@ struct TimedRun {
         }
         if (written < meetings && status == LOBATTO_OK) status = LOBATTO_NOT_FINITE;
     }
+
+    // Where it was at a meeting; 0: at the start.
+    double time(std::int64_t meeting, const Reference& reference) const {
+        return reference.until * static_cast<double>(meeting) / static_cast<double>(meetings);
+    }
+    template <class Wide>
+    std::vector<Wide> positions(std::int64_t meeting) const {
+        return meeting == 0 ? std::vector<Wide>(start.q.begin(), start.q.end()) : part<Wide>(meeting, 0);
+    }
+    template <class Wide>
+    std::vector<Wide> momenta(std::int64_t meeting) const {
+        return meeting == 0 ? std::vector<Wide>(start.p.begin(), start.p.end()) : part<Wide>(meeting, 1);
+    }
+
+private:
+    template <class Wide>
+    std::vector<Wide> part(std::int64_t meeting, std::size_t number) const {
+        const std::size_t n = start.q.size();
+        const real* const first = rows.data() + static_cast<std::size_t>(meeting - 1) * (1 + 2 * n) + 1 + number * n;
+        return std::vector<Wide>(first, first + n);
+    }
 };
 
 // The slope of the straight line of least squares.
@@ -90,6 +111,97 @@ double slope_of(const std::vector<double>& x, const std::vector<double>& y) {
         xy += (x[i] - mean_x) * (y[i] - mean_y);
     }
     return xx > 0 ? xy / xx : 0;
+}
+
+// The errors of states at the samples that the run meets.
+template <class real>
+void compare_with_reference(const TimedRun<real>& run, const Reference& reference, Measurement& result,
+                            Measurer::Course* course) {
+    using Wide = std::conditional_t<std::is_same_v<real, float>, double, real>;
+    const std::size_t n = reference.n, columns = 1 + 2 * n;
+    const auto error_at = [&](std::int64_t meeting) {
+        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
+        const auto sample = static_cast<std::size_t>(meeting * reference.samples / run.meetings);
+        const double* const high = reference.high.data() + sample * 2 * n;
+        const double* const low = reference.low.data() + sample * 2 * n;
+        double worst = 0;
+        for (std::size_t k = 0; k < 2 * n; ++k) {
+            const Wide difference =
+                (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
+            const double error = std::fabs(static_cast<double>(difference)) / reference.scale[k];
+            if (!(error <= worst)) worst = error;
+        }
+        return worst;
+    };
+    result.reaches = reference.until;
+    bool is_lost = false;
+    for (std::int64_t meeting = 1; meeting <= run.meetings; ++meeting) {
+        const double error = error_at(meeting);
+        if (!(error <= result.error)) result.error = error;
+        result.error_end = error;
+        if (!is_lost && !(error < lost)) {
+            is_lost = true;
+            result.reaches = run.time(meeting - 1, reference);
+        }
+        if (course != nullptr) {
+            course->time.push_back(run.time(meeting, reference));
+            course->error.push_back(error);
+        }
+    }
+    if (!std::isfinite(result.error)) result.complete = false;
+}
+
+// The energy in the reference's precision, of the start as rounded and of the states as they are. `exact`: a kernel of
+// the system in that precision.
+template <class Exact, class real>
+void look_at_energy(const TimedRun<real>& run, const Reference& reference, const Kernel& exact,
+                    const ExactStart& exact_start, Measurement& result, Measurer::Course* course) {
+    LoadedStepper<Exact> stepper(exact);
+    const StartIn<Exact> start = start_in<Exact>(exact_start, exact, static_cast<Exact>(run.h));
+    stepper.prepare(start.parameters, static_cast<Exact>(run.h));
+    std::vector<double> times, errors;
+    Exact first = 0;
+    const std::int64_t every = std::max<std::int64_t>(1, run.meetings / (course != nullptr ? run.meetings : energies));
+    for (std::int64_t meeting = 0; meeting <= run.meetings; meeting += every) {
+        const double time = run.time(meeting, reference);
+        Exact energy = 0;
+        if (stepper.energy(static_cast<Exact>(time), run.template positions<Exact>(meeting),
+                           run.template momenta<Exact>(meeting), energy) != LOBATTO_OK)
+            return;
+        if (meeting == 0) first = energy;
+        times.push_back(time);
+        errors.push_back(static_cast<double>(energy - first) / reference.energy_scale);
+    }
+    result.energy_error = 0;
+    for (const double error : errors) result.energy_error = std::max(result.energy_error, std::fabs(error));
+    result.drift = slope_of(times, errors);
+    if (course != nullptr) course->energy.assign(errors.begin() + 1, errors.end());
+}
+
+// Of the momenta that the symmetries conserve, relative to their parts, in quadruple precision.
+template <class real>
+double largest_momentum_error(const TimedRun<real>& run, const std::vector<Symmetry>& symmetries) {
+    using Wide = __float128;
+    double worst = 0;
+    for (const Symmetry& symmetry : symmetries) {
+        Wide first = 0;
+        double largest = 0, size = 0;
+        for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) {
+            const std::vector<Wide> q = run.template positions<Wide>(meeting), p = run.template momenta<Wide>(meeting);
+            const std::size_t n = q.size();
+            Wide momentum = 0;
+            for (std::size_t i = 0; i < n; ++i) {
+                Wide direction = symmetry.d[i];
+                for (std::size_t j = 0; j < n; ++j) direction += static_cast<Wide>(symmetry.B[i * n + j]) * q[j];
+                momentum += p[i] * direction;
+                size = std::max(size, std::fabs(static_cast<double>(p[i] * direction)));
+            }
+            if (meeting == 0) first = momentum;
+            largest = std::max(largest, std::fabs(static_cast<double>(momentum - first)));
+        }
+        if (size > 0) worst = std::max(worst, largest / size);
+    }
+    return worst;
 }
 
 }  // namespace
@@ -111,116 +223,29 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
     result.complete = run.status == LOBATTO_OK;
     result.seconds = run.seconds;
     if (!result.complete) return result;
-    double spent = run.seconds;
-    const std::size_t n = reference_.n, columns = 1 + 2 * n;
-
-    const auto error_at = [&](std::int64_t meeting) {
-        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
-        const auto sample = static_cast<std::size_t>(meeting * reference_.samples / run.meetings);
-        const double* const high = reference_.high.data() + sample * 2 * n;
-        const double* const low = reference_.low.data() + sample * 2 * n;
-        double worst = 0;
-        for (std::size_t k = 0; k < 2 * n; ++k) {
-            using Wide = std::conditional_t<std::is_same_v<real, float>, double, real>;
-            const Wide difference =
-                (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
-            const double error = std::fabs(static_cast<double>(difference)) / reference_.scale[k];
-            if (!(error <= worst)) worst = error;
-        }
-        return worst;
-    };
-    result.reaches = reference_.until;
-    bool is_lost = false;
-    for (std::int64_t meeting = 1; meeting <= run.meetings; ++meeting) {
-        const double error = error_at(meeting);
-        if (!(error <= result.error)) result.error = error;
-        result.error_end = error;
-        const double time = reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings);
-        if (!is_lost && !(error < lost)) {
-            is_lost = true;
-            result.reaches = reference_.until * static_cast<double>(meeting - 1) / static_cast<double>(run.meetings);
-        }
-        if (course != nullptr) {
-            course->time.push_back(time);
-            course->error.push_back(error);
-        }
-    }
-    if (!std::isfinite(result.error)) result.complete = false;
+    compare_with_reference(run, reference_, result, course);
     result.iterations = static_cast<double>(run.iterations) / static_cast<double>(run.steps);
     result.gradients =
         gradients_of(kernel.table(), static_cast<double>(run.iterations), static_cast<double>(run.steps));
     result.energy_error = result.drift = result.momentum_error = result.defect = std::nan("");
     if (!all || !result.complete) return result;
 
+    double spent = run.seconds;
     for (int repetition = 0; repetition < most_repetitions && spent < timing_seconds; ++repetition) {
         const Timing again = time_in<real>(kernel, candidate);
         result.seconds = std::min(result.seconds, again.seconds);
         spent += again.seconds;
     }
-    // Energy and momenta in the reference's precision, of the start as rounded and of the states as they are.
-    using Wide = __float128;
-    std::vector<Wide> q(n), p(n);
-    const auto state_at = [&](std::int64_t meeting) {
-        for (std::size_t k = 0; k < n; ++k) {
-            q[k] = meeting == 0 ? run.start.q[k] : run.rows[static_cast<std::size_t>(meeting - 1) * columns + 1 + k];
-            p[k] =
-                meeting == 0 ? run.start.p[k] : run.rows[static_cast<std::size_t>(meeting - 1) * columns + 1 + n + k];
-        }
-    };
-    const auto energy_of = [&](auto type) {
-        using Exact = decltype(type);
-        LoadedStepper<Exact> stepper(exact_);
-        const StartIn<Exact> exact = start_in<Exact>(start_, exact_, static_cast<Exact>(run.h));
-        stepper.prepare(exact.parameters, static_cast<Exact>(run.h));
-        std::vector<double> times, errors;
-        Exact first = 0;
-        const std::int64_t every =
-            std::max<std::int64_t>(1, run.meetings / (course != nullptr ? run.meetings : energies));
-        for (std::int64_t meeting = 0; meeting <= run.meetings; meeting += every) {
-            state_at(meeting);
-            Exact energy = 0;
-            const double time = reference_.until * static_cast<double>(meeting) / static_cast<double>(run.meetings);
-            if (stepper.energy(static_cast<Exact>(time), std::vector<Exact>(q.begin(), q.end()),
-                               std::vector<Exact>(p.begin(), p.end()), energy) != LOBATTO_OK)
-                return;
-            if (meeting == 0) first = energy;
-            times.push_back(time);
-            errors.push_back(static_cast<double>(energy - first) / reference_.energy_scale);
-        }
-        result.energy_error = 0;
-        for (const double error : errors) result.energy_error = std::max(result.energy_error, std::fabs(error));
-        result.drift = slope_of(times, errors);
-        if (course != nullptr) course->energy.assign(errors.begin() + 1, errors.end());
-    };
     if (conserves_ && reference_.energy_scale > 0) {
         if (reference_.precision == Precision::quadruple)
-            energy_of(__float128());
+            look_at_energy<__float128>(run, reference_, exact_, start_, result, course);
         else
-            energy_of(static_cast<long double>(0));
+            look_at_energy<long double>(run, reference_, exact_, start_, result, course);
     }
-    if (!symmetries_.empty()) {
-        double worst = 0;
-        for (const Symmetry& symmetry : symmetries_) {
-            Wide first = 0;
-            double largest = 0, size = 0;
-            for (std::int64_t meeting = 0; meeting <= run.meetings; ++meeting) {
-                state_at(meeting);
-                Wide momentum = 0;
-                for (std::size_t i = 0; i < n; ++i) {
-                    Wide direction = symmetry.d[i];
-                    for (std::size_t j = 0; j < n; ++j) direction += static_cast<Wide>(symmetry.B[i * n + j]) * q[j];
-                    momentum += p[i] * direction;
-                    size = std::max(size, std::fabs(static_cast<double>(p[i] * direction)));
-                }
-                if (meeting == 0) first = momentum;
-                largest = std::max(largest, std::fabs(static_cast<double>(momentum - first)));
-            }
-            if (size > 0) worst = std::max(worst, largest / size);
-        }
-        result.momentum_error = worst;
-    }
+    if (!symmetries_.empty()) result.momentum_error = largest_momentum_error(run, symmetries_);
     run.stepper.prepare(run.start.parameters, run.h);
-    if (kernel->has_tangent != 0 && static_cast<int>(n) <= defect_limit && conserves_ && candidate.tolerance == 0)
+    if (kernel->has_tangent != 0 && static_cast<int>(reference_.n) <= defect_limit && conserves_ &&
+        candidate.tolerance == 0)
         result.defect = static_cast<double>(symplectic_defect(run.stepper, run.start.q, run.start.p));
     return result;
 }

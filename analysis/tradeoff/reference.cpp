@@ -29,7 +29,9 @@ constexpr double precise_factor = 6;      // what the precise way takes longer, 
 constexpr double half = 0.5;              // of the seconds, for a first way; the rest is for finer steps
 constexpr double overtime = 1.25;         // of the seconds: then it is given up
 constexpr double radians_of_step = 0.75;  // h omega of the family's first run
-constexpr int most_refinements = 4;
+constexpr int most_refinements = 12;
+constexpr double near = 0.1;    // of the amplitude: steps so far off are too long to converge yet
+constexpr double looser = 100;  // tolerance of the second extrapolation, of the first's
 constexpr int frequency_looks = 24;
 
 template <class real>
@@ -49,10 +51,18 @@ public:
     Reference compute() {
         observe();
         const double tolerance = reference_.precision == Precision::quadruple ? 1e-22 : 3e-17;
+        const auto began = Clock::now();
         const auto states = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
         if (!states) throw ComputationError("the reference fails: its steps become too short");
+        const double took = seconds_since(began);
         keep(*states);
-        compare(*states);
+        reference_.disagreement.assign(static_cast<std::size_t>(reference_.samples) + 1,
+                                       std::numeric_limits<double>::infinity());
+        compare(*states, took);
+        if (reference_.disagreement.back() > request_.wanted) compare_with_looser(*states, looser * tolerance, took);
+        if (reference_.first.empty())
+            throw ComputationError("the reference fails: the steps of " + std::string(kernel_->method) +
+                                   " do not converge on this motion, however short");
         reference_.seconds = seconds_since(began_);
         return std::move(reference_);
     }
@@ -195,24 +205,16 @@ private:
         for (const real value : scale_) reference_.scale.push_back(static_cast<double>(value));
     }
 
-    // The family's own way with `ratio` steps between two samples; nothing when a step fails.
-    std::optional<std::vector<double>> disagreement_with(const States& states, std::int64_t ratio) {
-        const int samples = reference_.samples;
-        const real h = static_cast<real>(request_.until) / static_cast<real>(samples * ratio);
-        if (stepper_.prepare(start_.parameters, h) != LOBATTO_OK || stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
-            return std::nullopt;
+    // The largest difference up to each sample, of states that `at(i)` gives; nothing when it gives none.
+    template <class At>
+    std::optional<std::vector<double>> largest_differences(const States& states, const At& at) const {
         std::vector<double> largest{0};
-        std::vector<real> q, p;
-        for (int i = 1; i <= samples; ++i) {
-            check_interruption();
-            lobatto_advance call{};
-            call.steps = ratio;
-            if (stepper_.advance(call) != LOBATTO_OK) return std::nullopt;
-            real time;
-            stepper_.state(time, q, p);
+        for (int i = 1; i <= reference_.samples; ++i) {
+            const std::vector<real>* const there = at(i);
+            if (there == nullptr) return std::nullopt;
             double worst = largest.back();
             for (std::size_t k = 0; k < 2 * n_; ++k) {
-                const real difference = (k < n_ ? q[k] : p[k - n_]) - states[static_cast<std::size_t>(i) * 2 * n_ + k];
+                const real difference = (*there)[k] - states[static_cast<std::size_t>(i) * 2 * n_ + k];
                 const double error = std::fabs(static_cast<double>(difference / scale_[k]));
                 if (!(error <= worst)) worst = error;
             }
@@ -221,29 +223,73 @@ private:
         return largest;
     }
 
-    void compare(const States& states) {
+    // The family's own way with `ratio` steps between two samples; nothing when a step fails, or after `limit` seconds.
+    std::optional<std::vector<double>> disagreement_with(const States& states, std::int64_t ratio, double limit) {
+        const int samples = reference_.samples;
+        const real h = static_cast<real>(request_.until) / static_cast<real>(samples * ratio);
+        if (stepper_.prepare(start_.parameters, h) != LOBATTO_OK || stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
+            return std::nullopt;
+        const auto began = Clock::now();
+        std::vector<real> row, p;
+        return largest_differences(states, [&](int) -> const std::vector<real>* {
+            check_interruption();
+            lobatto_advance call{};
+            call.steps = ratio;
+            if (stepper_.advance(call) != LOBATTO_OK || seconds_since(began) > limit) return nullptr;
+            real time;
+            stepper_.state(time, row, p);
+            row.insert(row.end(), p.begin(), p.end());
+            return &row;
+        });
+    }
+
+    // With shorter and shorter steps of the family, in the seconds that are left beside those of a second
+    // extrapolation.
+    void compare(const States& states, double extrapolation_seconds) {
         const double interval = request_.until / reference_.samples;
         auto ratio = static_cast<std::int64_t>(std::ceil(interval / static_cast<double>(step_of_family())));
         double last = 0;
         for (int refinement = 0; refinement <= most_refinements; ++refinement, ratio *= 2) {
+            const double left = request_.seconds_limit - seconds_since(began_) - extrapolation_seconds;
+            reference_.is_late = refinement > 0 && 2 * last > left;
+            if (reference_.is_late) break;
             const auto began = Clock::now();
-            const auto measured = disagreement_with(states, ratio);
+            const auto measured =
+                disagreement_with(states, ratio, std::fmax(left, request_.seconds_limit * (overtime - 1)));
             last = seconds_since(began);
-            const double before = reference_.disagreement.empty() ? std::numeric_limits<double>::infinity()
-                                                                  : reference_.disagreement.back();
-            if (measured && measured->back() < before) {
-                reference_.disagreement = *measured;
-                reference_.first = fmt::format("{} with {} steps in {}", kernel_->method, ratio * reference_.samples,
-                                               precision_name(reference_.precision));
-            }
+            const double before = reference_.disagreement.back();
             const double now = measured ? measured->back() : std::numeric_limits<double>::infinity();
-            if (now <= request_.wanted) break;
-            if (measured && before < std::numeric_limits<double>::infinity() && now > before / 4) break;
-            if (seconds_since(began_) + 2 * last > request_.seconds_limit) break;
+            if (now < before)
+                agree(*measured, fmt::format("{} with {} steps in {}", kernel_->method, ratio * reference_.samples,
+                                             precision_name(reference_.precision)));
+            if (now <= request_.wanted || (before < near && now > before / 4)) break;
         }
-        if (reference_.disagreement.empty())
-            throw ComputationError("the reference fails: the steps of " + std::string(kernel_->method) +
-                                   " do not converge on this motion, however short");
+    }
+
+    // Equal steps of the family that resolve a close encounter may take too long: the same extrapolation, less precise.
+    void compare_with_looser(const States& states, double tolerance, double extrapolation_seconds) {
+        if (seconds_since(began_) + extrapolation_seconds > overtime * request_.seconds_limit) return;
+        std::optional<States> others;
+        try {
+            others = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
+        } catch (const TooSlow&) {
+        }
+        if (!others) return;
+        std::vector<real> row(2 * n_);
+        const auto measured = largest_differences(states, [&](int i) {
+            const auto begin = others->begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(i) * 2 * n_);
+            std::copy(begin, begin + std::ssize(row), row.begin());
+            return &row;
+        });
+        reference_.is_late = false;
+        if (measured && measured->back() < reference_.disagreement.back())
+            agree(*measured, fmt::format("explicit extrapolation to {:.0e} a step in {}", tolerance,
+                                         precision_name(reference_.precision)));
+    }
+
+    void agree(std::vector<double> disagreement, std::string way) {
+        reference_.disagreement = std::move(disagreement);
+        reference_.first = std::move(way);
         reference_.second = "explicit extrapolation in " + precision_name(reference_.precision);
     }
 

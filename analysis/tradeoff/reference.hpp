@@ -27,6 +27,7 @@ struct Reference {
     double energy_scale = 0;           // the largest |p v|/2
     double frequency = 0;              // the largest met (largest_frequency)
     double seconds = 0;                // that it took
+    bool is_late = false;              // more time would have made it better
 
     double time(int sample) const { return until * sample / samples; }
     // The last time up to which the two ways differ by less than this.

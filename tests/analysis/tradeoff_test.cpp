@@ -217,6 +217,34 @@ TEST_CASE("a measurement store keeps measurements, and leaves out a torn line an
     CHECK(MeasurementStore(path, "another").found() == 0);
 }
 
+TEST_CASE(
+    "a reference is refined until it is sure, on eccentric orbits too, where long double does not do in quadruple") {
+    const test::TemporaryFolder folder;
+    for (const auto& [e, precision] : std::map<std::string, Precision>{{"0.9", Precision::extended},  // 5e-11
+                                                                       {"0.99", Precision::quadruple}}) {
+        const std::string path = folder / "orbit.toml";
+        test::write_text(path, fmt::format("lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n"
+                                           "[coordinates]\nx = {{ position = \"1 - {0}\", velocity = 0 }}\n"
+                                           "y = {{ position = 0, velocity = \"sqrt((1 + {0})/(1 - {0}))\" }}\n"
+                                           "[run]\nstep = 0.01\nuntil = \"4*pi\"\n",
+                                           e));
+        const Scene scene = read_scene(path);
+        ExperimentRequest wish;
+        wish.seconds = 36000;
+        wish.wanted = 1e-11;
+        const Experiment experiment(derive(scene), scene, wish);
+        const Reference& reference = experiment.reference();
+        CAPTURE(e);
+        CAPTURE(reference.first);
+        CHECK(reference.precision == precision);
+        CHECK(reference.disagreement.back() < 1e-11);
+        // A whole number of periods: back at the start.
+        const std::size_t last = static_cast<std::size_t>(reference.samples) * 2 * reference.n;
+        for (std::size_t k = 0; k < 2 * reference.n; ++k)
+            CHECK(std::fabs(reference.high[last + k] - reference.high[k]) < 1e-11 * reference.scale[k]);
+    }
+}
+
 TEST_CASE("what was measured for its error alone is measured again when everything is asked for") {
     const Scene scene = read_scene(pendulum);
     Experiment experiment(derive(scene), scene, {});
