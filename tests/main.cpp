@@ -156,10 +156,12 @@ private:
 DOCTEST_REGISTER_LISTENER("notes", 1, Notes);
 
 // $LOBATTO_TEST_WORKERS: how many files' tests run at a time, each file in a process of its own. Kernels that no test
-// keeps to itself go to one cache that goes away with the run.
+// keeps to itself go to one cache of all processes, $LOBATTO_TEST_CACHE, or a folder that goes away with the run.
 int main(int argc, char** argv) {
-    const lobatto::test::TemporaryFolder cache;
-    const EnvironmentVariable shared("LOBATTO_CACHE_DIR", cache.string());
+    const lobatto::test::TemporaryFolder own;
+    const char* const given = std::getenv("LOBATTO_TEST_CACHE");
+    const std::string cache = given != nullptr ? given : own.string();
+    const EnvironmentVariable of_processes("LOBATTO_TEST_CACHE", cache), shared("LOBATTO_CACHE_DIR", cache);
     const char* const workers = std::getenv("LOBATTO_TEST_WORKERS");
     if (workers != nullptr && std::atoi(workers) > 1) return Workers(argc, argv, std::atoi(workers)).run();
     return doctest::Context(argc, argv).run();
