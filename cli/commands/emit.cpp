@@ -114,6 +114,7 @@ fs::path path_for(const EmitCommand& options, const std::string& name) {
     if (error) fail_to_write(options.folder, error.message());
     const fs::path path = fs::path(options.folder) / (name + ".hpp");
     keep_scene(options.scene, path);
+    keep_foreign(path);
     return path;
 }
 
@@ -152,6 +153,7 @@ void emit_scene(const EmitCommand& options) {
                             options.scene));
         const fs::path support = fs::path(options.folder) / "kernel.hpp";
         keep_scene(options.scene, support);
+        keep_foreign(support);
         write_atomically(support, support_text());
     }
     write_atomically(path, source.header);

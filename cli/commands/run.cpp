@@ -358,7 +358,11 @@ void run(const RunOptions& options) {
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
     const bool has_events = !scene.outputs.events.empty();
     keep_scene(scene.path, path);
-    if (has_events) keep_scene(scene.path, event_path(options, scene));
+    if (options.output.empty()) keep_foreign(path);
+    if (has_events) {
+        keep_scene(scene.path, event_path(options, scene));
+        keep_foreign(event_path(options, scene));
+    }
     if (!options.resume) keep_strangers(path);
     if (!options.quiet)
         fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, run.source.digest, run.derivation_seconds,

@@ -6,8 +6,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <filesystem>
+#include <fstream>
 
 #include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
@@ -48,6 +51,20 @@ void keep_scene(const std::string& scene, const std::string& path) {
             std::filesystem::equivalent(path + ending, scene, none))
             throw InputError(
                 fmt::format("{}: the result would overwrite the scene {}; give it another name", path, scene));
+}
+
+void keep_foreign(const std::string& path) {
+    constexpr std::size_t looked_at = 4096;  // bytes: all that Lobatto writes names it in its first lines
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(path, none)) return;
+    std::string begin(looked_at, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(begin.data(), static_cast<std::streamsize>(looked_at));
+    begin.resize(static_cast<std::size_t>(file.gcount()));
+    std::transform(begin.begin(), begin.end(), begin.begin(), [](unsigned char c) { return std::tolower(c); });
+    if (!begin.empty() && begin.find("lobatto") == std::string::npos)
+        throw InputError(fmt::format(
+            "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));
 }
 
 }  // namespace lobatto

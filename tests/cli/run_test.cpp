@@ -548,6 +548,20 @@ TEST_CASE("files that Lobatto did not write are never touched") {
         CHECK(test::read_file(scene) == text);
         std::filesystem::remove(scene);
     }
+    // Nor under the names that a command chooses itself: of events, of support headers.
+    const std::string scene = place.file("events.toml");
+    test::write_text(scene,
+                     "lagrangian = \"q'^2/2 - q^2/2\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[run]\n"
+                     "step = 0.1\nuntil = 1\n[output]\nevents = [\"q = 0\"]\n");
+    test::write_text(place.file("w.events.csv"), "mine");
+    test::write_text(place.file("kernel.hpp"), "mine");
+    const test::Finished events = place.run({scene, "-o", out, "--until", "1"});
+    CHECK(events.exit_code == 2);
+    CHECK(contains(events.err, "w.events.csv is there, and Lobatto did not write it"));
+    CHECK(test::read_file(place.file("w.events.csv")) == "mine");
+    const test::Finished emitted = test::run({LOBATTO_PROGRAM, "emit", pendulum, "-o", place.file(".")});
+    CHECK(emitted.exit_code == 2);
+    CHECK(test::read_file(place.file("kernel.hpp")) == "mine");
     // A whole file takes another name for its own beginning.
     test::write_text(place.file("t.json.partial"), "mine");
     CHECK(place.run({pendulum, "-o", out, "--until", "1"}).exit_code == 0);
