@@ -79,8 +79,9 @@ public:
     void run() {
         require_values();
         require_domains();
-        require_mass();
-        if (scene_.start == Start::velocity || system_.separable) return;
+        const bool seeks = scene_.start == Start::momentum && !system_.separable;
+        if (!seeks || !has_mass_near_the_momentum()) require_mass();
+        if (!seeks) return;
         find_velocities();
         require_values();
         require_mass();
@@ -229,12 +230,43 @@ private:
         }
     }
 
-    // Newton's method for dL/dv = p0 from v = 0, its steps halved until the residual falls: what kernels do too.
-    void find_velocities() {
+    Numbers wanted_momentum() const {
         Numbers wanted;
         for (std::size_t k = 0; k < scene_.initial_rate.size(); ++k)
             wanted.push_back(value_of(scene_.initial_rate[k], "the initial momentum of " + scene_.coordinates[k].name));
-        Numbers velocity(wanted.size(), cln::cl_R(0));
+        return wanted;
+    }
+
+    bool is_singular() const { return eliminate_mass(Numbers(system_.q.size(), cln::cl_R(0))).singular; }
+
+    // At rest there may be no inverse, as of v^4: then the velocities begin at the multiple of the momentum whose own
+    // momentum is nearest, as in kernels.
+    bool has_mass_near_the_momentum() {
+        if (!is_singular()) return true;
+        const Numbers wanted = wanted_momentum();
+        Numbers best(wanted.size(), cln::cl_R(0));
+        std::optional<Residual> nearest;
+        for (int exponent = -40; exponent <= 40; ++exponent) {
+            Numbers trial;
+            for (const cln::cl_R& p : wanted) trial.push_back(p * cln::expt(cln::cl_R(2), exponent));
+            std::optional<Residual> there = residual(trial, wanted);
+            if (!there || (nearest && there->square >= nearest->square)) continue;
+            nearest = there;
+            best = trial;
+        }
+        residual(best, wanted);
+        if (!is_singular()) {
+            first_velocity_ = best;
+            return true;
+        }
+        residual(Numbers(wanted.size(), cln::cl_R(0)), wanted);
+        return false;
+    }
+
+    // Newton's method for dL/dv = p0, its steps halved until the residual falls: what kernels do too.
+    void find_velocities() {
+        const Numbers wanted = wanted_momentum();
+        Numbers velocity = first_velocity_.empty() ? Numbers(wanted.size(), cln::cl_R(0)) : first_velocity_;
         std::optional<Residual> here = residual(velocity, wanted);
         for (int iteration = 0; here && !here->vanishes; ++iteration) {
             const Elimination step = eliminate_mass(here->vector);
@@ -273,6 +305,7 @@ private:
     std::vector<std::pair<int, int>> mass_places_;
     std::vector<ex> mass_values_;
     std::vector<Id> momentum_, mass_;
+    Numbers first_velocity_;  // empty: rest
 };
 
 }  // namespace

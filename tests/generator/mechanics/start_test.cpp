@@ -86,6 +86,10 @@ TEST_CASE("a momentum that no velocity has is refused where it is given") {
     CHECK(refusal("sqrt(1 + x'^2) - x^2", start("0.999")) == "accepted");
     // A relativistic particle takes any momentum, from velocities below that of light.
     CHECK(refusal("-sqrt(1 - x'^2) - x^2", start("-1000")) == "accepted");
+    // At rest it has no mass; at the velocity of this momentum it has.
+    for (const char* momentum : {"8", "-0.001", "1000"})
+        CHECK(refusal("x'^4/4 - x^2/2", start(momentum)) == "accepted");
+    CHECK(refusal("x'^4/4 - x^2/2", start("0")).find("the mass matrix is singular at the start") != std::string::npos);
     // Two coordinates: the one in the way is named.
     CHECK(refusal("x'^2*(1 + x^2)/2 + sqrt(1 + y'^2)", start("5") + "y = { position = 0, momentum = -3 }\n")
               .starts_with("scene.toml:5:32: no velocity has this momentum: p_y = dL/dy' = y'/sqrt(y'^2 + 1) comes no "
