@@ -8,6 +8,7 @@
 
 namespace lobatto {
 
+constexpr double by_chance = 0.1;  // of an amplitude: what is apart by more may meet again, and is no small error then
 constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
 
 // Where a companion begins: a few units in the last place beside the start, so that it leaves it where nearby

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace lobatto {
 
@@ -18,9 +19,10 @@ constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for it
 constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
 constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
 constexpr int most_coupled = 16;               // coordinates of which that is looked for
-constexpr double graded = 8;       // steps are at most this part of the distance to a pulse, or half of its width
-constexpr double by_chance = 0.1;  // of the amplitude: what is apart by more may meet again, and is no small error then
-constexpr double exponential = 30;  // times more than errors that grow with the square of the time
+constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double finest = 0x1p-30;  // steps are never shorter than this part of those of the run
+constexpr std::int64_t most_looked = 500000;  // steps of the companion, for what is narrow in them
+constexpr double exponential = 30;            // times more than errors that grow with the square of the time
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -41,11 +43,18 @@ std::vector<double> joined(std::vector<double> q, const std::vector<double>& p) 
 
 }  // namespace
 
+std::int64_t companion_steps(std::int64_t steps) {
+    std::int64_t taken = steps + (steps + 1) / 2;
+    while (std::gcd(steps, taken) != 1) ++taken;
+    return taken;
+}
+
 Companion::Companion(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request)
     : kernel_(kernel),
       groups_(amplitude_groups(derivation.scene)),
       order_(derivation.quadrature.order()),
-      rows_a_step_(1 + request.dense) {
+      rows_a_step_(1 + request.dense),
+      narrow_(derivation.system, request.parameters) {
     request_.parameters = request.parameters;
     request_.q = request.q;
     request_.p = request.p;
@@ -60,6 +69,8 @@ Companion::Companion(const Derivation& derivation, const Kernel& kernel, const T
         std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
     stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
+    is_driven_ = !derivation.system.autonomous;
+    if (is_driven_) stride_ *= (fewest_driven_steps + stride_ - 1) / stride_;
 }
 
 Companion::~Companion() {
@@ -83,7 +94,8 @@ Companion::Segment Companion::segment(std::size_t number) const {
     Segment result;
     result.begin = static_cast<std::int64_t>(number) * stride_;
     result.steps = std::min(stride_, request_.steps - result.begin);
-    result.taken = result.steps + (result.steps + 1) / 2;
+    result.taken = result.steps > 0 ? companion_steps(result.steps) : 0;
+    if (is_driven_ && result.steps < fewest_driven_steps) result.taken = companion_steps(fewest_driven_steps);
     return result;
 }
 
@@ -96,6 +108,18 @@ struct Companion::Place {
     double time, step;  // step: 0 before the first
     std::vector<double> q, p;
     lobatto_status status = LOBATTO_OK;
+
+    struct State {
+        double time;
+        std::vector<double> q, p;
+    };
+    State state() const { return {time, q, p}; }
+    void go_back(const State& to) {
+        time = to.time;
+        q = to.q;
+        p = to.p;
+        step = 0;
+    }
 
     // Steps of another size begin at this place.
     void set_step(double size, const std::vector<double>& parameters) {
@@ -125,16 +149,39 @@ bool Companion::is_near_pulse(double from, double step) const {
     return false;
 }
 
+bool Companion::can_halve(double from, double step) const {
+    return std::fabs(step) > finest * std::fmax(std::fabs(request_.step), std::fabs(from));
+}
+
 // Steps shorter and shorter towards a pulse.
 void Companion::take_finely(Place& place, double from, double step) {
     if (place.status != LOBATTO_OK || cancelled_) return;
-    if (is_near_pulse(from, step) && from + step / 2 != from) {
+    if (is_near_pulse(from, step) && can_halve(from, step)) {
         take_finely(place, from, step / 2);
         take_finely(place, from + step / 2, step / 2);
         return;
     }
+    take_one(place, from, step);
+}
+
+// One step; shorter ones in its place, if the motion met something narrow in it.
+void Companion::take_one(Place& place, double from, double step) {
+    const Place::State before = place.state();
     place.set_step(step, request_.parameters);
     place.advance(1, request_.tolerance);
+    if (narrow_.empty() || place.status != LOBATTO_OK || looked_ >= most_looked) return;
+    ++looked_;
+    NarrowTerms::State begin{from, before.q, {}}, end{from + step, place.q, {}};
+    if (place.stepper.velocity(from, before.q, before.p, begin.v) != LOBATTO_OK ||
+        place.stepper.velocity(from + step, place.q, place.p, end.v) != LOBATTO_OK)
+        return;
+    const std::optional<Pulse> met = narrow_.on_the_way(begin, end);
+    if (!met || !can_halve(from, step)) return;
+    pulses_.insert(std::upper_bound(pulses_.begin(), pulses_.end(), *met,
+                                    [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
+                   *met);
+    place.go_back(before);
+    take_finely(place, from, step);
 }
 
 void Companion::take(Place& place, const Segment& part) {
@@ -144,8 +191,9 @@ void Companion::take(Place& place, const Segment& part) {
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;
+        const bool looks = !narrow_.empty() && looked_ < most_looked;
         std::int64_t count = 0;
-        while (count < std::min(piece, part.taken - done) &&
+        while (!looks && count < std::min(piece, part.taken - done) &&
                (pulses_.empty() || !is_near_pulse(here + static_cast<double>(count) * size, size)))
             count = pulses_.empty() ? std::min(piece, part.taken - done) : count + 1;
         if (count == 0) {
@@ -283,7 +331,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     } worst;
     const std::size_t count = std::min(run_.size(), companion_.size());
     for (std::size_t j = 0; j < count; ++j) {
-        const Segment part = segment(j);
+        const Segment part = segment(0);
         const double ratio = static_cast<double>(part.taken) / static_cast<double>(part.steps),
                      of_run = 1 / (1 - std::pow(ratio, -order_));
         error.until = request_.time + static_cast<double>(run_[j].steps) * request_.step;

@@ -3,7 +3,9 @@
 // the steps. With a method of order p the difference D of the two is (1 - r^-p) times the error of the run, r the ratio
 // of their steps; where rounding decides, D is the error itself, about.
 //
-// Where explicit time makes short pulses, which steps may miss, the companion takes short ones.
+// Where explicit time makes short pulses, or the motion meets terms that are narrower than a step (narrow_terms.hpp),
+// which steps may miss, the companion takes short ones. In equally many times it takes steps of a number without a
+// common divisor with that of the run: oscillations that look constant to the one do not to the other.
 //
 // The companion begins four units in the last place beside the start: what no number of steps can know, and what grows
 // where nearby trajectories diverge, is an error too.
@@ -19,6 +21,7 @@
 #include <vector>
 
 #include "analysis/accuracy/amplitude.hpp"
+#include "analysis/accuracy/narrow_terms.hpp"
 #include "analysis/accuracy/pulses.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "runtime/run/trajectory.hpp"
@@ -40,6 +43,11 @@ struct MeasuredError {
 
     bool is_lost() const { return lost_after.has_value(); }
 };
+
+// Of a companion, for so many steps of the run: about 3/2 of them, without a common divisor.
+std::int64_t companion_steps(std::int64_t steps);
+// Of a run with explicit time between two comparisons, at least: in fewer steps common divisors cannot be avoided.
+inline constexpr std::int64_t fewest_driven_steps = 8;
 
 // One line.
 std::string text_of(const MeasuredError& error, const Scene& scene);
@@ -77,6 +85,8 @@ private:
     void compute();
     void take(Place& place, const Segment& part);
     void take_finely(Place& place, double from, double step);
+    void take_one(Place& place, double from, double step);
+    bool can_halve(double from, double step) const;
     bool is_near_pulse(double from, double step) const;
     std::vector<double> amplitudes() const;  // 2n; 0: of what does not move, or by rounding alone
     MeasuredError compare(const TrajectoryResult& result) const;
@@ -86,6 +96,9 @@ private:
     std::vector<int> groups_;
     int order_, rows_a_step_;
     std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
+    NarrowTerms narrow_;         // likewise, where the motion meets them
+    std::int64_t looked_ = 0;    // steps of the companion at which that was looked at
+    bool is_driven_ = false;     // explicit time
     std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;
     std::vector<Point> run_;            // of the run, at comparisons

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The errors of the trajectories of a sweep, measured as those of a run (companion.hpp): each against the same motion
-// in 3/2 of the steps, from a start that is four units in the last place away.
+// in 3/2 of the steps, from a start that is four units in the last place away. They are compared at the kept states.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "analysis/accuracy/pulses.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "runtime/run/ensemble.hpp"
 
@@ -17,8 +18,10 @@ public:
     EnsembleCompanion(const Derivation& derivation, const Kernel& kernel, const EnsembleRequest& request);
 
     struct Error {
-        double relative;  // of the positions at the end, each by its own amplitude; the largest. Not a number: unknown
-        bool lost;        // as large as the motion, or the companion could not reach the end
+        // Of the positions at the end, each by its own amplitude; the largest. The largest of all, where the two were
+        // so far apart that they may have met again by chance. Not a number: unknown.
+        double relative;
+        bool lost;  // it was as large as the motion, or the companion could not reach the end
     };
     // Of a trajectory that reached the end. To be asked in the order of the indices: the companions of many are
     // computed together.
@@ -27,15 +30,23 @@ public:
 private:
     struct Known {
         lobatto_status status = LOBATTO_NOT_FINITE;
-        std::vector<double> least, most, end;  // 2n
+        std::vector<double> least, most;  // 2n
+        std::vector<double> rows;         // 2n each: where the trajectory keeps its states, but for the start
     };
     void compute(std::int64_t first);
+    // `steps` of the sweep's own from `begin` on; the companions are at `begin` already.
+    void take(std::int64_t begin, std::int64_t steps, std::int64_t every);
+    // Whether it meets pulses, or is driven and kept too often for a companion in lanes.
+    bool goes_alone(const EnsembleStart& start);
+    Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
 
+    const Derivation& derivation_;
     Kernel kernel_;
     const EnsembleRequest& request_;
     std::vector<int> groups_;
     int order_;
-    std::int64_t taken_;  // steps of each companion
+    std::vector<double> pulse_parameters_;  // those that were asked for last
+    bool has_pulses_ = false;               // with these
     std::int64_t first_ = 0;
     std::vector<Known> known_;  // from trajectory first_ on
 };

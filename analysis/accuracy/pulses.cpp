@@ -17,9 +17,11 @@ namespace {
 using GiNaC::ex;
 
 constexpr std::size_t most_pulses = 1000;
-constexpr int rounds = 200;    // of the simultaneous iteration for roots
-constexpr int samples = 8192;  // of what is no polynomial in time
-constexpr double real = 1e-9;  // |Im| of a real root, relative
+constexpr int rounds = 200;        // of the simultaneous iteration for roots
+constexpr int samples = 8192;      // of what is no polynomial in time
+constexpr double real = 1e-9;      // |Im| of a real root, relative
+constexpr double multiple = 1e-3;  // the same of a multiple one, as rounding splits it
+constexpr double tiny = 0x1p-40;
 
 // All roots of c_0 + c_1 x + ... by the iteration of Durand and Kerner.
 std::vector<std::complex<double>> roots_of(std::vector<double> c) {
@@ -108,11 +110,17 @@ private:
             for (std::size_t j = of.size(); j-- > 0;) value = value * x + of[j];
             return value;
         };
-        const std::vector<double> first = slope(c), second = slope(first);
+        const std::vector<double> first = slope(c);
         if (name == "exp" && c.size() > 2)
-            for (const auto& root : roots_of(first))
-                if (std::fabs(root.imag()) <= real * std::abs(root) && at(second, root.real()) < 0)
-                    add(root.real(), std::sqrt(-2 / at(second, root.real())));
+            for (const auto& root : roots_of(first)) {
+                if (std::fabs(root.imag()) > multiple * std::abs(root)) continue;
+                const double middle = root.real(), most = at(c, middle);
+                double width = 2 * widest_;  // on which u falls by 1
+                while (width > widest_ * tiny &&
+                       std::fmin(most - at(c, middle - width / 2), most - at(c, middle + width / 2)) >= 1)
+                    width /= 2;
+                add(middle, width);
+            }
         if (is_switch(name) || (name == "exp" && c.size() == 2))
             for (const auto& root : roots_of(c))
                 if (std::fabs(root.imag()) <= real * std::abs(root))

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "analysis/accuracy/companion.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/accuracy/ensemble_companion.hpp"
 #include "analysis/accuracy/sweep_watch.hpp"
@@ -187,13 +188,15 @@ private:
     bool accepts_lost_;
 };
 
-// The states of one trajectory; only the last of them can be one at which it failed.
-void write(SweepTable& table, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
+// The states of one trajectory, each `every`-th and the last (0: the last alone); only the last of them can be one at
+// which it failed.
+void write(SweepTable& table, const Scene& scene, const Grid& grid, const EnsembleRequest& request, std::int64_t every,
            const EnsembleTrajectory& trajectory, const Verdict& verdict) {
     const Records& kept = trajectory.kept;
     const int numbers = scene.outputs.momenta ? kept.columns : 1 + (kept.columns - 1) / 2;
     for (std::int64_t i = 0; i < kept.count; ++i) {
         const bool last = i + 1 == kept.count;
+        if (!last && (every == 0 || i * request.every % every != 0)) continue;
         table.add(trajectory.index);
         for (std::size_t a = 0; a < grid.axes().size(); ++a) table.add(grid.value(trajectory.index, a));
         table.add(static_cast<std::int64_t>(last ? verdict.status : LOBATTO_OK));
@@ -314,6 +317,17 @@ void print_fixed_times(const Scene& scene, const Grid& grid) {
     }
 }
 
+// How often states are kept: as often as is asked for, and some 61 times for the companions to be compared with.
+std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool unmeasured) {
+    constexpr std::int64_t comparisons = 61, most_tried = 1000;  // no part of times that one writes
+    if (unmeasured || steps == 0) return every;
+    if (every == 0 || every > steps) return std::max(fewest_driven_steps, (steps + comparisons - 1) / comparisons);
+    const std::int64_t wanted = std::min(comparisons * every / steps, every / fewest_driven_steps);
+    for (std::int64_t parts = std::max<std::int64_t>(1, wanted); parts <= std::min(every, wanted + most_tried); ++parts)
+        if (every % parts == 0) return every / parts;
+    return every;
+}
+
 EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, const Grid& grid, const Steps& steps) {
     EnsembleRequest request;
     request.count = grid.count();
@@ -322,7 +336,7 @@ EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, cons
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps.count;
     request.tolerance = scene.method.tolerance;
-    request.every = options.overrides.every.value_or(0);
+    request.every = looked_at(options.overrides.every.value_or(0), steps.count, options.unmeasured);
     request.threads = options.threads;
     return request;
 }
@@ -353,6 +367,7 @@ void sweep(const SweepOptions& options) {
     const std::string path = output_path(
         options.output, result_name(scene.path) + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
     keep_scene(scene.path, path);
+    if (options.output.empty()) keep_foreign(path);
     SweepTable table(path, format, comments_of(scene, source, request, grid),
                      columns_of(scene, grid, !options.unmeasured));
     std::vector<Failure> failures;
@@ -364,7 +379,7 @@ void sweep(const SweepOptions& options) {
     };
     request.sink = [&](const EnsembleTrajectory& trajectory) {
         if (trajectory.status != LOBATTO_OK) verdict = judges.judge(trajectory);
-        write(table, scene, grid, request, trajectory, verdict);
+        write(table, scene, grid, request, options.overrides.every.value_or(0), trajectory, verdict);
         if (verdict.status == LOBATTO_OK || failures.size() == failures_told) return;
         const double time = trajectory.kept.rows[(trajectory.kept.count - 1) * trajectory.kept.columns];
         failures.push_back({trajectory.index, trajectory.steps_done, verdict.status, time});

@@ -531,6 +531,35 @@ TEST_CASE("a sweep measures the error of every trajectory; what is not resolved 
     CHECK(!contains(unmeasured.out, "measured error"));
 }
 
+TEST_CASE("a sweep looks at motions on their way, and at pulses between its steps") {
+    const Place place;
+    // Near the top of its barrier the pendulum is lost at t = 208; at t = 1000 its companion is near it by chance.
+    const std::string pendulum = place.file("pendulum.toml");
+    test::write_text(pendulum,
+                     "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
+                     "[method]\nfamily = \"gauss\"\nstages = 4\n[run]\nstep = 0.1\nuntil = 1000\n");
+    CHECK(place.sweep({pendulum, "--vary", "q=1,3.1415926,3.5"}).exit_code == 3);
+    CHECK(column(read_trajectory(place.file()), "status") == std::vector<double>{0, 8, 0});
+    // A kick of 0.1 sqrt(pi) that falls between all nodes; none when it comes after the end.
+    const std::string pulse = place.file("pulse.toml");
+    test::write_text(pulse,
+                     "lagrangian = \"q'^2/2 - q^2/2 + 100*q*exp(-((t - c)/0.001)^2)\"\ntime = \"t\"\n[coordinates]\n"
+                     "q = { position = 1, velocity = 0 }\n[parameters]\nc = 5\n[run]\nstep = 0.1\nuntil = 10\n");
+    place.sweep({pulse, "--vary", "c=5.015,5.05,20"});
+    const TrajectoryTable table = read_trajectory(place.file());
+    const std::vector<double> q = column(table, "q"), error = column(table, "error");
+    for (const std::size_t i : {0, 1}) {
+        CHECK(std::fabs(q[i] - std::cos(10)) < 1e-6);  // not seen
+        CHECK(error[i] > 0.1);
+        CHECK(error[i] < 0.25);
+    }
+    CHECK(error[2] < 1e-10);
+    // What is looked at does not change what is written.
+    REQUIRE(place.sweep({pendulum, "--vary", "q=1,2", "--every", "3000"}).exit_code == 0);
+    CHECK(column(read_trajectory(place.file()), "steps") ==
+          std::vector<double>{0, 3000, 6000, 9000, 10000, 0, 3000, 6000, 9000, 10000});
+}
+
 TEST_CASE("contradictions on the command line are errors") {
     const Place place;
     const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {

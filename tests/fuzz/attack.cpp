@@ -16,6 +16,7 @@
 #include <atomic>
 #include <boost/numeric/odeint.hpp>
 #include <cmath>
+#include <cstdio>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -159,8 +160,8 @@ class Author {
 public:
     explicit Author(std::uint64_t seed) : random_(seed) {}
 
-    static inline const std::vector<std::string> classes = {"ordinary", "separatrix", "pulse",    "scales",
-                                                            "singular", "unstable",   "saturated"};
+    static inline const std::vector<std::string> classes = {"ordinary", "separatrix", "pulse",  "scales", "singular",
+                                                            "unstable", "saturated",  "narrow", "sampled"};
 
     Case make(const std::string& kind) {
         Case made;
@@ -172,6 +173,8 @@ public:
         if (kind == "singular") singular(made);
         if (kind == "unstable") unstable(made);
         if (kind == "saturated") saturated(made);
+        if (kind == "narrow") narrow(made);
+        if (kind == "sampled") sampled(made);
         return made;
     }
 
@@ -408,6 +411,51 @@ private:
         times(made, magnitude(-1.5, -0.3), 4000);
     }
 
+    // Walls, wells and steps in the way that are narrower than what a step moves, and pulses that move with the motion.
+    void narrow(Case& made) {
+        start(made, 1);
+        made.v[0] += 1;
+        times(made, magnitude(-1.5, -0.5), 60);
+        const double width = made.step * magnitude(-1.5, 0), strength = uniform(-1, 1);
+        const Formula u = (q(0) - number(uniform(-0.4, 0.4))) / number(width);
+        Formula term;
+        switch (whole(0, 4)) {
+            case 0:
+                term = strength * call("exp", number(-1) * squared(u));
+                break;
+            case 1:
+                term = number(strength) / (number(1) + squared(u));
+                break;
+            case 2:
+                term = (0.2 * strength) * call("tanh", u);
+                break;
+            case 3:
+                term = strength * call("exp", number(-1) * power(u, 4));
+                break;
+            default: {
+                const double at = made.step * made.steps * uniform(0.05, 0.95);
+                const Formula moving = (time(made) - number(at) - 0.1 * call("sin", q(0))) / number(width);
+                made.pulses.push_back({at, width});
+                term = (strength / std::fmin(1, width)) * q(0) *
+                       call("exp", number(-1) * power(moving, one_in(2) ? 2 : 4));
+            }
+        }
+        made.lagrangian = kinetic(made) - springs(made) + term;
+        made.longest = std::fmin(made.longest, width / 8);
+    }
+
+    // Oscillations that look constant at equal steps.
+    void sampled(Case& made) {
+        start(made, whole(1, 2));
+        times(made, magnitude(-1.5, -0.3), 200);
+        if (one_in(2)) made.method = "points = 2";
+        const double whole_turns = whole(1, 8), rate = std::numbers::pi * whole_turns / made.step;
+        made.lagrangian =
+            kinetic(made) - springs(made, uniform(0.5, 2)) + uniform(0.2, 2) * q(0) * call("cos", rate * time(made));
+        if (one_in(2)) made.lagrangian = made.lagrangian - 0.1 * power(q(0), 4);
+        made.longest = 1 / rate;
+    }
+
     std::mt19937_64 random_;
 };
 
@@ -579,6 +627,7 @@ int main(int argc, char** argv) {
         std::cerr << "attack SEED CASES [CLASS]\n";
         return 2;
     }
+    std::setvbuf(stdout, nullptr, _IOLBF, 0);  // what was found stands there, whatever ends the program
     const std::uint64_t seed = std::strtoull(argv[1], nullptr, 10);
     const int cases = std::atoi(argv[2]);
     const std::vector<std::string> classes = argc > 3 ? std::vector<std::string>{argv[3]} : Author::classes;
