@@ -2,6 +2,7 @@
 // Who runs in the race: a method with one setting to choose, and how it brings trajectories to the end of a problem.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -20,9 +21,6 @@ struct Effort {
     long evaluations = 0;  // of accelerations or slopes; 0: not counted
 };
 
-// A solution that a coarse tolerance lets escape to infinity ends a run here.
-inline constexpr long most_steps = 200'000;
-
 enum class Ladder { steps, tolerance };  // what the setting is: the number of steps to T, or an error tolerance
 
 struct Contestant {
@@ -37,15 +35,17 @@ struct Contestant {
     std::function<double(double setting, std::size_t trajectories)> prepare = {};
     // Seconds from formulas to a loaded program, nothing cached; where `prepare` does not tell them.
     std::function<double()> cold_start = {};
+    double coarsest = 1e-3, finest = 1e-16, ratio = std::sqrt(10);  // of tolerances, and from one to the next
 };
 
 using Contestants = std::vector<Contestant>;
 Contestants own_peers(const Problem& problem);
 Contestants taylor_peer(const Problem& problem);
+Contestants taylor_peer_by_clang(const Problem& problem);
 Contestants odeint_peers(const Problem& problem);
 Contestants gsl_peers(const Problem& problem);
 Contestants sundials_peers(const Problem& problem);
-Contestants heyoka_peers(const Problem& problem);
+Contestants heyoka_peers(const Problem& problem, int trajectories);
 
 // y = (q, p) in one array, as the libraries of first-order systems want it.
 inline void join(const Trajectory& trajectory, double* y) {

@@ -53,11 +53,11 @@ void draw_diagram(const std::string& folder, const Race& race) {
     const std::string script = fmt::format(
         "{}set logscale xy\nset xrange [1e-1:1e-14]\nset format x \"10^{{%T}}\"\nset format y \"%g\"\n"
         "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
-        "set title \"{} ({}){}\" noenhanced\nset xlabel \"error at the end, largest of q and p\"\n"
+        "set title \"{} ({}){}\" noenhanced\nset xlabel \"error at the end, largest of {}\"\n"
         "set ylabel \"milliseconds{}\"\n{}\n",
         data, race.problem->name, race.problem->title,
         race.trajectories > 1 ? fmt::format(", ensemble of {}", race.trajectories) : "",
-        race.trajectories > 1 ? " a trajectory" : "", curves);
+        race.problem->positions_only ? "q" : "q and p", race.trajectories > 1 ? " a trajectory" : "", curves);
     draw(folder, fmt::format("{}{}", race.problem->name, race.trajectories > 1 ? "_ensemble" : ""), script, 1000, 560);
 }
 

@@ -24,7 +24,7 @@ Contestants gsl_peers(const Problem& problem) {
             const std::unique_ptr<gsl_odeiv2_driver, void (*)(gsl_odeiv2_driver*)> driver(
                 gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 0.1, tolerance, tolerance),
                 gsl_odeiv2_driver_free);
-            gsl_odeiv2_driver_set_nmax(driver.get(), most_steps);
+            gsl_odeiv2_driver_set_nmax(driver.get(), static_cast<unsigned long>(problem.most_steps));
             return one_by_one(trajectories, [&](Trajectory& trajectory) {
                 std::array<double, size> y;
                 join(trajectory, y.data());

@@ -147,6 +147,7 @@ int check_instructions(bool store) {
     bool changed = false;
     std::string text = head + "\n";
     for (const Problem& problem : problems()) {
+        if (problem.positions_only) continue;
         const Counted now = count_case(problem);
         fmt::print("{} {}, h = {}: {:.1f} instructions a step, {:.2f} iterations\n", now.problem, now.method, now.step,
                    now.instructions, now.iterations);

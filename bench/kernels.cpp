@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -29,8 +28,10 @@ std::string scene_path(const Problem& problem) {
     return std::string(LOBATTO_SOURCE_DIR) + "/bench/scenes/" + problem.scene;
 }
 
-std::vector<Method> methods_in_race(bool few, bool separable) {
+std::vector<Method> methods_in_race(const Problem& problem, bool few, bool separable) {
     std::vector<Method> methods;
+    // Equal steps have little chance there.
+    if (problem.positions_only) return {{Family::lobatto, 9}, {Family::lobatto, 12}, {Family::gauss, 10}};
     for (const int points : {3, 4, 5, 6, 7, 8, 9, 10, 12})
         if (!few || points % 4 == 1) methods.push_back({Family::lobatto, points});
     for (const int stages : {2, 3, 4, 6, 8, 10})
@@ -98,19 +99,43 @@ Effort run_lanes(const lobatto_kernel& kernel, double h, std::int64_t steps, dou
 }
 
 // Where the iteration of a step ends, relative to the displacement in it; 0: at rounding.
-constexpr std::array tolerances = {0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7};
+const std::vector<double>& tolerances_of(const Problem& problem) {
+    static const std::vector all = {0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7}, few = {0.0, 1e-13, 1e-11};
+    return problem.positions_only ? few : all;
+}
 
 // `steps` steps of h of each trajectory.
 using Run = std::function<Effort(double h, std::int64_t steps, std::vector<Trajectory>& trajectories)>;
 
-Run run_of(const Kernel& kernel, double tolerance) {
+// A kernel takes momenta, a trajectory has velocities: p times masses, or divided by them.
+template <class Operation>
+void change_momenta(const std::vector<double>& masses, std::vector<Trajectory>& trajectories, const Operation& change) {
+    for (Trajectory& trajectory : trajectories)
+        for (std::size_t k = 0; k < masses.size(); ++k) trajectory.p[k] = change(trajectory.p[k], masses[k]);
+}
+std::vector<double> masses_of(const Problem& problem) {
+    return with_type_of(problem, [](auto type) {
+        std::vector<double> masses;
+        for (int k = 0; k < decltype(type)::coordinates; ++k) masses.push_back(type.mass(k));
+        return masses;
+    });
+}
+
+Run run_of(const Problem& problem, const Kernel& kernel, double tolerance) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
-    return [stepper, tolerance](double h, std::int64_t steps, std::vector<Trajectory>& trajectories) -> Effort {
+    const auto run = [stepper, tolerance](double h, std::int64_t steps,
+                                          std::vector<Trajectory>& trajectories) -> Effort {
         const lobatto_kernel& table = stepper->kernel().table();
         if (table.lanes > 0) return run_lanes(table, h, steps, tolerance, trajectories);
         if (stepper->prepare({}, h) != LOBATTO_OK) return {};
         return one_by_one(trajectories,
                           [&](Trajectory& trajectory) { return run_one(*stepper, steps, tolerance, trajectory); });
+    };
+    return [run, masses = masses_of(problem)](double h, std::int64_t steps, std::vector<Trajectory>& trajectories) {
+        change_momenta(masses, trajectories, std::multiplies<>());
+        const Effort effort = run(h, steps, trajectories);
+        change_momenta(masses, trajectories, std::divides<>());
+        return effort;
     };
 }
 
@@ -138,7 +163,7 @@ bool endures(const Problem& problem, const Run& run, std::int64_t steps, const T
 
 Contestant contestant_of(const Problem& problem, Method method, double tolerance, const Kernel& kernel,
                          std::int64_t together) {
-    const Run run = run_of(kernel, tolerance);
+    const Run run = run_of(problem, kernel, tolerance);
     // Beyond this, of which `lobatto run` warns, a step must prove itself.
     const double longest = stability_limit(quadrature_of(method)) / problem.frequency;
     const auto proven = std::make_shared<std::map<std::int64_t, bool>>();
@@ -174,7 +199,7 @@ KernelSource source_of(const Problem& problem, Method method) {
 
 Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together) {
     const bool separable = derive(read_scene(scene_path(problem))).system.separable;
-    const std::vector<Method> methods = methods_in_race(few, separable);
+    const std::vector<Method> methods = methods_in_race(problem, few, separable);
     std::vector<KernelSource> sources;
     for (const Method& method : methods) sources.push_back(source_of(problem, method));
     // Compilers side by side; the generator itself is for one thread.
@@ -189,7 +214,7 @@ Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t to
     Contestants contestants;
     for (std::size_t i = 0; i < methods.size(); ++i) {
         const Kernel kernel = kernel_for(sources[i], together);
-        for (const double tolerance : tolerances)
+        for (const double tolerance : tolerances_of(problem))
             if (tolerance == 0 || methods[i].family != Family::splitting)
                 contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel, together));
     }

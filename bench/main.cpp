@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// lobatto_bench: our kernels against every peer, on the five problems of docs/benchmarks.md.
+// lobatto_bench: our kernels against every peer, on the problems of docs/benchmarks.md.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -7,6 +7,7 @@
 
 #include "bench/growth.hpp"
 #include "bench/instructions.hpp"
+#include "bench/reference.hpp"
 #include "bench/report.hpp"
 #include "runtime/error.hpp"
 
@@ -18,7 +19,8 @@ using namespace lobatto::bench;
 struct Options {
     std::vector<std::string> problems;
     std::string output = "out/bench";
-    bool ensemble = false;
+    bool ensemble = false, single = false;
+    bool references = false;
     bool growth = false, instructions = false, store = false;
     RaceOptions race;
 };
@@ -30,13 +32,19 @@ void run(const Options& options) {
         const auto& wanted = options.problems;
         if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), problem.name) == wanted.end()) continue;
         if (!options.ensemble) single.push_back(run_race(problem, 1, options.race));
-        ensemble.push_back(run_race(problem, ensemble_size, options.race));
+        if (!options.single) ensemble.push_back(run_race(problem, ensemble_size, options.race));
     }
     fill_cold_starts(single);
     fill_cold_starts(ensemble);
     print_machine();
-    print_tables(single);
-    print_tables(ensemble);
+    // Equal time scales and varying ones apart.
+    for (const std::vector<Race>* races : {&single, &ensemble})
+        for (const bool varying : {false, true}) {
+            std::vector<Race> alike;
+            std::copy_if(races->begin(), races->end(), std::back_inserter(alike),
+                         [&](const Race& race) { return race.problem->positions_only == varying; });
+            print_tables(alike);
+        }
     std::vector<Race> all = single;
     all.insert(all.end(), ensemble.begin(), ensemble.end());
     write_csv(options.output + "/measurements.csv", all);
@@ -50,12 +58,17 @@ void run(const Options& options) {
 int main(int argc, char** argv) {
     CLI::App program("The race of Lobatto's kernels against other integrators (docs/benchmarks.md).", "lobatto bench");
     Options options;
-    program.add_option("--problem", options.problems, "Only this problem, P1 to P5; may be given again")
-        ->check(CLI::IsMember({"P1", "P2", "P3", "P4", "P5"}));
+    std::vector<std::string> names;
+    for (const Problem& problem : problems()) names.push_back(problem.name);
+    program.add_option("--problem", options.problems, "Only this problem; may be given again")
+        ->check(CLI::IsMember(names));
     program.add_option("--output", options.output, "Folder of the CSV file and the diagrams")->capture_default_str();
-    program.add_flag("--ensemble", options.ensemble, "Only the ensembles");
+    CLI::Option* ensemble = program.add_flag("--ensemble", options.ensemble, "Only the ensembles");
+    program.add_flag("--single", options.single, "Only one trajectory")->excludes(ensemble);
     program.add_flag("--peers-only", options.race.peers_only, "Without our kernels");
     program.add_flag("--quick", options.race.quick, "Fewer kernels, coarser steps and fewer repetitions");
+    program.add_flag("--references", options.references,
+                     "No race: how far the references of the problems move with shorter steps");
     program.add_flag("--growth", options.growth, "No race: chains of 8 to 4096 masses, linear systems");
     CLI::Option* instructions = program.add_flag("--instructions", options.instructions,
                                                  "No race: count the instructions a step, compare with the stored");
@@ -63,7 +76,9 @@ int main(int argc, char** argv) {
     try {
         program.parse(argc, argv);
         if (options.instructions) return check_instructions(options.store);
-        if (options.growth) {
+        if (options.references) {
+            print_references(options.problems);
+        } else if (options.growth) {
             print_machine();
             print_growth();
         } else {

@@ -15,7 +15,8 @@ namespace odeint = boost::numeric::odeint;
 template <class Type, class Make>
 Contestant adaptive(const Problem& problem, const std::string& method, int order, const Make& make) {
     constexpr std::size_t size = 2 * Type::coordinates;
-    const auto run = [until = problem.until, make](double tolerance, std::vector<Trajectory>& trajectories) {
+    const auto run = [until = problem.until, most_steps = problem.most_steps, make](
+                         double tolerance, std::vector<Trajectory>& trajectories) {
         return one_by_one(trajectories, [&](Trajectory& trajectory) {
             std::array<double, size> y;
             join(trajectory, y.data());

@@ -3,6 +3,7 @@
 #include "bench/contestant.hpp"
 #include "bench/peers/gauss.hpp"
 #include "bench/peers/nystrom.hpp"
+#include "bench/peers/radau.hpp"
 #include "bench/peers/splitting.hpp"
 
 namespace lobatto::bench {
@@ -42,20 +43,40 @@ Contestant gauss(const Problem& problem) {
     });
 }
 
-template <class Type>
-Contestant nystrom(const Problem& problem) {
-    const auto run = [until = problem.until](double setting, std::vector<Trajectory>& trajectories) {
+// `integrate`(state, tolerance) returns its steps and evaluations.
+template <class Type, class Integrate>
+Contestant adaptive(const std::string& method, int order, const Integrate& integrate) {
+    const auto run = [integrate](double setting, std::vector<Trajectory>& trajectories) {
         return one_by_one(trajectories, [&](Trajectory& trajectory) {
             State<double, Type::coordinates> state;
             std::copy(trajectory.q.begin(), trajectory.q.end(), state.q.begin());
             std::copy(trajectory.p.begin(), trajectory.p.end(), state.p.begin());
-            const AdaptiveCount count = integrate_nystrom<Type>(state, until, setting);
+            const AdaptiveCount count = integrate(state, setting);
             std::copy(state.q.begin(), state.q.end(), trajectory.q.begin());
             std::copy(state.p.begin(), state.p.end(), trajectory.p.begin());
             return Effort{count.steps >= 0, count.steps, count.evaluations};
         });
     };
-    return {"Dormand-Prince Nystroem 12", 12, false, false, Ladder::tolerance, run};
+    return {method, order, false, false, Ladder::tolerance, run};
+}
+
+template <class Type>
+Contestant nystrom(const Problem& problem) {
+    return adaptive<Type>("Dormand-Prince Nystroem 12", 12, [until = problem.until](auto& state, double tolerance) {
+        return integrate_nystrom<Type>(state, until, tolerance);
+    });
+}
+
+template <class Type>
+Contestant radau(const Problem& problem) {
+    const auto integrate = [until = problem.until, most = problem.most_steps](auto& state, double tolerance) {
+        return integrate_radau<Type>(state, until, tolerance, most);
+    };
+    Contestant contestant = adaptive<Type>("Gauss-Radau 15", 15, integrate);
+    // The seventh root of it is the step; the paper recommends 1e-9, and beyond 1e-11 it asks for less than rounding.
+    contestant.coarsest = 10;
+    contestant.finest = 1e-11;
+    return contestant;
 }
 
 }  // namespace
@@ -65,6 +86,7 @@ Contestants own_peers(const Problem& problem) {
         using Type = decltype(type);
         if constexpr (Type::separable) {
             return {nystrom<Type>(problem),
+                    radau<Type>(problem),
                     splitting<Type, blanes_moan_14>(problem, "Blanes-Moan SRKN14a"),
                     splitting<Type, blanes_moan_11>(problem, "Blanes-Moan SRKN11b"),
                     splitting<Type, sofroniou_spaletta_10>(problem, "Sofroniou-Spaletta 35 stages"),

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The five problems of the race, mass 1, written by hand for the peers: accelerations where the mass matrix is
-// constant, slopes of the first-order form (q, p)' = (dH/dp, -dH/dq) for all, each for every number type.
+// The problems of the race, written by hand for the peers: accelerations where the mass matrix is constant, slopes of
+// the first-order form (q, p)' = (dH/dp, -dH/dq) for all, each for every number type. Where masses are constant, p are
+// velocities: the momenta of unit masses.
 #pragma once
 
 #include <array>
 #include <cstring>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "bench/peers/number.hpp"
@@ -17,11 +19,12 @@ struct State {
     std::array<real, n> q, p;
 };
 
-// For problems with H = p^2/2 + V(q): from the acceleration and V. y = (q, p).
+// For problems with H = sum of m_k p_k^2/2 + V(q): from the acceleration and V. y = (q, p).
 template <class Problem, int n>
 struct Separable {
-    static constexpr bool separable = true;
+    static constexpr bool separable = true, has_pace = false;
     static constexpr int coordinates = n;
+    static constexpr double mass(int) { return 1; }
     template <class real>
     static void slope(const real* y, real* dy) {
         for (int k = 0; k < n; ++k) dy[k] = y[n + k];
@@ -30,7 +33,7 @@ struct Separable {
     template <class real>
     static real energy(const real* q, const real* p) {
         real H = Problem::potential(q);
-        for (int k = 0; k < n; ++k) H += p[k] * p[k] / 2;
+        for (int k = 0; k < n; ++k) H += real(Problem::mass(k)) * p[k] * p[k] / 2;
         return H;
     }
 };
@@ -64,8 +67,9 @@ struct HenonHeiles : Separable<HenonHeiles, 2> {
 
 // P3. The double pendulum, unit masses and lengths, g = 9.81: M = (2, cos d; cos d, 1) with d = q1 - q2.
 struct DoublePendulum {
-    static constexpr bool separable = false;
+    static constexpr bool separable = false, has_pace = false;
     static constexpr int coordinates = 2;
+    static constexpr double mass(int) { return 1; }  // p are momenta
     static constexpr double g = 9.81;
     template <class real>
     static void slope(const real* y, real* dy) {
@@ -87,7 +91,7 @@ struct DoublePendulum {
     }
 };
 
-// P4. Kepler: V = -1/|q|.
+// P4, P6 and P7. Kepler: V = -1/|q|.
 struct Kepler : Separable<Kepler, 2> {
     template <class real>
     static void acceleration(const real* q, real* a) {
@@ -145,34 +149,83 @@ struct Chain : Separable<Chain, 32> {
     }
 };
 
+// P8 and P9. Three bodies in a plane, G = 1: V = -sum of m_i m_j / r_ij, q = (x1, y1, x2, y2, x3, y3).
+template <const auto& masses>
+struct ThreeBodies : Separable<ThreeBodies<masses>, 6> {
+    static constexpr bool has_pace = true;
+    static constexpr double mass(int k) { return masses[k / 2]; }
+    // action(i, j) for each pair of bodies.
+    template <class Action>
+    static void each_pair(const Action& action) {
+        action(0, 1);
+        action(1, 2);
+        action(2, 0);
+    }
+    template <class real>
+    static void acceleration(const real* q, real* a) {
+        for (int k = 0; k < 6; ++k) a[k] = 0;
+        each_pair([&](int i, int j) {
+            const real x = q[2 * j] - q[2 * i], y = q[2 * j + 1] - q[2 * i + 1];
+            const real r2 = x * x + y * y, inverse = 1 / r2, w = inverse * inverse * square_root(r2);
+            const real toward = real(masses[j]) * w, back = real(masses[i]) * w;
+            a[2 * i] += toward * x;
+            a[2 * i + 1] += toward * y;
+            a[2 * j] -= back * x;
+            a[2 * j + 1] -= back * y;
+        });
+    }
+    template <class real>
+    static real potential(const real* q) {
+        real V = 0;
+        each_pair([&](int i, int j) {
+            const real x = q[2 * j] - q[2 * i], y = q[2 * j + 1] - q[2 * i + 1];
+            V -= real(masses[i] * masses[j]) / square_root(x * x + y * y);
+        });
+        return V;
+    }
+    // The time in which the nearest pair falls together, about: how long a step of the reference may be.
+    template <class real>
+    static real pace(const real* q) {
+        real sum = 0;
+        each_pair([&](int i, int j) {
+            const real x = q[2 * j] - q[2 * i], y = q[2 * j + 1] - q[2 * i + 1], r2 = x * x + y * y;
+            sum += real(masses[i] + masses[j]) / (r2 * square_root(r2));
+        });
+        return 1 / square_root(sum);
+    }
+};
+inline constexpr std::array pythagorean_masses = {3.0, 4.0, 5.0}, hierarchical_masses = {0.5, 0.5, 0.125};
+using Pythagorean = ThreeBodies<pythagorean_masses>;
+using Hierarchical = ThreeBodies<hierarchical_masses>;
+
+using AnyProblem = std::variant<Pendulum, HenonHeiles, DoublePendulum, Kepler, Chain, Pythagorean, Hierarchical>;
+
+// What a reference is computed by: a formula; quadruple precision; 80 bits, for ensembles only or for all.
+enum class Reference { closed, quadruple, quadruple_for_one, extended };
+
 // The same for what is chosen at run time. Numbers are the nearest doubles of the problem's.
 struct Problem {
     std::string name;   // "P1"
     std::string title;  // "pendulum"
     std::string scene;  // file below bench/scenes/
-    double until;       // T
+    AnyProblem type;
+    double until;  // T
     std::vector<double> q, p;
-    double longest_step;   // where the scan of steps begins
-    double frequency;      // the highest of small motions: our steps stay within the linear stability limit
-    long reference_steps;  // of the reference solution
+    double longest_step;  // where the scan of steps begins
+    double frequency;     // the highest of small motions: our steps stay within the linear stability limit
+    Reference reference = Reference::quadruple_for_one;
+    double reference_step = 0;    // where there is a pace, times the pace
+    double spread = 1e-3;         // how far the starts of an ensemble lie apart
+    bool positions_only = false;  // are compared, because velocities are large where bodies are close
+    double revolutions = 0;       // in T; where steps are counted by revolution
+    long most_steps = 200'000;    // of an adaptive method, whose solution has escaped to infinity else
 };
 const std::vector<Problem>& problems();
 
 // Calls action with the problem's type: action(Pendulum()).
 template <class Action>
-auto with_type_of(const Problem& problem, Action action) {
-    switch (problem.name[1]) {
-        case '1':
-            return action(Pendulum());
-        case '2':
-            return action(HenonHeiles());
-        case '3':
-            return action(DoublePendulum());
-        case '4':
-            return action(Kepler());
-        default:
-            return action(Chain());
-    }
+auto with_type_of(const Problem& problem, const Action& action) {
+    return std::visit(action, problem.type);
 }
 
 }  // namespace lobatto::bench

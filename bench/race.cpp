@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <map>
 
@@ -23,37 +23,48 @@ struct Course {
     std::vector<Trajectory> starts, ends;
 };
 
-// Trajectory i of an ensemble: the first coordinate times 1 + i/1000.
+// Trajectory i of an ensemble: the first coordinate times 1 + i spread.
 Course course_of(const Problem& problem, int trajectories) {
     Course course{problem, {}, {}};
     for (int i = 0; i < trajectories; ++i) {
         Trajectory start{problem.q, problem.p};
-        start.q[0] *= 1 + 1e-3 * i;
+        start.q[0] *= 1 + problem.spread * i;
         course.starts.push_back(start);
         course.ends.push_back(i == 0 ? reference_end(problem, start) : quick_reference_end(problem, start));
     }
     return course;
 }
 
-double distance(const Trajectory& a, const Trajectory& b) {
+double distance(const Problem& problem, const Trajectory& a, const Trajectory& b) {
     double largest = 0;
-    for (std::size_t k = 0; k < a.q.size(); ++k)
-        for (const double difference : {a.q[k] - b.q[k], a.p[k] - b.p[k]})
-            largest = std::isfinite(difference) ? std::max(largest, std::fabs(difference)) : infinity;
+    const auto compare = [&](double x, double y) {
+        largest = std::isfinite(x - y) ? std::max(largest, std::fabs(x - y)) : infinity;
+    };
+    for (std::size_t k = 0; k < a.q.size(); ++k) {
+        compare(a.q[k], b.q[k]);
+        if (!problem.positions_only) compare(a.p[k], b.p[k]);
+    }
     return largest;
+}
+
+// Of this thread: others may use the machine at the same time.
+double processor_seconds() {
+    std::timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 Measurement measure(const Course& course, const Contestant& contestant, double setting) {
     std::vector<Trajectory> trajectories = course.starts;
-    const auto start = std::chrono::steady_clock::now();
+    const double start = processor_seconds();
     const Effort effort = contestant.run(setting, trajectories);
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    const double elapsed = processor_seconds() - start;
     const double count = static_cast<double>(trajectories.size());
-    Measurement result{setting, elapsed.count() / count, 0, 0, effort.steps, effort.evaluations};
+    Measurement result{setting, elapsed / count, 0, 0, effort.steps, effort.evaluations};
     result.steps /= static_cast<long>(trajectories.size());
     result.evaluations /= static_cast<long>(trajectories.size());
     for (std::size_t i = 0; i < trajectories.size(); ++i) {
-        result.error = std::max(result.error, distance(trajectories[i], course.ends[i]));
+        result.error = std::max(result.error, distance(course.problem, trajectories[i], course.ends[i]));
         const double H0 = energy_of(course.problem, course.starts[i]), H = energy_of(course.problem, trajectories[i]);
         result.energy_error = std::max(result.energy_error, std::fabs(H / H0 - 1));
     }
@@ -61,12 +72,18 @@ Measurement measure(const Course& course, const Contestant& contestant, double s
     return result;
 }
 
-// Numbers of steps in ratios of about 2^(1/4); tolerances in ratios of 3, or of 30 where each must be compiled.
+// Where a run takes seconds, fewer settings are tried and sooner given up.
+bool is_long(const Problem& problem) {
+    return problem.revolutions > 1000;
+}
+
+// Numbers of steps in ratios of about 2^(1/4); tolerances in the contestant's ratio; quick ones in larger ratios.
 std::vector<double> ladder_of(const Problem& problem, const Contestant& contestant, bool quick) {
     std::vector<double> settings;
     if (contestant.ladder == Ladder::tolerance) {
-        const double ratio = quick || contestant.prepare ? std::sqrt(1000) : std::sqrt(10);
-        for (double tolerance = 1e-3; tolerance > 0.9e-16; tolerance /= ratio) settings.push_back(tolerance);
+        const double ratio = quick ? std::max(contestant.ratio, 10.0) : contestant.ratio;
+        for (double tolerance = contestant.coarsest; tolerance > 0.9 * contestant.finest; tolerance /= ratio)
+            settings.push_back(tolerance);
         return settings;
     }
     const double ratio = quick ? std::sqrt(2) : std::sqrt(std::sqrt(2)), longest = 1e8;
@@ -79,13 +96,19 @@ std::vector<double> ladder_of(const Problem& problem, const Contestant& contesta
 // methods may be slowest at the coarsest steps, so one slow setting is not the end.
 void scan(const Course& course, Lane& lane, bool quick, double time_limit) {
     const int beyond = 4;
-    const double trajectories = static_cast<double>(course.starts.size());
+    const double trajectories = static_cast<double>(course.starts.size()), most_preparation = 60;
+    double preparation = 0;
     int fine = 0, slow = 0;
-    for (const double setting : ladder_of(course.problem, lane.contestant, quick)) {
+    for (const double setting : ladder_of(course.problem, lane.contestant, quick || is_long(course.problem))) {
+        if (preparation > most_preparation) break;
         const double prepared = lane.contestant.prepare ? lane.contestant.prepare(setting, course.starts.size()) : 0;
+        preparation += prepared;
         Measurement best = measure(course, lane.contestant, setting);
         // Short runs are repeated, and so are those that seem too slow: another program may have been in the way.
-        const auto doubtful = [&] { return best.seconds < 2e-3 / trajectories || best.seconds > time_limit; };
+        const auto doubtful = [&] {
+            const double all = best.seconds * trajectories;
+            return all < 2e-3 || (best.seconds > time_limit && all < 0.1);
+        };
         for (int repetition = 0; repetition < 2 && doubtful(); ++repetition)
             best.seconds = std::min(best.seconds, measure(course, lane.contestant, setting).seconds);
         best.compile_seconds = prepared;
@@ -103,14 +126,14 @@ double fastest(const Lane& lane, double target) {
     return seconds;
 }
 
-// Eight times what the best so far needs for the finest target that anyone reached.
-double time_limit_of(const std::vector<Lane>& lanes) {
+// Eight times what the best so far needs for the finest target that anyone reached, in long races three times.
+double time_limit_of(const Problem& problem, const std::vector<Lane>& lanes) {
     for (std::size_t i = targets.size(); i-- > 0;) {
         double best = infinity;
         for (const Lane& lane : lanes) best = std::min(best, fastest(lane, targets[i]));
-        if (best < infinity) return 8 * best;
+        if (best < infinity) return (is_long(problem) ? 3 : 8) * best;
     }
-    return 0.1;
+    return 5;
 }
 
 // The few settings of a lane that may be its fastest for a target.
@@ -138,11 +161,14 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
     const auto enter = [&](Contestants more) { std::move(more.begin(), more.end(), std::back_inserter(contestants)); };
     enter(own_peers(problem));
     enter(taylor_peer(problem));
+#ifdef LOBATTO_BENCH_CLANG
+    enter(taylor_peer_by_clang(problem));
+#endif
     enter(odeint_peers(problem));
     enter(gsl_peers(problem));
     enter(sundials_peers(problem));
 #ifdef LOBATTO_BENCH_HEYOKA
-    enter(heyoka_peers(problem));
+    enter(heyoka_peers(problem, trajectories));
 #endif
     if (!options.peers_only) {
         say(race, "kernels");
@@ -151,7 +177,7 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
     for (Contestant& contestant : contestants) {
         say(race, contestant.method);
         Lane lane{std::move(contestant), {}, {}};
-        scan(course, lane, options.quick, time_limit_of(race.lanes));
+        scan(course, lane, options.quick, time_limit_of(problem, race.lanes));
         race.lanes.push_back(std::move(lane));
     }
 
@@ -163,7 +189,8 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
                 const auto known = [&](const auto& finalist) { return finalist.second == m; };
                 if (std::none_of(finalists.begin(), finalists.end(), known)) finalists.push_back({&lane.contestant, m});
             }
-    for (int repetition = 0; repetition < (options.quick || trajectories > 1 ? 5 : 9); ++repetition)
+    const int repetitions = is_long(problem) ? 3 : options.quick || trajectories > 1 ? 5 : 9;
+    for (int repetition = 0; repetition < repetitions; ++repetition)
         for (auto& [contestant, m] : finalists)
             m->seconds = std::min(m->seconds, measure(course, *contestant, m->setting).seconds);
     for (Lane& lane : race.lanes)

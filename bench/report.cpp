@@ -150,7 +150,8 @@ void print_tables(const std::vector<Race>& races) {
 
 void write_csv(const std::string& path, const std::vector<Race>& races) {
     std::ofstream file(path);
-    file << "problem,target,method,setting,order,symplectic,compile_s,wall_s,error,energy_error,steps,evaluations\n";
+    file << "problem,target,method,setting,order,symplectic,compile_s,processor_s,error,energy_error,steps,"
+            "evaluations\n";
     for (const Race& race : races)
         for (const Lane& lane : race.lanes) {
             for (const Measurement& m : lane.scan) write_line(file, race, lane, m, "");

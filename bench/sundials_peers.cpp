@@ -37,7 +37,7 @@ struct Workspace {
 };
 
 template <class Type>
-Effort run_arkode(double until, double tolerance, std::vector<Trajectory>& trajectories) {
+Effort run_arkode(double until, long most_steps, double tolerance, std::vector<Trajectory>& trajectories) {
     Workspace work(2 * Type::coordinates);
     double* const y = N_VGetArrayPointer(work.y);
     join(trajectories.front(), y);
@@ -63,7 +63,7 @@ Effort run_arkode(double until, double tolerance, std::vector<Trajectory>& traje
 }
 
 template <class Type>
-Effort run_cvode(double until, double tolerance, std::vector<Trajectory>& trajectories) {
+Effort run_cvode(double until, long most_steps, double tolerance, std::vector<Trajectory>& trajectories) {
     Workspace work(2 * Type::coordinates);
     double* const y = N_VGetArrayPointer(work.y);
     join(trajectories.front(), y);
@@ -97,12 +97,13 @@ Contestants sundials_peers(const Problem& problem) {
     return with_type_of(problem, [&](auto type) -> Contestants {
         using Type = decltype(type);
         const double until = problem.until;
+        const long most_steps = problem.most_steps;
         return {{"ARKODE Fehlberg 13-7-8", 8, false, false, Ladder::tolerance,
-                 [until](double tolerance, auto& trajectories) {
-                     return run_arkode<Type>(until, tolerance, trajectories);
+                 [=](double tolerance, auto& trajectories) {
+                     return run_arkode<Type>(until, most_steps, tolerance, trajectories);
                  }},
-                {"CVODE Adams", 0, false, false, Ladder::tolerance, [until](double tolerance, auto& trajectories) {
-                     return run_cvode<Type>(until, tolerance, trajectories);
+                {"CVODE Adams", 0, false, false, Ladder::tolerance, [=](double tolerance, auto& trajectories) {
+                     return run_cvode<Type>(until, most_steps, tolerance, trajectories);
                  }}};
     });
 }

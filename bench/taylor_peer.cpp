@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Our own implementation of Taylor's method as a contestant, in a file of its own for the compiler options that suit
-// it.
+// it; compiled by clang++ a second time where that is installed.
 #include <memory>
 
 #include "bench/contestant.hpp"
@@ -9,6 +9,12 @@
 namespace lobatto::bench {
 
 namespace {
+
+#ifdef LOBATTO_BENCH_BY_CLANG
+const char* const method = "Taylor series, by clang++";
+#else
+const char* const method = "Taylor series";
+#endif
 
 // Eight trajectories side by side, what is left one by one; chains all one by one, eight masses side by side: faster.
 template <class Type>
@@ -39,12 +45,16 @@ Contestant taylor(const Problem& problem) {
         for (; first < trajectories.size(); ++first) take(*single, first, 1);
         return all;
     };
-    return {"Taylor series", 0, false, false, Ladder::tolerance, run};
+    return {method, 0, false, false, Ladder::tolerance, run};
 }
 
 }  // namespace
 
+#ifdef LOBATTO_BENCH_BY_CLANG
+Contestants taylor_peer_by_clang(const Problem& problem) {
+#else
 Contestants taylor_peer(const Problem& problem) {
+#endif
     return with_type_of(problem, [&](auto type) -> Contestants { return {taylor<decltype(type)>(problem)}; });
 }
 

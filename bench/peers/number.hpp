@@ -9,6 +9,8 @@ extern "C" {  // of libquadmath
 __float128 sinq(__float128) noexcept;
 __float128 cosq(__float128) noexcept;
 __float128 sqrtq(__float128) noexcept;
+__float128 asinq(__float128) noexcept;
+__float128 floorq(__float128) noexcept;
 }
 
 namespace lobatto::bench {

@@ -18,6 +18,9 @@ namespace lobatto::bench {
 typedef double Eight __attribute__((vector_size(8 * sizeof(double))));
 typedef std::int64_t EightIntegers __attribute__((vector_size(8 * sizeof(double))));
 
+// Four numbers: those of the pairs of three bodies, and one to spare.
+typedef double Four __attribute__((vector_size(4 * sizeof(double))));
+
 inline constexpr int most_orders = 20;  // what a tolerance of 1e-16 asks for
 
 // Coefficients of 1, t, t^2, ... of one variable.
@@ -47,6 +50,17 @@ inline Eight square_root(Eight x) {
     for (int i = 0; i < 8; ++i) result[i] = std::sqrt(x[i]);
     return result;
 }
+template <>
+inline Four square_root(Four x) {
+    return Four{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
+}
+
+// The race has this method from both compilers: of functions of one name the linker would keep one.
+#ifdef __clang__
+inline namespace by_clang {
+#else
+inline namespace by_gnu {
+#endif
 
 // term(0) + ... + term(count - 1), the index known when it is compiled, in four sums that do not wait for each other.
 template <int count, class Term>
@@ -87,13 +101,17 @@ WRITTEN_OUT inline real later_product(const Series<real>& a, const Series<real>&
         return sum_of<k - 1>([&](auto j) WRITTEN_OUT { return a[j + 1] * b[k - 1 - j]; }) + a[k] * b[0];
 }
 
-// The type of constants beside a number: Eight takes double for each of its parts.
+// The type of constants beside a number: Eight and Four take double for each of their parts.
 template <class real>
 struct ConstantOf {
     using type = real;
 };
 template <>
 struct ConstantOf<Eight> {
+    using type = double;
+};
+template <>
+struct ConstantOf<Four> {
     using type = double;
 };
 template <class real>
@@ -188,6 +206,18 @@ struct Expansion<DoublePendulum, real> {
     }
 };
 
+// Coefficient k > 0 of r2 = x^2 + y^2, and of w = r2^(-3/2) by k r2 w' + 3/2 r2' w = 0; over = 1/r2.
+template <int k, class real>
+WRITTEN_OUT inline void inverse_cube(const Series<real>& x, const Series<real>& y, const real& over, Series<real>& r2,
+                                     Series<real>& w) {
+    r2[k] = square<k>(x) + square<k>(y);
+    const auto term = [&](auto j) WRITTEN_OUT { return -((3 * k - j) * inverse<real, 2 * k>)*r2[k - j] * w[j]; };
+    real sum = term(std::integral_constant<int, 0>());
+    if constexpr (k > 1)
+        sum += sum_of<k - 1>([&](auto j) WRITTEN_OUT { return term(std::integral_constant<int, j + 1>()); });
+    w[k] = over * sum;
+}
+
 template <class real>
 struct Expansion<Kepler, real> {
     Series<real> y[4], r2, w;  // w = |q|^-3
@@ -197,22 +227,66 @@ struct Expansion<Kepler, real> {
         const real over = 1 / r2[0];
         w[0] = over * over * square_root(r2[0]);
         for_orders(order, [&](auto k) WRITTEN_OUT {
-            if constexpr (k > 0) {
-                // k r2 w' + 3/2 r2' w = 0.
-                r2[k] = square<k>(x1) + square<k>(x2);
-                const auto term = [&](auto j)
-                                      WRITTEN_OUT { return -((3 * k - j) * inverse<real, 2 * k>)*r2[k - j] * w[j]; };
-                real sum = term(std::integral_constant<int, 0>());
-                if constexpr (k > 1)
-                    sum +=
-                        sum_of<k - 1>([&](auto j) WRITTEN_OUT { return term(std::integral_constant<int, j + 1>()); });
-                w[k] = over * sum;
-            }
+            if constexpr (k > 0) inverse_cube<k>(x1, x2, over, r2, w);
             constexpr auto factor = inverse<real, k + 1>;
             x1[k + 1] = factor * p1[k];
             x2[k + 1] = factor * p2[k];
             p1[k + 1] = -factor * product<k>(w, x1);
             p2[k + 1] = -factor * product<k>(w, x2);
+        });
+    }
+};
+
+// Three bodies. A row is one pair or, of one trajectory in double, all three: lane i is the pair of bodies i and i + 1.
+template <const auto& masses, class real>
+struct Expansion<ThreeBodies<masses>, real> {
+    static constexpr bool side_by_side = std::is_same_v<real, double>;
+    using Row = std::conditional_t<side_by_side, Four, real>;
+    static constexpr int rows = side_by_side ? 1 : 3;
+    Series<real> y[12];  // the bodies' x and y in turn, then their slopes
+    Series<Row> dx[rows], dy[rows], r2[rows], w[rows];
+
+    // From body i to the next, coordinate c of both; the lane to spare stands still at a distance of 1.
+    template <int k>
+    WRITTEN_OUT void subtract(Series<Row>* d, int c) {
+        if constexpr (side_by_side)
+            d[0][k] = Four{y[2 + c][k], y[4 + c][k], y[c][k], k == 0 && c == 0 ? 1.0 : 0.0} -
+                      Four{y[c][k], y[2 + c][k], y[4 + c][k], 0};
+        else
+            for (int i = 0; i < 3; ++i) d[i][k] = y[2 * ((i + 1) % 3) + c][k] - y[2 * i + c][k];
+    }
+    template <int k>
+    WRITTEN_OUT void pull(const Series<Row>* d, int c) {
+        constexpr auto factor = inverse<real, k + 1>;
+        real f[3];
+        if constexpr (side_by_side) {
+            const Four all = product<k>(w[0], d[0]);
+            for (int i = 0; i < 3; ++i) f[i] = all[i];
+        } else {
+            for (int i = 0; i < 3; ++i) f[i] = product<k>(w[i], d[i]);
+        }
+        using constant = Constant<real>;
+        for (int i = 0; i < 3; ++i)
+            y[6 + 2 * i + c][k + 1] = (factor * constant(masses[(i + 1) % 3])) * f[i] -
+                                      (factor * constant(masses[(i + 2) % 3])) * f[(i + 2) % 3];
+    }
+    void expand(int order) {
+        Row over[rows] = {};
+        for_orders(order, [&](auto k) WRITTEN_OUT {
+            subtract<k>(dx, 0);
+            subtract<k>(dy, 1);
+            for (int i = 0; i < rows; ++i) {
+                if constexpr (k == 0) {
+                    r2[i][0] = dx[i][0] * dx[i][0] + dy[i][0] * dy[i][0];
+                    over[i] = 1 / r2[i][0];
+                    w[i][0] = over[i] * over[i] * square_root(r2[i][0]);
+                } else {
+                    inverse_cube<k>(dx[i], dy[i], over[i], r2[i], w[i]);
+                }
+            }
+            for (int c = 0; c < 6; ++c) y[c][k + 1] = inverse<real, k + 1> * y[6 + c][k];
+            pull<k>(dx, 0);
+            pull<k>(dy, 1);
         });
     }
 };
@@ -378,4 +452,5 @@ AdaptiveCount integrate_taylor(Expansion<Problem, real>& x, double until, double
     return counts;
 }
 
+}  // namespace by_clang or by_gnu
 }  // namespace lobatto::bench

@@ -7,7 +7,9 @@
 #include <memory>
 
 #include "bench/peers/gauss.hpp"
+#include "bench/peers/kepler.hpp"
 #include "bench/peers/nystrom.hpp"
+#include "bench/peers/radau.hpp"
 #include "bench/peers/splitting.hpp"
 #include "bench/peers/taylor.hpp"
 #include "bench/reference.hpp"
@@ -152,6 +154,43 @@ TEST_CASE("the adaptive peer keeps the tolerance it was given, about") {
     CHECK(count.evaluations >= 17 * count.steps);
 }
 
+TEST_CASE("Gauss-Radau has order 15, and its nodes are zeros of P_7 + P_8") {
+    for (int i = 1; i < RadauTable::nodes; ++i) {
+        const auto P = shifted_legendre<8>(radau_15.c[i]);
+        CHECK(std::fabs(static_cast<double>(P[7] + P[8])) < 1e-22);  // measured: 2e-24, their 25 digits
+    }
+    // Measured: 15.03 (24 and 48 steps; with fewer the order has not set in).
+    const auto radau = [](Planar& s, Quad h, long m) { integrate_radau_fixed<Kepler>(s, h, m, exact("1e-30")); };
+    CHECK(measured_order<Kepler>({{Quad(0.7), 0}, {0, Quad(1.36)}}, radau, 2, 24) == doctest::Approx(15).epsilon(0.02));
+}
+
+TEST_CASE("Gauss-Radau's steps follow an eccentric orbit, and its energy stays at rounding") {
+    for (const double eccentricity : {0.9, 0.99}) {
+        CAPTURE(eccentricity);
+        const Trajectory begin{{1 - eccentricity, 0}, {0, std::sqrt((1 + eccentricity) / (1 - eccentricity))}};
+        State<double, 2> state{{begin.q[0], begin.q[1]}, {begin.p[0], begin.p[1]}};
+        const double until = 100;
+        const AdaptiveCount count = integrate_radau<Kepler>(state, until, 1e-9, 200'000);
+        const auto end = kepler_after({{begin.q[0], begin.q[1]}, {begin.p[0], begin.p[1]}}, until);
+        const double energy = Kepler::energy(state.q.data(), state.p.data());
+        const double before = Kepler::energy(begin.q.data(), begin.p.data());
+        MESSAGE(count.steps << " steps, energy " << energy / before - 1);
+        CHECK(count.steps > 0);
+        for (int k = 0; k < 2; ++k) CHECK(std::fabs(state.q[k] - static_cast<double>(end.q[k])) < 1e-10);
+        CHECK(std::fabs(energy / before - 1) < 1e-13);
+    }
+}
+
+TEST_CASE("Kepler's closed solution is that of Gauss collocation") {
+    const Planar begin{{Quad(0.7), Quad(0.1)}, {Quad(-0.2), Quad(1.36)}};
+    for (const double until : {0.3, 4.0, 30.0}) {
+        CAPTURE(until);
+        Planar state = begin;
+        integrate_gauss<12, Kepler>(state, Quad(until) / 2000, 2000, exact("1e-31"));
+        CHECK(distance(state, kepler_after(begin, until)) < 1e-25);
+    }
+}
+
 TEST_CASE("a Taylor series has the order at which it is cut") {
     const auto order_of = [](auto problem, const Planar& start, int order) {
         using Type = decltype(problem);
@@ -169,7 +208,10 @@ TEST_CASE("a Taylor series has the order at which it is cut") {
 
 TEST_CASE("Taylor series reach the ends of the race's problems, alone and eight side by side") {
     for (const Problem& problem : problems()) {
+        if (problem.name == "P8b" || problem.name == "P9") continue;  // as P8, longer
         CAPTURE(problem.name);
+        // Measured: P6 3e-11, P7 6e-11, P8 2e-11.
+        const double bound = problem.positions_only ? 1e-9 : 1e-11;
         with_type_of(problem, [&](auto type) {
             using Type = decltype(type);
             constexpr int n = Type::coordinates;
@@ -181,7 +223,7 @@ TEST_CASE("Taylor series reach the ends of the race's problems, alone and eight 
                     put(x, n + k, lane, problem.p[k]);
                 }
             };
-            const auto factor_of = [](int lane) { return 1 + 1e-3 * (lane % 5); };
+            const auto factor_of = [&](int lane) { return 1 + problem.spread * (lane % 5); };
             for (int lane = 0; lane < 8; ++lane) start(*eight, lane, factor_of(lane));
             const long steps = integrate_taylor(*eight, problem.until, 1e-15).steps;
             const Trajectory end = reference_end(problem, {problem.q, problem.p});
@@ -190,11 +232,11 @@ TEST_CASE("Taylor series reach the ends of the race's problems, alone and eight 
                 CAPTURE(lane);
                 start(*alone, 0, factor_of(lane));
                 sum += integrate_taylor(*alone, problem.until, 1e-15).steps;
-                for (int k = 0; k < 2 * n; ++k) {
+                for (int k = 0; k < (problem.positions_only ? n : 2 * n); ++k) {
                     CAPTURE(k);
                     const double value = get(*alone, k, 0);
-                    if (lane == 0) CHECK(std::fabs(value - (k < n ? end.q[k] : end.p[k - n])) < 1e-11);
-                    CHECK(std::fabs(get(*eight, k, lane) - value) < 1e-11);
+                    if (lane == 0) CHECK(std::fabs(value - (k < n ? end.q[k] : end.p[k - n])) < bound);
+                    CHECK(std::fabs(get(*eight, k, lane) - value) < bound);
                 }
             }
             CHECK(std::labs(steps - sum) <= sum / 50);
@@ -243,6 +285,16 @@ TEST_CASE("the computed ends of the race's problems agree with those of another 
             if (!std::isnan(known[i].q[k])) CHECK(std::fabs(end.q[k] - known[i].q[k]) < bound);
             if (!std::isnan(known[i].p[k])) CHECK(std::fabs(end.p[k] - known[i].p[k]) < bound);
         }
+    }
+}
+
+TEST_CASE("the references of close encounters do not move with shorter steps") {
+    for (const Problem& problem : problems()) {
+        if (problem.reference != Reference::quadruple) continue;
+        CAPTURE(problem.name);
+        const Trajectory start{problem.q, problem.p};
+        const Trajectory end = reference_end(problem, start), finer = reference_end(problem, start, 0.8);
+        for (std::size_t k = 0; k < end.q.size(); ++k) CHECK(std::fabs(end.q[k] - finer.q[k]) < 1e-15);
     }
 }
 
