@@ -21,7 +21,7 @@ struct harmonic_oscillator {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "848b818dfbf9d8ed";
+    static constexpr const char* digest = "ff64d98617989416";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -73,7 +73,7 @@ struct harmonic_oscillator {
     };
     using Coefficients = CoefficientsOf<real>;
 
-    // Values of stage parameter and step size.
+    // The coefficients of these parameters and this step size.
     static Status prepare(const Parameters& p, real h, Coefficients& k) {
         k.m = p.m;
         k.omega_squared = p.omega * p.omega;

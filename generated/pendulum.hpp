@@ -20,7 +20,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "8f5322287b7e8e24";
+    static constexpr const char* digest = "0c137ae9d1bc4305";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -86,7 +86,7 @@ struct pendulum {
     };
     using Coefficients = CoefficientsOf<real>;
 
-    // Values of stage parameter and step size.
+    // The coefficients of these parameters and this step size.
     static Status prepare(const Parameters& p, real, Coefficients& k) {
         k.m = p.m;
         k.omega_squared = p.omega * p.omega;

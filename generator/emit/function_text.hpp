@@ -12,7 +12,7 @@
 
 namespace lobatto {
 
-// Values of stage parameter or step size that later stages use: the fields of the emitted struct Coefficients.
+// Values of the phases parameter and step size that later phases use: the fields of the emitted struct Coefficients.
 struct Hoisted {
     explicit Hoisted(const Programs& programs);
     std::vector<Id> order;            // operands before users, parameters and h first

@@ -290,7 +290,7 @@ private:
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else
             text += "        return Status::ok;\n";
-        return "\n    // Values of stage parameter and step size.\n" +
+        return "\n    // The coefficients of these parameters and this step size.\n" +
                signature("Status", "prepare", {{"const Parameters&", "p"}, {"real", "h"}, {"Coefficients&", "k"}},
                          text) +
                text + "    }\n";

@@ -95,7 +95,7 @@ typedef struct lobatto_kernel {
 
     /* Life of a stepper: memory of stepper_bytes bytes that the caller owns, with this alignment. */
     int32_t (*prepare)(void* stepper, const void* parameters,
-                       const void* step); /* values of stage parameter and step size */
+                       const void* step); /* values of parameters and step size */
     int32_t (*start)(void* stepper, const void* time, const void* q,
                      const void* p); /* forgets what earlier steps left */
     int32_t (*advance)(void* stepper, lobatto_advance* call);
@@ -118,21 +118,23 @@ typedef struct lobatto_kernel {
                         void* F); /* the step's equations at X, N */
     int32_t (*jacobian)(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                         void* J); /* dF/dX, N x N */
+    /* One step from (q, p) and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p. */
     int32_t (*tangent)(const void* stepper, const void* time, const void* q, const void* p, void* q1, void* p1,
-                       void* T); /* one step from (q, p)
-and its tangent map d(q1, p1)/d(q, p), 2n x 2n, rows and columns q then p */
+                       void* T);
 
     /* Ensembles: `lanes` trajectories side by side, with one step size and one time. Memory of ensemble_bytes bytes
      * that the caller owns, with this alignment. All arrays are lane-major: lane l has parameters[l * parameters ...],
      * q[l * n ...], p[l * n ...]. status: one lobatto_status a lane, which each function sets; a lane whose status is
      * not LOBATTO_OK on entry of start or advance is left alone: where it has not started, its state means nothing.
      * No lane's results depend on its neighbours. */
-    int32_t lanes; /* 0: none, and the functions are null; else `advance` takes its steps without fixed_point */
+    /* 0: none, and the functions are null. Else a stepper is what a lane falls back on: `advance` takes its steps by
+     * Newton's iteration; dense, events, residual, jacobian and tangent are unsupported. */
+    int32_t lanes;
     int32_t ensemble_bytes;
     int32_t ensemble_alignment;
     void (*ensemble_prepare)(void* ensemble, const void* parameters, const void* step, int32_t* status);
     void (*ensemble_start)(void* ensemble, const void* time, const void* q, const void* p, int32_t* status);
-    /* steps_done and iterations (fixed_point): one a lane, of this call. A failed lane keeps its last good state. */
+    /* steps_done and iterations: one a lane, of this call. A failed lane keeps its last good state. */
     void (*ensemble_advance)(void* ensemble, int64_t steps, double tolerance, int32_t* status, int64_t* steps_done,
                              int64_t* iterations);
     void (*ensemble_state)(const void* ensemble, void* q, void* p);

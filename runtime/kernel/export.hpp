@@ -59,9 +59,11 @@ struct ExportEnsemble {
 template <class K, class E = NoEnsemble>
 struct Export {
     using real = typename K::real;
-    using S = std::conditional_t<(K::events > 0), WatchedStepper<K>, Stepper<K>>;
-    static constexpr int n = K::coordinates;
-    static constexpr bool has_dense = K::form != Form::linear_map;
+    // Beside lanes, which have functions of their own, a single trajectory takes steps and does no more.
+    static constexpr bool is_whole = E::lanes == 0;
+    static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
+    static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
+    using S = std::conditional_t<(event_count > 0), WatchedStepper<K>, Stepper<K>>;
 
     static const S& of(const void* stepper) { return *static_cast<const S*>(stepper); }
     static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
@@ -74,7 +76,7 @@ struct Export {
         S* const fresh = new (stepper) S;
         if (*in(step) == real(0)) return LOBATTO_TIME_STANDS_STILL;
         if (!is_finite(*in(step))) return LOBATTO_NOT_FINITE;
-        if constexpr (K::events > 0) fresh->parameters = values;
+        if constexpr (event_count > 0) fresh->parameters = values;
         return code(fresh->prepare(values, *in(step)));
     }
 
@@ -86,7 +88,8 @@ struct Export {
         call->steps_done = call->records_written = call->events_written = call->iterations = 0;
         call->iterations_most = 0;
         call->increment_largest = call->increment_failed = 0.0;
-        if ((call->dense > 0 && (!has_dense || call->record_every != 1)) || (call->events != nullptr && K::events == 0))
+        if ((call->dense > 0 && (!has_dense || call->record_every != 1)) ||
+            (call->events != nullptr && event_count == 0))
             return call->status = LOBATTO_UNSUPPORTED;
         if constexpr (sizeof(S) <= 4096) {
             S local = of(stepper);  // a local copy: the optimiser may keep it in registers
@@ -99,7 +102,7 @@ struct Export {
     }
 
     static Status advance_in(S& stepper, lobatto_advance& call) {
-        if constexpr (K::events > 0) {
+        if constexpr (event_count > 0) {
             if (call.events != nullptr) {
                 Events<K> events(stepper);
                 return take_steps(stepper, call, &events);
@@ -134,8 +137,8 @@ struct Export {
             }
             if constexpr (has_events) {
                 real* const rows = out(call.events) + call.events_written * AnyEvents::columns;
-                const Status looked = events->look(stepper, rows, call.events_written);
-                if (looked != Status::ok) return looked;
+                const Status found = events->find(stepper, rows, call.events_written);
+                if (found != Status::ok) return found;
             }
             if (--until_record == 0) {
                 if constexpr (has_dense) {
@@ -195,15 +198,18 @@ struct Export {
     }
     static std::int32_t residual(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                                  void* F) {
-        return code(of(stepper).residual(*in(time), in(q), in(p), in(X), out(F)));
+        if constexpr (is_whole) return code(of(stepper).residual(*in(time), in(q), in(p), in(X), out(F)));
+        return LOBATTO_UNSUPPORTED;
     }
     static std::int32_t jacobian(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                                  void* J) {
-        return code(of(stepper).jacobian(*in(time), in(q), in(p), in(X), out(J)));
+        if constexpr (is_whole) return code(of(stepper).jacobian(*in(time), in(q), in(p), in(X), out(J)));
+        return LOBATTO_UNSUPPORTED;
     }
     static std::int32_t tangent(const void* stepper, const void* time, const void* q, const void* p, void* q1, void* p1,
                                 void* T) {
-        return code(of(stepper).tangent(*in(time), in(q), in(p), out(q1), out(p1), out(T)));
+        if constexpr (has_tangent) return code(of(stepper).tangent(*in(time), in(q), in(p), out(q1), out(p1), out(T)));
+        return LOBATTO_UNSUPPORTED;
     }
 
     static constexpr lobatto_real kind() {
@@ -213,7 +219,7 @@ struct Export {
                                                       : LOBATTO_FLOAT128;
     }
     static constexpr std::int32_t events_of_step() {
-        if constexpr (K::events > 0)
+        if constexpr (event_count > 0)
             return Events<K>::most;
         else
             return 0;
@@ -235,9 +241,9 @@ struct Export {
                                              K::autonomous ? 1 : 0,
                                              K::linear ? 1 : 0,
                                              K::has_energy ? 1 : 0,
-                                             K::has_tangent ? 1 : 0,
+                                             has_tangent ? 1 : 0,
                                              has_dense ? 1 : 0,
-                                             K::events,
+                                             event_count,
                                              events_of_step(),
                                              sizeof(S),
                                              alignof(S),

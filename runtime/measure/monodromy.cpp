@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How fast neighbouring motions part: the eigenvalues of one step, and the growth of a linear kernel's own motion.
+// How fast nearby trajectories diverge: the eigenvalues of one step, and the growth of a linear kernel's own motion.
 #include "runtime/measure/monodromy.hpp"
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How fast neighbouring motions part: the eigenvalues of one step, and the growth of a linear kernel's own motion.
+// How fast nearby trajectories diverge: the eigenvalues of one step, and the growth of a linear kernel's own motion.
 #pragma once
 
 #include <complex>

@@ -76,7 +76,7 @@ std::vector<Written> files_of(const Json& list) {
 }
 
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
-    throw MachineError(fmt::format("cannot go on from {}: {}. Run without --resume to begin anew", path, reason));
+    throw MachineError(fmt::format("cannot continue from {}: {}. Run without --resume to start again", path, reason));
 }
 
 // Nothing when there is no such file.

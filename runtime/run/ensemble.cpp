@@ -33,9 +33,9 @@ constexpr std::int64_t rows_of_group = 4096;
 const double no_number = std::numeric_limits<double>::quiet_NaN();
 
 // Trajectories that take their steps together. All arrays are lane-major, status is one a lane (abi.h).
-class Lanes {
+class Trajectories {
 public:
-    virtual ~Lanes() = default;
+    virtual ~Trajectories() = default;
     virtual int width() const = 0;
     virtual void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) = 0;
     virtual void start(double time, const std::vector<double>& q, const std::vector<double>& p,
@@ -48,9 +48,9 @@ public:
                         std::vector<double>& energy) const = 0;
 };
 
-class OneStepper : public Lanes {
+class SingleTrajectory : public Trajectories {
 public:
-    explicit OneStepper(const Kernel& kernel) : stepper_(kernel) {}
+    explicit SingleTrajectory(const Kernel& kernel) : stepper_(kernel) {}
     int width() const override { return 1; }
     void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) override {
         *status = stepper_.prepare(parameters, step);
@@ -81,9 +81,9 @@ private:
     double time_ = 0;
 };
 
-class KernelLanes : public Lanes {
+class LaneTrajectories : public Trajectories {
 public:
-    explicit KernelLanes(const Kernel& kernel)
+    explicit LaneTrajectories(const Kernel& kernel)
         : kernel_(kernel),
           memory_(::operator new(static_cast<std::size_t>(kernel->ensemble_bytes), alignment(kernel)),
                   Deleter{alignment(kernel)}) {}
@@ -167,9 +167,9 @@ public:
     Worker(const Kernel& kernel, const EnsembleRequest& request, Shared& shared)
         : request_(request), shared_(shared), n_(static_cast<std::size_t>(kernel->coordinates)), single_(kernel) {
         if (kernel->lanes > 0)
-            lanes_ = std::make_unique<KernelLanes>(kernel);
+            lanes_ = std::make_unique<LaneTrajectories>(kernel);
         else
-            lanes_ = std::make_unique<OneStepper>(kernel);
+            lanes_ = std::make_unique<SingleTrajectory>(kernel);
         const auto width = static_cast<std::size_t>(lanes_->width());
         start_.parameters.resize(static_cast<std::size_t>(kernel->parameters));
         start_.q.resize(n_);
@@ -304,7 +304,7 @@ private:
     Shared& shared_;
     std::size_t n_;
     LoadedStepper<double> single_;  // for momenta
-    std::unique_ptr<Lanes> lanes_;
+    std::unique_ptr<Trajectories> lanes_;
     EnsembleStart start_;
     std::vector<double> parameters_, q_, p_, energy_;
     std::vector<std::int32_t> status_;

@@ -165,7 +165,7 @@ void PartialFile::keep(std::int64_t kept) {
         if (source >= 0) close(source);
         if (copied < kept)
             throw MachineError(fmt::format(
-                "cannot go on with {} in {}: it is shorter than the run had written it. Run without --resume", what_,
+                "cannot continue with {} in {}: it is shorter than the run had written it. Run without --resume", what_,
                 path_));
     }
     if (ftruncate(descriptor_, kept) != 0 || lseek(descriptor_, kept, SEEK_SET) != kept) fail(partial_, errno);

@@ -76,21 +76,19 @@ template <class T>
 struct AnglesNear {
     Angle<T>* angles;
 
-    LOBATTO_INLINE void sincos(int i, const T& x, T& sine, T& cosine) const {
-        Angle<T>& near = angles[i];
+    LOBATTO_INLINE void sincos(int number, const T& x, T& sine, T& cosine) const {
+        Angle<T>& near = angles[number];
         T delta = x - near.x;
         if (__builtin_expect(!all(fabs(delta) <= functions::near_below), 0)) {
             functions::recentre(near, x);
             delta = x - near.x;
         }
-        sine = T::of(LOBATTO_EACH(part) {
-            using functions::single;
-            Pack<double, T::lanes> one_sine, one_cosine;
-            functions::turn(single(delta, part), single(near.sine, part), single(near.cosine, part), one_sine,
-                            one_cosine);
-            cosine.part[part] = one_cosine.part[0];
-            return one_sine.part[0];
-        });
+        using functions::single;
+        constexpr int count = T::count;
+        Pack<double, T::lanes> one_sine, one_cosine;
+        LOBATTO_EACH(
+            functions::turn(single(delta, i), single(near.sine, i), single(near.cosine, i), one_sine, one_cosine),
+            sine.part[i] = one_sine.part[0], cosine.part[i] = one_cosine.part[0]);
     }
 };
 

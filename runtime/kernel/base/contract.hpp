@@ -107,6 +107,14 @@ constexpr bool moves_immediately() {
 // The most coordinates whose mass matrix is treated as a full one.
 constexpr int most_full = 16;
 
+// Zero when all are finite, not a number otherwise.
+template <class real>
+inline real not_finite_part(const real* x, int count) {
+    real sum = real(0);
+    for (int i = 0; i < count; ++i) sum += x[i] - x[i];
+    return sum;
+}
+
 // What the steppers of all forms carry.
 template <class K>
 struct Motion {
@@ -114,19 +122,30 @@ struct Motion {
     static constexpr int n = K::coordinates;
     static constexpr int event_room = K::events > 0 ? K::events : 1;
 
-    typename K::Coefficients coefficients{};  // values of stage parameter and step size
+    typename K::Coefficients coefficients{};  // values of parameters and step size
     real step_size{};                         // h
     real start_time{};
     std::int64_t steps{};             // since start: the time is start_time + steps * h
     real tolerance{};                 // of increments, relative; the iteration of a step ends there, or at rounding
     real q[n]{};                      // position
     std::int32_t iterations{};        // of the last step
-    real increment{};                 // last increment of the last step that looked, relative to its displacement
+    real increment{};                 // last increment that was measured, relative to the displacement of its step
     real event_values[event_room]{};  // the last of each that was not zero (steppers/events.hpp)
 
     real time() const { return start_time + real(steps) * step_size; }
     real next_time() const { return start_time + real(steps + 1) * step_size; }
     bool time_stands_still() const { return next_time() == time(); }
+
+    // One step of `local`, a copy of this stepper, from (q, p) at `time` to (q1, p1).
+    template <class S>
+    static Status step_from(S& local, real time, const real* position, const real* momentum, real* q1, real* p1) {
+        Status status = local.start(time, position, momentum);
+        if (status == Status::ok) status = local.step();
+        if (status != Status::ok) return status;
+        for (int k = 0; k < n; ++k) q1[k] = local.q[k];
+        local.momentum(p1);
+        return status;
+    }
 };
 
 // One trajectory of kernel K. Usage: prepare, start, then step as often as wanted. Not thread-safe; copy freely. A step
@@ -151,7 +170,7 @@ template <class K, bool neighbours>
 struct FixedPointOf;
 
 // How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
-// going) moves the lanes that are going, and answers which have moved; position(c) and momentum(single, lane, p) read.
+// active) moves the active lanes, and answers which have moved; position(c) and momentum(single, lane, p) read.
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct LaneStepper;
 
@@ -161,6 +180,18 @@ struct ConstantMass : Motion<K> {
     using typename Motion<K>::real;
     using Motion<K>::n, Motion<K>::coefficients;
     real u[n]{};  // M^-1 p
+
+    // Begins at (q, p); W: M^-1 grad V there.
+    Status begin(real time, const real* position, const real* momentum, real* W) {
+        this->start_time = time;
+        this->steps = 0;
+        for (int k = 0; k < n; ++k) this->q[k] = position[k];
+        K::velocity(coefficients, momentum, u);
+        Formulas<K>::minus_acceleration(coefficients, time, static_cast<const real*>(this->q), W);
+        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, this->q, u, this->event_values);
+        const real sum = time + not_finite_part(position, n) + not_finite_part(momentum, n) + not_finite_part(W, n);
+        return is_finite(sum) ? Status::ok : Status::not_finite;
+    }
 
     void momentum(real* p) const { K::momentum(coefficients, u, p); }
     Status energy(real time, const real* position, const real* momentum, real* value) const {
@@ -235,14 +266,6 @@ constexpr void lagrange(const real* points, real theta, real* value, real* slope
             value[j] *= (theta - points[l]) * scale;
         }
     }
-}
-
-// Zero when all are finite, not a number otherwise.
-template <class real>
-inline real not_finite_part(const real* x, int count) {
-    real sum = real(0);
-    for (int i = 0; i < count; ++i) sum += x[i] - x[i];
-    return sum;
 }
 
 }  // namespace lobatto

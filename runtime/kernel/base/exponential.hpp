@@ -205,13 +205,15 @@ LOBATTO_FUNCTION(tanh)
 
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> pow(const Pack<real, width>& x, const Pack<real, width>& y) {
-    if constexpr (std::is_same_v<real, double>)
-        return x.of(
-            LOBATTO_EACH(i) { return functions::pow(functions::single(x, i), functions::single(y, i)).part[0]; });
-    else if constexpr (std::is_same_v<real, float>)
+    using Numbers = Pack<real, width>;
+    constexpr int count = Numbers::count;
+    if constexpr (std::is_same_v<real, double>) {
+        LOBATTO_PARTS(Numbers, functions::pow(functions::single(x, i), functions::single(y, i)).part[0]);
+    } else if constexpr (std::is_same_v<real, float>) {
         return functions::narrowed(pow(functions::widened(x), functions::widened(y)));
-    else
-        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::pow(x.part[i], y.part[i]); });
+    } else {
+        LOBATTO_PARTS(Numbers, lobatto::pow(x.part[i], y.part[i]));
+    }
 }
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> pow(const Pack<real, width>& x, real_of<Pack<real, width>> y) {

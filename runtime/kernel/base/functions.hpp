@@ -72,21 +72,26 @@ LOBATTO_INLINE Pack<float, width> narrowed(const Pack<double, width>& x) {
 // Register by register: the constants of a function fill too many registers for two at a time.
 template <int width>
 LOBATTO_INLINE Doubles<Doubles<width>::lanes> single(const Doubles<width>& x, int i) {
-    return Doubles<Doubles<width>::lanes>::of(LOBATTO_EACH() { return x.part[i]; });
+    Doubles<Doubles<width>::lanes> one;
+    one.part[0] = x.part[i];
+    return one;
 }
 
 }  // namespace functions
 
 // The function of packs of any number type from that of doubles.
-#define LOBATTO_FUNCTION(name)                                                                         \
-    template <class real, int width>                                                                   \
-    LOBATTO_INLINE Pack<real, width> name(const Pack<real, width>& x) {                                \
-        if constexpr (std::is_same_v<real, double>)                                                    \
-            return x.of(LOBATTO_EACH(i) { return functions::name(functions::single(x, i)).part[0]; }); \
-        else if constexpr (std::is_same_v<real, float>)                                                \
-            return functions::narrowed(name(functions::widened(x)));                                   \
-        else                                                                                           \
-            return x.of(LOBATTO_EACH(i) { return lobatto::name(x.part[i]); });                         \
+#define LOBATTO_FUNCTION(name)                                                        \
+    template <class real, int width>                                                  \
+    LOBATTO_INLINE Pack<real, width> name(const Pack<real, width>& x) {               \
+        using Numbers = Pack<real, width>;                                            \
+        constexpr int count = Numbers::count;                                         \
+        if constexpr (std::is_same_v<real, double>) {                                 \
+            LOBATTO_PARTS(Numbers, functions::name(functions::single(x, i)).part[0]); \
+        } else if constexpr (std::is_same_v<real, float>) {                           \
+            return functions::narrowed(name(functions::widened(x)));                  \
+        } else {                                                                      \
+            LOBATTO_PARTS(Numbers, lobatto::name(x.part[i]));                         \
+        }                                                                             \
     }
 
 }  // namespace lobatto

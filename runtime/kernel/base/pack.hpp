@@ -13,8 +13,33 @@
 #include "numbers.hpp"
 
 #define LOBATTO_INLINE [[gnu::always_inline]] inline
-#define LOBATTO_FORMULA __attribute__((always_inline))             // behind the parameters of a function object
-#define LOBATTO_EACH(i) [&](int i) __attribute__((always_inline))  // a function of the number of a register
+#define LOBATTO_FORMULA __attribute__((always_inline))  // behind the parameters of a function object
+
+// An expression for each register i of a pack, which has `count` of them, at most eight. It is text, not a function of
+// i: the compiler's time goes with the number of functions.
+#define LOBATTO_REGISTER(number, ...) \
+    if constexpr (number < count) {   \
+        constexpr int i = number;     \
+        __VA_ARGS__;                  \
+    }
+#define LOBATTO_EACH(...)            \
+    LOBATTO_REGISTER(0, __VA_ARGS__) \
+    LOBATTO_REGISTER(1, __VA_ARGS__) \
+    LOBATTO_REGISTER(2, __VA_ARGS__) \
+    LOBATTO_REGISTER(3, __VA_ARGS__) \
+    LOBATTO_REGISTER(4, __VA_ARGS__) \
+    LOBATTO_REGISTER(5, __VA_ARGS__) \
+    LOBATTO_REGISTER(6, __VA_ARGS__) \
+    LOBATTO_REGISTER(7, __VA_ARGS__)
+// Returns the Result whose register i is the expression.
+#define LOBATTO_PARTS(Result, ...)               \
+    Result result;                               \
+    LOBATTO_EACH(result.part[i] = (__VA_ARGS__)) \
+    return result
+#define LOBATTO_OPERATOR(Given, Result, operation)                                    \
+    LOBATTO_INLINE friend Result operator operation(const Given& a, const Given& b) { \
+        LOBATTO_PARTS(Result, typename Result::Part(a.part[i] operation b.part[i]));  \
+    }
 
 namespace lobatto {
 
@@ -238,7 +263,7 @@ struct Shape {
     static_assert(width >= 1 && (width & (width - 1)) == 0, "the width of a pack is a power of two");
     static constexpr int lanes = width < native_lanes<real> ? width : native_lanes<real>;
     static constexpr int count = width / lanes;
-    using Each = std::make_integer_sequence<int, count>;
+    static_assert(count <= 8, "a pack has at most eight registers");
 };
 
 // Which lanes: what comparisons of packs give.
@@ -249,37 +274,38 @@ struct Mask;
 template <class real, int width>
 struct Bits;
 
+// The first (0) or second (1) half of the registers.
+template <class Half, class Whole>
+LOBATTO_INLINE Half registers_of(const Whole& whole, int which) {
+    constexpr int count = Half::count;
+    LOBATTO_PARTS(Half, whole.part[which * count + i]);
+}
+
 template <class real, int width>
 struct Pack {
     static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
-    using Each = typename Shape<real, width>::Each;
     using Part = typename Register<real, lanes>::Values;
+    using Truths = Mask<real, width>;
 
     Part part[count];
 
     Pack() = default;
     // One register at a time: g++ keeps a Pack in registers only while it is not copied as a whole.
-    LOBATTO_INLINE Pack(const Pack& other) { copy(other, Each{}); }
+    LOBATTO_INLINE Pack(const Pack& other) { LOBATTO_EACH(part[i] = other.part[i]); }
     LOBATTO_INLINE Pack& operator=(const Pack& other) {
-        copy(other, Each{});
+        LOBATTO_EACH(part[i] = other.part[i]);
         return *this;
     }
-    LOBATTO_INLINE Pack(real x) : Pack(of(LOBATTO_EACH() { return x - Part{}; })) {}  // x - 0 keeps -0
-
-    // The pack of the registers f(0), f(1), ...
-    template <class F>
-    LOBATTO_INLINE static Pack of(F f) {
-        return of(f, Each{});
-    }
+    LOBATTO_INLINE Pack(real x) { LOBATTO_EACH(part[i] = x - Part{}); }  // x - 0 keeps -0
 
     LOBATTO_INLINE static Pack load(const real* from) {
-        return of(LOBATTO_EACH(i) {
-            Part x;
-            __builtin_memcpy(&x, from + i * lanes, sizeof x);
-            return x;
-        });
+        Pack result;
+        LOBATTO_EACH(__builtin_memcpy(&result.part[i], from + i * lanes, sizeof(Part)));
+        return result;
     }
-    LOBATTO_INLINE void store(real* to) const { store(to, Each{}); }
+    LOBATTO_INLINE void store(real* to) const {
+        LOBATTO_EACH(__builtin_memcpy(to + i * lanes, &part[i], sizeof(Part)));
+    }
 
     LOBATTO_INLINE real operator[](int lane) const {
         if constexpr (lanes == 1)
@@ -294,60 +320,36 @@ struct Pack {
             part[lane / lanes][lane % lanes] = x;
     }
 
-    LOBATTO_INLINE Pack operator-() const {
-        return of(LOBATTO_EACH(i) { return -part[i]; });
-    }
+    LOBATTO_INLINE Pack operator-() const { LOBATTO_PARTS(Pack, -part[i]); }
     LOBATTO_INLINE Pack& operator+=(const Pack& b) { return *this = *this + b; }
     LOBATTO_INLINE Pack& operator-=(const Pack& b) { return *this = *this - b; }
     LOBATTO_INLINE Pack& operator*=(const Pack& b) { return *this = *this * b; }
     LOBATTO_INLINE Pack& operator/=(const Pack& b) { return *this = *this / b; }
-
-    LOBATTO_INLINE friend Pack operator+(const Pack& a, const Pack& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] + b.part[i]; });
-    }
-    LOBATTO_INLINE friend Pack operator-(const Pack& a, const Pack& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] - b.part[i]; });
-    }
-    LOBATTO_INLINE friend Pack operator*(const Pack& a, const Pack& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] * b.part[i]; });
-    }
-    LOBATTO_INLINE friend Pack operator/(const Pack& a, const Pack& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] / b.part[i]; });
-    }
-    LOBATTO_INLINE friend Mask<real, width> operator<(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] < b.part[i]; });
-    }
-    LOBATTO_INLINE friend Mask<real, width> operator<=(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] <= b.part[i]; });
-    }
-    LOBATTO_INLINE friend Mask<real, width> operator>(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] > b.part[i]; });
-    }
-    LOBATTO_INLINE friend Mask<real, width> operator>=(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] >= b.part[i]; });
-    }
-    LOBATTO_INLINE friend Mask<real, width> operator==(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] == b.part[i]; });
-    }
-    LOBATTO_INLINE friend Mask<real, width> operator!=(const Pack& a, const Pack& b) {
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return a.part[i] != b.part[i]; });
-    }
+    LOBATTO_OPERATOR(Pack, Pack, +);
+    LOBATTO_OPERATOR(Pack, Pack, -);
+    LOBATTO_OPERATOR(Pack, Pack, *);
+    LOBATTO_OPERATOR(Pack, Pack, /);
+    LOBATTO_OPERATOR(Pack, Truths, <);
+    LOBATTO_OPERATOR(Pack, Truths, <=);
+    LOBATTO_OPERATOR(Pack, Truths, >);
+    LOBATTO_OPERATOR(Pack, Truths, >=);
+    LOBATTO_OPERATOR(Pack, Truths, ==);
+    LOBATTO_OPERATOR(Pack, Truths, !=);
 
     LOBATTO_INLINE friend Pack fused(const Pack& a, const Pack& b, const Pack& c) {
-        if constexpr (lanes == 1)
-            return of(LOBATTO_EACH(i) { return lobatto::fused(a.part[i], b.part[i], c.part[i]); });
-        else
-            return of(LOBATTO_EACH(i) { return registers::fused(a.part[i], b.part[i], c.part[i]); });
+        if constexpr (lanes == 1) {
+            LOBATTO_PARTS(Pack, lobatto::fused(a.part[i], b.part[i], c.part[i]));
+        } else {
+            LOBATTO_PARTS(Pack, registers::fused(a.part[i], b.part[i], c.part[i]));
+        }
     }
     LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) { return select(a < b, a, b); }
     LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) { return select(a > b, a, b); }
 
     LOBATTO_INLINE friend Bits<real, width> bits(const Pack& a) {
-        return Bits<real, width>::of(LOBATTO_EACH(i) {
-            typename Bits<real, width>::Part x;
-            __builtin_memcpy(&x, &a.part[i], sizeof x);
-            return x;
-        });
+        Bits<real, width> result;
+        LOBATTO_EACH(__builtin_memcpy(&result.part[i], &a.part[i], sizeof(Part)));
+        return result;
     }
 
     // Over the lanes, by halves: (0 + 2) + (1 + 3) for four.
@@ -368,7 +370,7 @@ struct Pack {
     LOBATTO_INLINE Pack<real, (width > 1 ? width / 2 : 1)> half(int which) const {
         using Half = Pack<real, (width > 1 ? width / 2 : 1)>;
         if constexpr (count > 1)
-            return Half::of(LOBATTO_EACH(i) { return part[which * Half::count + i]; });
+            return registers_of<Half>(*this, which);
         else
             return half_register<Half>(which, std::make_integer_sequence<int, Half::lanes>());
     }
@@ -389,42 +391,23 @@ private:
         }
         return result;
     }
-    template <int... i>
-    LOBATTO_INLINE void copy(const Pack& other, std::integer_sequence<int, i...>) {
-        ((part[i] = other.part[i]), ...);
-    }
-    template <class F, int... i>
-    LOBATTO_INLINE static Pack of(F f, std::integer_sequence<int, i...>) {
-        Pack result;
-        ((result.part[i] = f(i)), ...);
-        return result;
-    }
-    template <int... i>
-    LOBATTO_INLINE void store(real* to, std::integer_sequence<int, i...>) const {
-        (__builtin_memcpy(to + i * lanes, &part[i], sizeof(Part)), ...);
-    }
 };
 
 template <class real, int width>
 struct Mask {
     static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
-    using Each = typename Shape<real, width>::Each;
     using Part = typename Register<real, lanes>::Truths;
+    using Numbers = Pack<real, width>;
 
     Part part[count];
 
     Mask() = default;
-    LOBATTO_INLINE Mask(bool truth)
-        : Mask(of(LOBATTO_EACH() {
-              if constexpr (lanes == 1)
-                  return truth;
-              else
-                  return Part{} - truth;
-          })) {}
-
-    template <class F>
-    LOBATTO_INLINE static Mask of(F f) {
-        return of(f, Each{});
+    LOBATTO_INLINE Mask(bool truth) {
+        if constexpr (lanes == 1) {
+            LOBATTO_EACH(part[i] = truth);
+        } else {
+            LOBATTO_EACH(part[i] = Part{} - truth);
+        }
     }
 
     LOBATTO_INLINE bool operator[](int lane) const {
@@ -441,27 +424,26 @@ struct Mask {
     }
 
     LOBATTO_INLINE Mask operator!() const {
-        if constexpr (lanes == 1)
-            return of(LOBATTO_EACH(i) { return !part[i]; });
-        else
-            return of(LOBATTO_EACH(i) { return ~part[i]; });
+        if constexpr (lanes == 1) {
+            LOBATTO_PARTS(Mask, !part[i]);
+        } else {
+            LOBATTO_PARTS(Mask, ~part[i]);
+        }
     }
-    LOBATTO_INLINE friend Mask operator&(const Mask& a, const Mask& b) {
-        return of(LOBATTO_EACH(i) { return Part(a.part[i] & b.part[i]); });
-    }
-    LOBATTO_INLINE friend Mask operator|(const Mask& a, const Mask& b) {
-        return of(LOBATTO_EACH(i) { return Part(a.part[i] | b.part[i]); });
-    }
+    LOBATTO_OPERATOR(Mask, Mask, &);
+    LOBATTO_OPERATOR(Mask, Mask, |);
 
     LOBATTO_INLINE friend bool any(const Mask& a) {
-        const Part joined = a.joined(Each{});
+        Part joined = a.part[0];
+        LOBATTO_EACH(joined = Part(joined | a.part[i]));
         if constexpr (lanes == 1)
             return joined;
         else
             return registers::any(joined);
     }
     LOBATTO_INLINE friend bool all(const Mask& a) {
-        const Part common = a.common(Each{});
+        Part common = a.part[0];
+        LOBATTO_EACH(common = Part(common & a.part[i]));
         if constexpr (lanes == 1)
             return common;
         else
@@ -469,92 +451,48 @@ struct Mask {
     }
 
     // a where the mask holds, b elsewhere.
-    LOBATTO_INLINE friend Pack<real, width> select(const Mask& mask, const Pack<real, width>& a,
-                                                   const Pack<real, width>& b) {
-        return Pack<real, width>::of(LOBATTO_EACH(i) { return mask.part[i] ? a.part[i] : b.part[i]; });
-    }
-
-private:
-    template <class F, int... i>
-    LOBATTO_INLINE static Mask of(F f, std::integer_sequence<int, i...>) {
-        Mask result;
-        ((result.part[i] = f(i)), ...);
-        return result;
-    }
-    template <int... i>
-    LOBATTO_INLINE Part joined(std::integer_sequence<int, i...>) const {
-        return Part((part[i] | ...));
-    }
-    template <int... i>
-    LOBATTO_INLINE Part common(std::integer_sequence<int, i...>) const {
-        return Part((part[i] & ...));
+    LOBATTO_INLINE friend Numbers select(const Mask& mask, const Numbers& a, const Numbers& b) {
+        LOBATTO_PARTS(Numbers, mask.part[i] ? a.part[i] : b.part[i]);
     }
 };
 
 template <class real, int width>
 struct Bits {
     static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
-    using Each = typename Shape<real, width>::Each;
     using Part = typename Register<real, lanes>::Integers;
     using Naturals = typename Register<real, lanes>::Naturals;
     using Integer = typename Register<real, 1>::Integers;
+    using Numbers = Pack<real, width>;
+    using Truths = Mask<real, width>;
 
     Part part[count];
 
     Bits() = default;
-    LOBATTO_INLINE Bits(Integer x) : Bits(of(LOBATTO_EACH() { return Part{} + x; })) {}
-
-    template <class F>
-    LOBATTO_INLINE static Bits of(F f) {
-        return of(f, Each{});
-    }
-
-    LOBATTO_INLINE friend Bits operator+(const Bits& a, const Bits& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] + b.part[i]; });
-    }
-    LOBATTO_INLINE friend Bits operator-(const Bits& a, const Bits& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] - b.part[i]; });
-    }
-    LOBATTO_INLINE friend Bits operator&(const Bits& a, const Bits& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] & b.part[i]; });
-    }
-    LOBATTO_INLINE friend Bits operator|(const Bits& a, const Bits& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] | b.part[i]; });
-    }
-    LOBATTO_INLINE friend Bits operator^(const Bits& a, const Bits& b) {
-        return of(LOBATTO_EACH(i) { return a.part[i] ^ b.part[i]; });
-    }
-    LOBATTO_INLINE Bits operator~() const {
-        return of(LOBATTO_EACH(i) { return ~part[i]; });
-    }
+    LOBATTO_INLINE Bits(Integer x) { LOBATTO_EACH(part[i] = Part{} + x); }
+    LOBATTO_OPERATOR(Bits, Bits, +);
+    LOBATTO_OPERATOR(Bits, Bits, -);
+    LOBATTO_OPERATOR(Bits, Bits, &);
+    LOBATTO_OPERATOR(Bits, Bits, |);
+    LOBATTO_OPERATOR(Bits, Bits, ^);
+    LOBATTO_INLINE Bits operator~() const { LOBATTO_PARTS(Bits, ~part[i]); }
     LOBATTO_INLINE friend Bits operator<<(const Bits& a, int places) {
-        return of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] << places); });
+        LOBATTO_PARTS(Bits, (Part)((Naturals)a.part[i] << places));
     }
 
     LOBATTO_INLINE friend Bits operator>>(const Bits& a, int places) {  // zeros come in
-        return of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] >> places); });
+        LOBATTO_PARTS(Bits, (Part)((Naturals)a.part[i] >> places));
     }
 
     // The numbers of these bits.
-    LOBATTO_INLINE friend Pack<real, width> from_bits(const Bits& a) {
-        return Pack<real, width>::of(LOBATTO_EACH(i) {
-            typename Pack<real, width>::Part x;
-            __builtin_memcpy(&x, &a.part[i], sizeof x);
-            return x;
-        });
+    LOBATTO_INLINE friend Numbers from_bits(const Bits& a) {
+        Numbers result;
+        LOBATTO_EACH(__builtin_memcpy(&result.part[i], &a.part[i], sizeof(Part)));
+        return result;
     }
     // Where the last bit is set.
-    LOBATTO_INLINE friend Mask<real, width> is_odd(const Bits& a) {
+    LOBATTO_INLINE friend Truths is_odd(const Bits& a) {
         constexpr int top = 8 * sizeof(Integer) - 1;
-        return Mask<real, width>::of(LOBATTO_EACH(i) { return (Part)((Naturals)a.part[i] << top) < 0; });
-    }
-
-private:
-    template <class F, int... i>
-    LOBATTO_INLINE static Bits of(F f, std::integer_sequence<int, i...>) {
-        Bits result;
-        ((result.part[i] = f(i)), ...);
-        return result;
+        LOBATTO_PARTS(Truths, (Part)((Naturals)a.part[i] << top) < 0);
     }
 };
 
@@ -562,17 +500,23 @@ private:
 // lobatto::fabs.
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
-    if constexpr (Pack<real, width>::lanes == 1)
-        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::sqrt(a.part[i]); });
-    else
-        return Pack<real, width>::of(LOBATTO_EACH(i) { return registers::square_root(a.part[i]); });
+    using Numbers = Pack<real, width>;
+    constexpr int count = Numbers::count;
+    if constexpr (Numbers::lanes == 1) {
+        LOBATTO_PARTS(Numbers, lobatto::sqrt(a.part[i]));
+    } else {
+        LOBATTO_PARTS(Numbers, registers::square_root(a.part[i]));
+    }
 }
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
-    if constexpr (Pack<real, width>::lanes == 1)
-        return Pack<real, width>::of(LOBATTO_EACH(i) { return lobatto::fabs(a.part[i]); });
-    else
-        return from_bits(bits(a) & ~bits(Pack<real, width>(real(-0.0))));
+    using Numbers = Pack<real, width>;
+    constexpr int count = Numbers::count;
+    if constexpr (Numbers::lanes == 1) {
+        LOBATTO_PARTS(Numbers, lobatto::fabs(a.part[i]));
+    } else {
+        return from_bits(bits(a) & ~bits(Numbers(real(-0.0))));
+    }
 }
 
 // a b + c of plain numbers, of Packs, or of both: for emitted formulas, whose kernel may bear any name.

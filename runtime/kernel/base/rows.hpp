@@ -47,8 +47,8 @@ struct FormulaRows {
 // Shorter runs of rows are not worth a Pack.
 constexpr int long_run = 8;
 
-// Where a chain hangs on walls: rows of two neighbours go on beyond its first coordinate, or its last, with zero in the
-// place of the coordinate that is not there.
+// Where the ends of a chain are fixed: rows of two neighbours go on beyond its first coordinate, or its last, with zero
+// in the place of the coordinate that is not there.
 constexpr int free_ends = 0, fixed_before = 1, fixed_behind = 2;
 
 // The coordinates of one node in registers, a Pack of neighbours each; beyond the last there are zeros.
@@ -110,7 +110,7 @@ LOBATTO_INLINE void written_out(int count, const F& f) {
 
 // Going through rows of formulas. `indices` has the `variables` of each row; a run is rows whose variables are those of
 // the row before plus one. All runs of more than one row have the same distances between the variables of a row. With
-// walls there is one run, over all coordinates, of rows of two neighbours.
+// fixed ends there is one run, over all coordinates, of rows of two neighbours.
 template <int variables, const auto& indices, int fixed_ends = free_ends>
 struct RowLoop {
     // How far variable j is behind the first.
@@ -144,16 +144,7 @@ struct RowLoop {
         V before[variables], here = load_from<V>(q, first);
         bool takes[variables]{};
         for (int j = 0; j < variables; ++j) before[j] = V(number(0));
-        if constexpr ((fixed_ends & fixed_before) != 0) {  // the last lane of what would stand before
-            FormulaRows<V, variables, in_lanes> rows;
-            rows.row = begin;
-            rows.count = width;
-            each(every, [&](auto j) LOBATTO_FORMULA {
-                rows.x[j] = offset(j) == 0 ? V(number(0)) : passed_on<width, width - 1>(V(number(0)), here);
-            });
-            formula(rows);
-            for (int j = 0; j < variables; ++j) before[j] = rows.result[j];
-        }
+        if constexpr ((fixed_ends & fixed_before) != 0) before_first<V, in_lanes>(begin, here, formula, before);
         const auto add = [&](int r, auto is_whole) LOBATTO_FORMULA {
             const int at = first + r;
             FormulaRows<V, variables, in_lanes> rows;
@@ -181,9 +172,9 @@ struct RowLoop {
             each(every, [&](auto j) LOBATTO_FORMULA {
                 V& result = rows.result[j];
                 if constexpr (in_lanes) {
-                    // The row at the wall gives to its first variable only.
-                    constexpr bool hangs = (fixed_ends & fixed_behind) != 0 && offset(j) > 0;
-                    if constexpr (!is_whole) result = first_lanes(result, count - (hangs ? 1 : 0) - r);
+                    // The row at the fixed end gives to its first variable only.
+                    constexpr bool is_end = (fixed_ends & fixed_behind) != 0 && offset(j) > 0;
+                    if constexpr (!is_whole) result = first_lanes(result, count - (is_end ? 1 : 0) - r);
                 }
                 takes[j] = rows.takes[j];
                 if constexpr (offset(j) > width)
@@ -230,10 +221,10 @@ struct RowLoop {
         for (int j = 0; j < variables; ++j) add_to(W, indices[row * variables + j], sign(one.result[j], one.takes[j]));
     }
 
-    // The rows at the walls of a chain of `count` coordinates, by themselves.
+    // The rows at the fixed ends of a chain of `count` coordinates, by themselves.
     template <class number, class Position, class Slope, class Formula>
-    LOBATTO_INLINE static void wall_rows(int count, Position q, Slope W, const Formula& formula) {
-        const auto hang = [&](int place, bool is_behind) LOBATTO_FORMULA {
+    LOBATTO_INLINE static void end_rows(int count, Position q, Slope W, const Formula& formula) {
+        const auto end_row = [&](int place, bool is_behind) LOBATTO_FORMULA {
             FormulaRows<number, variables, false> one;
             one.row = 0;
             one.count = 1;
@@ -242,11 +233,11 @@ struct RowLoop {
             for (int j = 0; j < variables; ++j)
                 if ((offset(j) == 0) == is_behind) add_to(W, place, sign(one.result[j], one.takes[j]));
         };
-        if constexpr ((fixed_ends & fixed_before) != 0) hang(0, false);
-        if constexpr ((fixed_ends & fixed_behind) != 0) hang(count - 1, true);
+        if constexpr ((fixed_ends & fixed_before) != 0) end_row(0, false);
+        if constexpr ((fixed_ends & fixed_behind) != 0) end_row(count - 1, true);
     }
 
-    // The one run, with the rows at the walls where they are rows as others are.
+    // The one run, with the rows at the fixed ends where they are rows as others are.
     template <class V, bool adds, const auto& runs, class Position, class Slope, class Formula>
     LOBATTO_INLINE static void entire(Position q, Slope W, const Formula& formula) {
         run<V, adds>(runs[0], runs[1] + ((fixed_ends & fixed_behind) != 0 ? 1 : 0), q, W, formula);
@@ -278,6 +269,19 @@ struct RowLoop {
     }
 
 private:
+    // What the row at the fixed end before coordinate `here` gives, in the last lane.
+    template <class V, bool in_lanes, class Formula>
+    LOBATTO_INLINE static void before_first(int begin, const V& here, const Formula& formula, V* before) {
+        using number = real_of<V>;
+        constexpr int width = in_lanes ? lanes_of<V> : 1;
+        FormulaRows<V, variables, in_lanes> rows;
+        rows.row = begin;
+        rows.count = width;
+        for (int j = 0; j < variables; ++j)
+            rows.x[j] = offset(j) == 0 ? V(number(0)) : passed_on<width, width - 1>(V(number(0)), here);
+        formula(rows);
+        for (int j = 0; j < variables; ++j) before[j] = rows.result[j];
+    }
     template <class V>
     LOBATTO_INLINE static V sign(const V& given, bool takes) {
         return takes ? -given : given;
@@ -326,7 +330,7 @@ struct OneByOne {
               class Formula>
     LOBATTO_INLINE static void add_rows(const number* q, number* W, const Formula& formula) {
         RowLoop<variables, indices>::template all<number, runs>(q, W, formula);
-        RowLoop<variables, indices, fixed_ends>::template wall_rows<number>(count, q, W, formula);
+        RowLoop<variables, indices, fixed_ends>::template end_rows<number>(count, q, W, formula);
     }
     // The same where the rows are one run that reaches all of W, of `count`, on which nothing stands yet.
     template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class number,
@@ -354,11 +358,34 @@ struct Immediate {
     LOBATTO_INLINE static void scale(Receiver, const Factor*) {}
 };
 
-// or those of a run side by side in a Pack, for plain numbers in arrays with room,
-struct SideBySide {
+// or those of a run side by side in a Pack:
+struct InLanes {
     template <class real>
     using NativePack = Pack<real, native_lanes<real>>;
 
+    template <class real>
+    static NativePack<real> pack_of(real*);
+    template <class V, int parts>
+    static V pack_of(Registers<V, parts>);
+
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends,
+              class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void add_rows(Position q, Slope W, const Formula& formula) {
+        using V = decltype(pack_of(W));
+        if constexpr (fixed_ends != free_ends)
+            RowLoop<variables, indices, fixed_ends>::template entire<V, true, runs>(q, W, formula);
+        else
+            RowLoop<variables, indices>::template all<V, runs>(q, W, formula);
+    }
+    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends,
+              class Position, class Slope, class Formula>
+    LOBATTO_INLINE static void set_rows(Position q, Slope W, const Formula& formula) {
+        RowLoop<variables, indices, fixed_ends>::template entire<decltype(pack_of(W)), false, runs>(q, W, formula);
+    }
+};
+
+// for plain numbers in arrays with room,
+struct SideBySide : InLanes {
     template <int count, class real>
     LOBATTO_INLINE static void clear(real* W) {
         for (int i = 0; i < count; i += native_lanes<real>) NativePack<real>(real(0)).store(W + i);
@@ -384,23 +411,10 @@ struct SideBySide {
     LOBATTO_INLINE static Place<real, place> at(real* W) {
         return {W};
     }
-    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class real,
-              class Formula>
-    LOBATTO_INLINE static void add_rows(const real* q, real* W, const Formula& formula) {
-        if constexpr (fixed_ends != free_ends)
-            RowLoop<variables, indices, fixed_ends>::template entire<NativePack<real>, true, runs>(q, W, formula);
-        else
-            RowLoop<variables, indices>::template all<NativePack<real>, runs>(q, W, formula);
-    }
-    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class real,
-              class Formula>
-    LOBATTO_INLINE static void set_rows(const real* q, real* W, const Formula& formula) {
-        RowLoop<variables, indices, fixed_ends>::template entire<NativePack<real>, false, runs>(q, W, formula);
-    }
 };
 
-// or the same in registers, all written out.
-struct WrittenOut {
+// or in registers, all written out.
+struct WrittenOut : InLanes {
     template <int count, class V, int parts>
     LOBATTO_INLINE static void clear(Registers<V, parts> W) {
         written_out<1>(parts, [&](int i) LOBATTO_FORMULA { W.part[i] = V(real_of<V>(0)); });
@@ -423,19 +437,6 @@ struct WrittenOut {
     template <int place, class Slope>
     LOBATTO_INLINE static Place<Slope, place> at(Slope W) {
         return {W};
-    }
-    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class V,
-              int parts, class Formula>
-    LOBATTO_INLINE static void add_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
-        if constexpr (fixed_ends != free_ends)
-            RowLoop<variables, indices, fixed_ends>::template entire<V, true, runs>(q, W, formula);
-        else
-            RowLoop<variables, indices>::template all<V, runs>(q, W, formula);
-    }
-    template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class V,
-              int parts, class Formula>
-    LOBATTO_INLINE static void set_rows(Registers<V, parts> q, Registers<V, parts> W, const Formula& formula) {
-        RowLoop<variables, indices, fixed_ends>::template entire<V, false, runs>(q, W, formula);
     }
 };
 

@@ -125,12 +125,10 @@ LOBATTO_FUNCTION(tan)
 template <class real, int width>
 LOBATTO_INLINE void sincos(const Pack<real, width>& x, Pack<real, width>& sine, Pack<real, width>& cosine) {
     if constexpr (std::is_same_v<real, double>) {
-        sine = x.of(LOBATTO_EACH(i) {
-            Pack<double, Pack<double, width>::lanes> one_sine, one_cosine;
-            functions::sincos(functions::single(x, i), one_sine, one_cosine);
-            cosine.part[i] = one_cosine.part[0];
-            return one_sine.part[0];
-        });
+        constexpr int count = Pack<double, width>::count;
+        Pack<double, Pack<double, width>::lanes> one_sine, one_cosine;
+        LOBATTO_EACH(functions::sincos(functions::single(x, i), one_sine, one_cosine), sine.part[i] = one_sine.part[0],
+                     cosine.part[i] = one_cosine.part[0]);
     } else if constexpr (std::is_same_v<real, float>) {
         Pack<double, width> wide_sine, wide_cosine;
         sincos(functions::widened(x), wide_sine, wide_cosine);
@@ -143,19 +141,23 @@ LOBATTO_INLINE void sincos(const Pack<real, width>& x, Pack<real, width>& sine, 
 }
 
 // Sine and cosine of one double: a pack of one lane, so that a lone trajectory and a lane of many have the same bits.
-template <class real>
-inline Only<real, double> sin(real x) {
-    return sin(Pack<double, 1>(x))[0];
-}
-template <class real>
-inline Only<real, double> cos(real x) {
-    return cos(Pack<double, 1>(x))[0];
-}
 inline void sincos(double x, double& sine, double& cosine) {
     Pack<double, 1> one_sine, one_cosine;
     sincos(Pack<double, 1>(x), one_sine, one_cosine);
     sine = one_sine[0];
     cosine = one_cosine[0];
+}
+template <class real>
+inline Only<real, double> sin(real x) {
+    real sine, cosine;
+    sincos(x, sine, cosine);
+    return sine;
+}
+template <class real>
+inline Only<real, double> cos(real x) {
+    real sine, cosine;
+    sincos(x, sine, cosine);
+    return cosine;
 }
 
 }  // namespace lobatto

@@ -37,7 +37,7 @@ struct Convergence {
         return both(is_noise(e), e >= raised(real(0.5)) * e_before);
     }
     LOBATTO_INLINE Truth is_noise(const T& e) const { return e <= raised(real(P::noise)) * enough; }
-    // Whether it is worth going on.
+    // Whether more iterations are worth their time.
     LOBATTO_INLINE Truth contracts(const T& e, const T& e_before) const {
         return either(e < raised(real(P::percent) / real(100)) * e_before, is_noise(e));
     }

@@ -192,7 +192,7 @@ private:
             a.inverse_scale[c] = fabs(T(h)) / maximum(scale, rounding);
             kappa_now[c] = kappa[c];
         }
-        if constexpr (K::angles > 0) look_around(k, time, q, a);
+        if constexpr (K::angles > 0) prepare_angles(k, time, q, a);
         // Velocities are kept, positions are made of them: more rounding, and ratios that tell less.
         const Convergence<T, 1, Pace<4, 90, 32>> rule{T(real(2) * least)};
         ActiveMask solved = active & !active;
@@ -217,7 +217,7 @@ private:
     // The angles at the start of the step are those that all its nodes are near; those of velocities with the velocity
     // of the last step's last node. Nothing else of the stage is computed.
     template <class Given>
-    LOBATTO_INLINE void look_around(const Given& k, real time, const T* q, Arrays& a) const {
+    LOBATTO_INLINE void prepare_angles(const Given& k, real time, const T* q, Arrays& a) const {
         using Start = Pack<real, lanes_of<T>>;
         Angle<Start> angles[K::angles];
         Start position[n], velocity[n], Lv[n], F[n], M[entries];

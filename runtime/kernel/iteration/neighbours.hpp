@@ -5,7 +5,7 @@
 // all nodes, then the stage map. What is different is the layout: of each node all coordinates stand one after another,
 // and every loop runs over them, so that the cost of a step is proportional to their number. Increments shrink by a
 // factor rho in each iteration, so W at positions that moved by e at last errs by rho e: the iteration ends when that
-// is rounding, or as much as is asked for, without another look at the new positions.
+// is rounding, or as much as is asked for, without an evaluation at the new positions.
 #ifndef LOBATTO_KERNEL_NEIGHBOURS_HPP
 #define LOBATTO_KERNEL_NEIGHBOURS_HPP
 
@@ -38,7 +38,7 @@ constexpr bool fits_registers() {
 // One trajectory; its state, the memory of its last step, and room for the next. Most steps are quick ones: as many
 // iterations as the last measurement found enough, and one test of the last increment, in registers, all written out,
 // or in memory; to the same bits. A step that does not pass, and now and then one to measure with, is taken carefully:
-// in memory, and every iteration looks at its increments.
+// in memory, and every iteration measures its increments.
 template <class K, bool in_registers = fits_registers<K>()>
 struct NeighbourFixedPoint {
     using real = typename K::real;
@@ -71,7 +71,7 @@ struct NeighbourFixedPoint {
     int last{};                                                    // the last step, of
     alignas(V) real w[2][m * room]{};                              // W at the inner nodes
     int evaluations{};                                             // of the last step
-    real increment{};                                              // the last one that was looked at, relative
+    real increment{};                                              // the last one that was measured, relative
 
     // Of the step that is being solved: positions of the inner nodes, q + h c v, v, and what u changes by. In registers
     // also W and the end of the step, which otherwise are written where they belong.
@@ -292,9 +292,9 @@ private:
     LOBATTO_INLINE V displacement(int at) const {
         return V(fabs(h)) * (fabs(V::load(memory.rate + at)) + fabs(V(h) * V::load(w_end[now] + at)));
     }
-    // An iteration that looks: the largest of what it moves by, measured against the displacement of each coordinate in
-    // a step, or what is `least`, with the rounding of its position as floor.
-    real look(InMemory& a, real least) {
+    // An iteration and its increment: the largest of what it moves by, measured against the displacement of each
+    // coordinate in a step, or what is `least`, with the rounding of its position as floor.
+    real measured_iteration(InMemory& a, real least) {
         const V on_position = V(on_distance()), floor = V(least + Limits<real>::smallest);
         V worst = V(real(0));
         over_parts<InMemory>([&](int at) LOBATTO_FORMULA {
@@ -326,7 +326,7 @@ private:
         });
         return !any(is_odd(signs >> (8 * static_cast<int>(sizeof(real)) - 1)));
     }
-    // Makes increments of `enough` small enough, relative to what they are measured against in an iteration that looks:
+    // Makes increments of `enough` small enough, relative to what they are measured against by measured_iteration:
     // of which the next steps compute the part of the velocity anew. False where squares are too small or too large for
     // numbers: then no step is quick.
     bool settle_at(real enough, real least) {
@@ -353,7 +353,7 @@ private:
         real e_before = real(0), measured = real(0), after[evaluation_limit + 1];  // so many iterations
         for (evaluations = 1; evaluations <= evaluation_limit; ++evaluations) {
             accelerate_nodes(memory, k, time);
-            const real e = look(memory, least);
+            const real e = measured_iteration(memory, least);
             increment = after[evaluations] = e;
             if (e_before > real(256) * Limits<real>::epsilon) measured = maximum(measured, e / e_before);
             const real known = real(4) * maximum(measured, shrinking);  // 4: the motion changes rho

@@ -99,6 +99,15 @@ inline bool increment_of_step(typename K::real h, const typename K::real* S, con
     return true;
 }
 
+// T = I + E without the last column of E.
+template <class K>
+inline void add_identity(const typename K::real* E, typename K::real* T) {
+    using real = typename K::real;
+    constexpr int size = 2 * K::coordinates;
+    for (int r = 0; r < size; ++r)
+        for (int c = 0; c < size; ++c) T[r * size + c] = (r == c ? real(1) : real(0)) + E[r * (size + 1) + c];
+}
+
 // From (q, u) to (q, p): rows of u and columns of u are multiplied by M and M^-1; the identity stays. T: 2n x (2n + 1).
 template <class K>
 inline void to_momentum(const typename K::Coefficients& k, typename K::real* T) {

@@ -71,7 +71,7 @@ struct Events {
 
     // Adds rows of event number, t, q[n], p[n] of the step taken since keep, in the order of the motion. Where a
     // shortened step fails, its status.
-    Status look(S& stepper, real* rows, std::int64_t& count) {
+    Status find(S& stepper, real* rows, std::int64_t& count) {
         step = &stepper;
         status = Status::ok;
         for (int i = 0; i < grid_size; ++i) {
@@ -82,7 +82,7 @@ struct Events {
             on_polynomial(grid[i], grid_values[i]);
         }
         int found = 0;
-        for (int e = 0; e < K::events && status == Status::ok; ++e) look_for(e, rows, found);
+        for (int e = 0; e < K::events && status == Status::ok; ++e) find_events(e, rows, found);
         if (status == Status::ok) count += found;
         return status;
     }
@@ -154,13 +154,13 @@ private:
         if (!sample.is_exact) sample = {sample.theta, exactly(sample.theta, e), true};
     }
 
-    void look_for(int e, real* rows, int& found) {
+    void find_events(int e, real* rows, int& found) {
         sample_count = grid_size;
         for (int i = 0; i < grid_size; ++i) samples[i] = {grid[i], grid_values[i][e], false};
         const auto exact = [&](real theta) { return exactly(theta, e); };
         const auto polynomial = [&](real theta) { return on_polynomial(theta, e); };
         reach_undefined(false, polynomial);
-        for (int i = 1; i + 1 < sample_count; ++i) i += look_between(i, polynomial, exact);
+        for (int i = 1; i + 1 < sample_count; ++i) i += refine_between(i, polynomial, exact);
         make_exact(samples[0], e);
         make_exact(samples[sample_count - 1], e);
         decide_signs(e);
@@ -204,7 +204,7 @@ private:
     // Around sample i, where |g| may be least without a change of sign at the samples: a sample there, if the sign
     // changes. How many were inserted.
     template <class Polynomial, class Exact>
-    int look_between(int i, const Polynomial& polynomial, const Exact& exact) {
+    int refine_between(int i, const Polynomial& polynomial, const Exact& exact) {
         const Sample a = samples[i - 1], middle = samples[i], b = samples[i + 1];
         if (!has_sign(a.value) || !has_sign(middle.value) || !has_sign(b.value)) return 0;
         if (changes(a.value, middle.value) || changes(middle.value, b.value)) return 0;

@@ -150,13 +150,13 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     // |increment residual|.
     Status velocity(real time, const real* position, const real* momentum, real* v) const {
         return mass_workspace.with([&](MassArrays& a) {
-            const auto look_at = [&](const real* trial) {
+            const auto evaluate = [&](const real* trial) {
                 Formulas<K>::legendre(coefficients, time, position, trial, a.p, a.entries);
                 for (int k = 0; k < n; ++k) a.residual[k] = momentum[k] - a.p[k];
                 return is_finite(not_finite_part(a.residual, n) + not_finite_part(a.entries, K::mass_entries));
             };
             const auto solve_from = [&]() -> Status {
-                if (!look_at(v)) return Status::not_finite;
+                if (!evaluate(v)) return Status::not_finite;
                 for (int iteration = 0; iteration < 100; ++iteration) {
                     if (iteration > 0 && is_near(a, momentum, v, real(2) * Limits<real>::epsilon)) return Status::ok;
                     a.matrix.clear();
@@ -168,7 +168,7 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
                     for (real part = real(1);; part *= real(0.5)) {
                         if (part < Limits<real>::epsilon) return Status::not_converged;
                         for (int k = 0; k < n; ++k) a.trial[k] = v[k] + part * a.increment[k];
-                        if (next_is_rounding || (look_at(a.trial) && solve_mass(a, a.next) <= length)) break;
+                        if (next_is_rounding || (evaluate(a.trial) && solve_mass(a, a.next) <= length)) break;
                     }
                     for (int k = 0; k < n; ++k) v[k] = a.trial[k];
                     if (next_is_rounding) return Status::ok;
@@ -187,7 +187,7 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
             real best = real(0), nearest = -real(1);
             for (real scale = real(0x1p-40); scale <= real(0x1p40); scale *= real(2)) {
                 for (int k = 0; k < n; ++k) v[k] = scale * momentum[k];
-                if (!look_at(v)) continue;
+                if (!evaluate(v)) continue;
                 real apart = real(0);
                 for (int k = 0; k < n; ++k) apart += a.residual[k] * a.residual[k];
                 if (nearest < real(0) || apart < nearest) best = scale, nearest = apart;
@@ -202,13 +202,8 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {
             Stepper local = *this;
-            Status status = local.start(time, position, momentum);
-            if (status == Status::ok) status = local.step();
+            const Status status = this->step_from(local, time, position, momentum, q1, p1);
             if (status != Status::ok) return status;
-            for (int k = 0; k < n; ++k) {
-                q1[k] = local.q[k];
-                p1[k] = local.p[k];
-            }
             local.refresh();
             return workspace.with([&](Arrays& a) {
                 evaluate_nodes(time, position, momentum, local.Y, a);

@@ -211,17 +211,8 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {
             Stepper local = *this;
-            Status status = local.start(time, position, momentum);
-            if (status == Status::ok) status = local.step();
-            if (status != Status::ok) return status;
-            for (int k = 0; k < n; ++k) {
-                q1[k] = local.q[k];
-                p1[k] = local.p[k];
-            }
-            for (int r = 0; r < 2 * n; ++r)
-                for (int c = 0; c < 2 * n; ++c)
-                    T[r * 2 * n + c] = (r == c ? real(1) : real(0)) + coefficients.Phi_minus_I[r * (2 * n + 1) + c];
-            return Status::ok;
+            add_identity<K>(coefficients.Phi_minus_I, T);
+            return this->step_from(local, time, position, momentum, q1, p1);
         } else {
             return Status::unsupported;
         }

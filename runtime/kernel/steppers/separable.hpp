@@ -73,21 +73,11 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     }
 
     Status start(real time, const real* position, const real* momentum) {
-        this->start_time = time;
-        this->steps = 0;
+        const Status status = this->begin(time, position, momentum, W + (s - 1) * n);
         has_history = false;
-        real sum = time + not_finite_part(momentum, n);
-        for (int k = 0; k < n; ++k) {
-            q[k] = position[k];
-            sum += position[k] - position[k];
-        }
-        K::velocity(coefficients, momentum, u);
-        Formulas<K>::minus_acceleration(coefficients, time, q, W + (s - 1) * n);
-        sum += not_finite_part(W + (s - 1) * n, n);
-        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
         is_current = true;
         if constexpr (has_fixed_point) begin_fixed_point(fixed_point);
-        return is_finite(sum) ? Status::ok : Status::not_finite;
+        return status;
     }
 
     Status step() {
@@ -179,11 +169,8 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {
             Stepper local = *this;
-            Status status = local.start(time, position, momentum);
-            if (status == Status::ok) status = local.step();
+            const Status status = this->step_from(local, time, position, momentum, q1, p1);
             if (status != Status::ok) return status;
-            for (int k = 0; k < n; ++k) q1[k] = local.q[k];
-            local.momentum(p1);
             constexpr int columns = 2 * n + 1;
             real full[2 * n * columns], second[s * n * n], at[n], ignored[n], entries[entry_room], none[n] = {};
             for (int i = 0; i < s; ++i) {
@@ -194,8 +181,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
             }
             if (!increment_of_step<K>(step_size, second, none, full)) return Status::singular_jacobian;
             to_momentum<K>(coefficients, full);
-            for (int r = 0; r < 2 * n; ++r)
-                for (int c = 0; c < 2 * n; ++c) T[r * 2 * n + c] = (r == c ? real(1) : real(0)) + full[r * columns + c];
+            add_identity<K>(full, T);
             return Status::ok;
         } else {
             (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;

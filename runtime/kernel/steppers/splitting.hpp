@@ -67,27 +67,27 @@ struct KickAndDrift {
     const Given& k;
 };
 template <class K, class T, class Given, bool is_last>
-LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& turn, int at, T slope) {
-    if constexpr (!K::unit_masses) slope *= turn.k.inverse_mass[at];
-    const T velocity = fused(turn.kick, slope, turn.u[at]);
-    turn.u[at] = velocity;
+LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& step, int at, T slope) {
+    if constexpr (!K::unit_masses) slope *= step.k.inverse_mass[at];
+    const T velocity = fused(step.kick, slope, step.u[at]);
+    step.u[at] = velocity;
     if constexpr (is_last)
-        turn.W[at] = slope;
+        step.W[at] = slope;
     else
-        turn.q[at] = fused(turn.drift, velocity, turn.q[at]);
+        step.q[at] = fused(step.drift, velocity, step.q[at]);
 }
 
 // One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
 // coordinates for each kick.
 template <class K, class T, class Given>
-LOBATTO_INLINE void step_in_passing(const Composition<K>& composition, const Given& k, typename K::real time,
-                                    typename K::real h, const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
+LOBATTO_INLINE void immediate_step(const Composition<K>& composition, const Given& k, typename K::real time,
+                                   typename K::real h, const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
     constexpr int n = K::coordinates, s = K::points;
     const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
-        const KickAndDrift<K, T, Given, is_last()> turn{
+        const KickAndDrift<K, T, Given, is_last()> step{
             q1, u1, W1, T(composition.kick[i]), T(is_last ? 0 : composition.drift[i]), k};
         const T* const position = q1;
-        Formulas<K>::template along_rows<Immediate>(k, T(time + K::c[i] * h), position, turn);
+        Formulas<K>::template along_rows<Immediate>(k, T(time + K::c[i] * h), position, step);
     };
     for (int c = 0; c < n; ++c) {
         u1[c] = Composition<K>::kicks_ends ? fused(T(composition.kick[0]), W[c], u[c]) : u[c];
@@ -100,7 +100,7 @@ LOBATTO_INLINE void step_in_passing(const Composition<K>& composition, const Giv
 // Whether positions and velocities, accelerations, and what is under way fit the 32 registers of AVX-512. With the 16
 // of AVX2 a part of them goes to the stack; written out, a step of 32 masses takes 206 ns there, in loops 241.
 template <class K>
-constexpr bool turns_fit_registers() {
+constexpr bool composition_fits_registers() {
     using real = typename K::real;
     constexpr int width = native_lanes<real>, parts = (K::coordinates + width - 1) / width;
     return parts <= (width * sizeof(real) == 64   ? 5
@@ -111,8 +111,8 @@ constexpr bool turns_fit_registers() {
 
 // Positions, velocities and accelerations of neighbouring coordinates, on the way in registers or in memory; to the
 // same bits.
-template <class K, bool in_registers = turns_fit_registers<K>()>
-struct NeighbourTurns {
+template <class K, bool in_registers = composition_fits_registers<K>()>
+struct NeighbourComposition {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points;
     static constexpr int width = native_lanes<real>, room = room_of<K>, parts = (n + width - 1) / width;
@@ -190,11 +190,11 @@ private:
 };
 
 template <class K, bool along_neighbours>
-struct KindOfTurns {
-    using type = NeighbourTurns<K>;
+struct NeighbourCompositionOf {
+    using type = NeighbourComposition<K>;
 };
 template <class K>
-struct KindOfTurns<K, false> {
+struct NeighbourCompositionOf<K, false> {
     struct type {};
 };
 
@@ -212,14 +212,14 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
         std::int64_t of{-1};  // this many steps since start; -1: not computed
         real W[2][n]{};
     };
-    using Nothing = typename KindOfTurns<K, false>::type;
+    using Nothing = typename NeighbourCompositionOf<K, false>::type;
 
     Composition<K> composition{};
     real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
     real q_before[n]{}, u_before[n]{};  // before the last step; likewise
     bool has_history{};                 // what lies between the ends of the last step is known
     mutable Ends ends{};
-    typename KindOfTurns<K, K::neighbours>::type neighbours{};
+    typename NeighbourCompositionOf<K, K::neighbours>::type neighbours{};
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         step_size = h;
@@ -229,21 +229,11 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
     }
 
     Status start(real time, const real* position, const real* momentum) {
-        this->start_time = time;
-        this->steps = 0;
+        const Status status = this->begin(time, position, momentum, W);
         has_history = false;
         ends.of = -1;
-        real sum = time + not_finite_part(momentum, n);
-        for (int k = 0; k < n; ++k) {
-            q[k] = position[k];
-            sum += position[k] - position[k];
-        }
-        K::velocity(coefficients, momentum, u);
-        Formulas<K>::minus_acceleration(coefficients, time, static_cast<const real*>(q), +W);
-        sum += not_finite_part(W, n);
-        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, q, u, this->event_values);
         if constexpr (K::neighbours) neighbours.begin(q, u, W);
-        return is_finite(sum) ? Status::ok : Status::not_finite;
+        return status;
     }
 
     Status step() {
@@ -260,7 +250,7 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
     // The polynomial of degree 5 that has the positions, velocities and accelerations at both ends of the last step, at
     // t + theta h.
     void polynomial(real theta, real* position, real* velocity) const {
-        look_at_ends();
+        evaluate_ends();
         const real t = theta, t2 = t * t, t3 = t2 * t, h = step_size;
         const real rise = t3 * (real(10) + t * (real(6) * t - real(15))),
                    rise_slope = t2 * (real(30) + t * (real(30) * t - real(60)));
@@ -297,14 +287,11 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {
             Stepper local = *this;
-            Status status = local.start(time, position, momentum);
+            const Status status = this->step_from(local, time, position, momentum, q1, p1);
             if (status != Status::ok) return status;
-            constexpr int columns = 2 * n + 1;
-            real full[2 * n * columns] = {}, at[n], rate[n], slope[n], entries[K::entries > 0 ? K::entries : 1];
-            for (int k = 0; k < n; ++k) {
-                at[k] = local.q[k];
-                rate[k] = local.u[k];
-            }
+            real full[2 * n * (2 * n + 1)] = {}, at[n], rate[n], slope[n], entries[K::entries > 0 ? K::entries : 1];
+            for (int k = 0; k < n; ++k) at[k] = position[k];
+            K::velocity(coefficients, momentum, rate);
             for (int i = 0; i < s; ++i) {
                 Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +slope,
                                   +entries);
@@ -314,13 +301,8 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
                 for (int k = 0; k < n; ++k) at[k] = fused(composition.drift[i], rate[k], at[k]);
                 drift_increment<K>(composition.drift[i], full);
             }
-            status = local.step();
-            if (status != Status::ok) return status;
-            for (int k = 0; k < n; ++k) q1[k] = local.q[k];
-            local.momentum(p1);
             to_momentum<K>(coefficients, full);
-            for (int r = 0; r < 2 * n; ++r)
-                for (int c = 0; c < 2 * n; ++c) T[r * 2 * n + c] = (r == c ? real(1) : real(0)) + full[r * columns + c];
+            add_identity<K>(full, T);
             return Status::ok;
         } else {
             (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;
@@ -368,7 +350,7 @@ private:
         else
             return u_before[k];
     }
-    void look_at_ends() const {
+    void evaluate_ends() const {
         if (ends.of == this->steps) return;
         ends.of = this->steps;
         real begin[n];
@@ -406,7 +388,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         const int next = 1 - now;
         T not_finite = T(real(0));
         if constexpr (moves_immediately<K>()) {
-            step_in_passing<K>(composition, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+            immediate_step<K>(composition, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {
             T q1[n], u1[n], W1[n];

@@ -393,8 +393,8 @@ TEST_CASE("neighbours in registers and in memory give the same bits") {
 #include "motion.hpp"
 using namespace lobatto;
 using K = kernels::motion;
-static NeighbourTurns<K, IN_REGISTERS> within;
-static NeighbourTurns<K, false> through;
+static NeighbourComposition<K, IN_REGISTERS> within;
+static NeighbourComposition<K, false> through;
 int main() {
     K::Coefficients k;
     Composition<K> composition;
@@ -442,9 +442,7 @@ int main() {
         }
 }
 
-TEST_CASE("chains side by side move as each does alone, to the same bits, and one that ends leaves the others be") {
-    const TemporaryFolder folder;
-    write_text(folder / "side.cpp", R"(
+constexpr const char* side_by_side_program = R"(
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -454,13 +452,13 @@ TEST_CASE("chains side by side move as each does alone, to the same bits, and on
 using namespace lobatto;
 using K = kernels::motion;
 constexpr int n = K::coordinates, lanes = 4, steps = 60;
-static_assert(K::immediate == IN_PASSING);
-static_assert(ensemble_lanes<K>(8) == (IN_PASSING ? native_lanes<double> : 0) && ensemble_lanes<K>(1) == 0);
+static_assert(K::immediate == IMMEDIATE);
+static_assert(ensemble_lanes<K>(8) == (IMMEDIATE ? native_lanes<double> : 0) && ensemble_lanes<K>(1) == 0);
 static Ensemble<K, lanes> together;
 static Stepper<K> alone[lanes];
-// Formulas in passing add in the order of neighbours in lanes; others need not.
+// Immediate updates add in the order of neighbours in lanes; others need not.
 static bool agree(const double* a, const double* b) {
-    if (IN_PASSING) return std::memcmp(a, b, n * sizeof *a) == 0;
+    if (IMMEDIATE) return std::memcmp(a, b, n * sizeof *a) == 0;
     double most = 0;
     for (int i = 0; i < n; ++i) most = std::fmax(most, std::fabs(a[i] - b[i]));
     return most < 1e-12;
@@ -513,7 +511,11 @@ int main() {
     }
     std::printf("done\n");
 }
-)");
+)";
+
+TEST_CASE("chains side by side move as each does alone, to the same bits, and one that ends leaves the others be") {
+    const TemporaryFolder folder;
+    write_text(folder / "side.cpp", side_by_side_program);
     const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
     const auto replaced = [](std::string text, const std::string& from, const std::string& by) {
         for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + by.size()))
@@ -533,7 +535,7 @@ int main() {
             const Derivation derivation = derivation_of(motion, splitting(stages), "energy = false\ntangent = false");
             REQUIRE(derivation.structure.neighbours());
             write_text(folder / "motion.hpp", emit(derivation).header);
-            const std::string passing = immediate ? "-DIN_PASSING=true" : "-DIN_PASSING=false";
+            const std::string passing = immediate ? "-DIMMEDIATE=true" : "-DIMMEDIATE=false";
             const auto check = [&](const std::vector<std::string>& target) {
                 const std::optional<Finished> side = built_and_run(folder, "side", target);
                 REQUIRE(side);

@@ -31,8 +31,8 @@ P random_pack(unsigned seed) {
 }  // namespace
 
 TEST_CASE_TEMPLATE("arithmetic of packs is that of their lanes", K, Kind<double, 1>, Kind<double, 2>, Kind<double, 4>,
-                   Kind<double, 8>, Kind<double, 16>, Kind<double, 32>, Kind<float, 1>, Kind<float, 2>, Kind<float, 4>,
-                   Kind<float, 8>, Kind<float, 32>, Kind<long double, 1>, Kind<long double, 4>) {
+                   Kind<double, 8>, Kind<float, 1>, Kind<float, 2>, Kind<float, 4>, Kind<float, 8>, Kind<float, 16>,
+                   Kind<long double, 1>, Kind<long double, 4>) {
     using real = typename K::real;
     using P = Pack<real, K::width>;
     static_assert(lanes_of<P> == K::width && std::is_same_v<real_of<P>, real>);
@@ -75,7 +75,7 @@ TEST_CASE_TEMPLATE("arithmetic of packs is that of their lanes", K, Kind<double,
 }
 
 TEST_CASE_TEMPLATE("one lane alone is found by any, and missed by all", K, Kind<double, 1>, Kind<double, 2>,
-                   Kind<double, 8>, Kind<double, 32>, Kind<float, 2>, Kind<float, 16>, Kind<long double, 2>) {
+                   Kind<double, 4>, Kind<double, 8>, Kind<float, 2>, Kind<float, 16>, Kind<long double, 2>) {
     for (int lane = 0; lane < K::width; ++lane) {
         Mask<typename K::real, K::width> one = false, others = true;
         CHECK_FALSE(any(one));
@@ -90,7 +90,7 @@ TEST_CASE_TEMPLATE("one lane alone is found by any, and missed by all", K, Kind<
     }
 }
 
-TEST_CASE_TEMPLATE("packs are loaded from and stored to any address", K, Kind<double, 2>, Kind<double, 32>,
+TEST_CASE_TEMPLATE("packs are loaded from and stored to any address", K, Kind<double, 2>, Kind<double, 8>,
                    Kind<float, 2>, Kind<float, 16>) {
     using P = Pack<typename K::real, K::width>;
     typename K::real from[K::width + 3], to[K::width + 3] = {};
