@@ -199,12 +199,12 @@ tables and pictures are written by a command, which takes some ten minutes, meas
 
     ninja -C build/release bench_choosing && build/release/bench_choosing choosing
 
-Errors are the largest on the way to the scene's end, relative to the amplitude of the motion; times are nanoseconds of processor time a unit of the scene's time, on
+Errors are the largest on the way to the scene's end, relative to the amplitude of the motion; times are nanoseconds of processor time per unit of the scene's time, on
 one core that was not alone. ω is the largest frequency of the motion.
 
 ## Which member for which accuracy
 
-The fastest in double precision for an error, its step in units of 1/ω, and what a unit of time costs:
+The fastest in double precision for an error, its step in units of 1/ω, and the cost per unit of time:
 
 {head}{winners}
 - Read along a row: nine more digits cost two to six times as much, not a thousand times. Accuracy is cheap once the order is high.

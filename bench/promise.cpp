@@ -88,7 +88,7 @@ double checked_error(Experiment& experiment, const Candidate& candidate) {
 // each member and tolerance. Steps that Newton's iteration takes cost more.
 class Cost {
 public:
-    explicit Cost(Experiment& experiment) : laboratory_(experiment) {}
+    explicit Cost(Experiment& experiment) : experiment_(experiment) {}
 
     // Of the whole motion, in seconds; infinite for one that does not reach the end.
     double of(const Measurement& m) {
@@ -111,13 +111,13 @@ private:
         const std::pair key(like.member, like.tolerance);
         const auto known = prices_.find(key);
         if (known != prices_.end()) return known->second;
-        const Kernel kernel = laboratory_.kernel_builder().kernel(like.member);
-        const double radians = laboratory_.until() * laboratory_.reference().frequency;
-        const StepLadder ladder(laboratory_.reference().samples, 1.1);
+        const Kernel kernel = experiment_.kernel_builder().kernel(like.member);
+        const double radians = experiment_.until() * experiment_.reference().frequency;
+        const StepLadder ladder(experiment_.reference().samples, 1.1);
         std::vector<Run> runs;
         for (const double radians_of_step : {2.0, 1.0, 0.5, 0.25, 0.12, 0.06}) {
             const std::int64_t steps = ladder.at_least(std::max(1.0, radians / radians_of_step));
-            const Measurement m = laboratory_.measurer().measure(kernel, {like.member, steps, like.tolerance}, false);
+            const Measurement m = experiment_.measurer().measure(kernel, {like.member, steps, like.tolerance}, false);
             if (!m.complete) continue;
             runs.push_back({m});
             if (m.seconds > 0.3 || runs.front().measurement.iterations > 1.5 * m.iterations) break;
@@ -127,7 +127,7 @@ private:
         double spent = 0;
         for (int round = 0; round < 100 && spent < 0.04; ++round)
             for (Run* run : {&many, &few}) {
-                const double seconds = laboratory_.measurer().time_once(kernel, run->measurement.candidate).seconds;
+                const double seconds = experiment_.measurer().time_once(kernel, run->measurement.candidate).seconds;
                 run->measurement.seconds = std::min(run->measurement.seconds, seconds);
                 spent += seconds;
             }
@@ -141,7 +141,7 @@ private:
         return prices_[key] = price;
     }
 
-    Experiment& laboratory_;
+    Experiment& experiment_;
     std::map<std::pair<Member, double>, Price> prices_;
 };
 

@@ -121,20 +121,20 @@ std::vector<double> EnergyWatch::save() const {
     std::vector<double> all{
         static_cast<double>(seen_), static_cast<double>(stride_),        energy_start_, energy_error_,
         static_cast<double>(lost_), static_cast<double>(leaving_.size())};
-    for (const Rows& rows : {leaving_, some_})
-        for (const std::vector<double>& row : rows) all.insert(all.end(), row.begin(), row.end());
+    for (const States& states : {leaving_, some_})
+        for (const std::vector<double>& row : states) all.insert(all.end(), row.begin(), row.end());
     return all;
 }
 
-void EnergyWatch::restore(const std::vector<double>& seen) {
-    auto at = seen.begin();
+void EnergyWatch::restore(const std::vector<double>& saved) {
+    auto at = saved.begin();
     seen_ = std::llround(*at++);
     stride_ = std::llround(*at++);
     energy_start_ = *at++;
     energy_error_ = *at++;
     lost_ = *at++ != 0;
     const auto leaving = static_cast<std::size_t>(std::llround(*at++));
-    for (; at < seen.end(); at += static_cast<std::ptrdiff_t>(columns_))
+    for (; at < saved.end(); at += static_cast<std::ptrdiff_t>(columns_))
         (leaving_.size() < leaving ? leaving_ : some_).emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
 }
 

@@ -21,9 +21,9 @@ public:
     // Looks at the kept states go by: some of all times, and those where the energy error has doubled.
     void observe(const Records& records);
 
-    // What it has seen so far, for a later run that goes on.
+    // What it has observed so far, for a run that continues.
     std::vector<double> save() const;
-    void restore(const std::vector<double>& seen);
+    void restore(const std::vector<double>& saved);
 
     // The first such state, where the energy is off by half of the mean kinetic energy, and by more than rounding of
     // the positions explains, or not real: no path of this Lagrangian goes there. What to tell of it, as of any stop;
@@ -31,15 +31,15 @@ public:
     std::string departure(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request) const;
 
 private:
-    using Rows = std::vector<std::vector<double>>;  // t, q, p
+    using States = std::vector<std::vector<double>>;  // t, q, p
 
     bool watches_;
     std::size_t columns_;
     std::int64_t rows_a_step_;  // the energies of states between the steps are not conserved as well
     std::int64_t seen_ = 0, stride_ = 1;
     double energy_start_ = 0, energy_error_ = 0;
-    bool lost_ = false;    // an energy in double that is no number
-    Rows some_, leaving_;  // the first of `leaving_` is the start
+    bool lost_ = false;      // an energy in double that is no number
+    States some_, leaving_;  // the first of `leaving_` is the start
 };
 
 }  // namespace lobatto

@@ -130,13 +130,13 @@ std::vector<double> HardestSteps::save() const {
     return all;
 }
 
-void HardestSteps::restore(const std::vector<double>& seen, std::size_t columns) {
-    if (seen.empty()) return;
+void HardestSteps::restore(const std::vector<double>& saved, std::size_t columns) {
+    if (saved.empty()) return;
     const auto width = static_cast<std::ptrdiff_t>(columns);
-    auto at = seen.begin();
+    auto at = saved.begin();
     before_.assign(at, at + width);
     energy_before_ = at[width];
-    for (at += width + 1; at < seen.end(); at += width + 2)
+    for (at += width + 1; at < saved.end(); at += width + 2)
         places_[static_cast<std::size_t>(at[0])] = {at[1], {at + 2, at + 2 + width}};
 }
 

@@ -18,9 +18,9 @@ public:
     void observe(const std::vector<double>& state, double energy);  // not a number: it is not known
     States<double> states() const;                                  // in the order of time, each once
 
-    // What it has seen so far, for a later run that goes on: `columns` a state.
+    // What it has observed so far, for a run that continues: `columns` a state.
     std::vector<double> save() const;
-    void restore(const std::vector<double>& seen, std::size_t columns);
+    void restore(const std::vector<double>& saved, std::size_t columns);
 
 private:
     struct Place {

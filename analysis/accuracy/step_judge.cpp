@@ -73,21 +73,21 @@ std::vector<double> StepJudge::save() const {
     return all;
 }
 
-void StepJudge::restore(const std::vector<double>& seen) {
+void StepJudge::restore(const std::vector<double>& saved) {
     const std::ptrdiff_t width = 2 * std::ssize(groups_);
-    auto at = seen.begin();
+    auto at = saved.begin();
     const auto take = [&](std::ptrdiff_t count) {
         std::vector<double> part(at, at + count);
         at += count;
         return part;
     };
-    if (std::ssize(seen) < 1 + 2 * width) return;  // nothing was kept yet
+    if (std::ssize(saved) < 1 + 2 * width) return;  // nothing was kept yet
     seen_ = std::llround(*at++);
     least_ = take(width);
     most_ = take(width);
     const std::ptrdiff_t by_hardest = std::llround(*at++);
     hardest_.restore(take(by_hardest), static_cast<std::size_t>(1 + width));
-    while (seen.end() - at > 1 + width) {
+    while (saved.end() - at > 1 + width) {
         const std::int64_t number = std::llround(*at++);
         keep(number, take(1 + width));
     }

@@ -22,9 +22,9 @@ public:
     explicit StepJudge(const Scene& scene);
     void observe(const Records& records);
 
-    // What it has seen so far, for a later run that goes on.
+    // What it has observed so far, for a run that continues.
     std::vector<double> save() const;
-    void restore(const std::vector<double>& seen);
+    void restore(const std::vector<double>& saved);
 
     struct Judgement {
         double radians = 0;  // h times the largest frequency met; 0: not looked for

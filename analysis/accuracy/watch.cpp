@@ -55,13 +55,13 @@ std::vector<double> Watch::save() const {
             discrete_error_};
 }
 
-void Watch::restore(const std::vector<double>& seen) {
-    position_error_ = seen.at(0);
-    seen_ = std::llround(seen.at(1));
-    compared_ = std::llround(seen.at(2));
-    stride_ = std::llround(seen.at(3));
-    discrete_start_ = seen.at(4);
-    discrete_error_ = seen.at(5);
+void Watch::restore(const std::vector<double>& saved) {
+    position_error_ = saved.at(0);
+    seen_ = std::llround(saved.at(1));
+    compared_ = std::llround(saved.at(2));
+    stride_ = std::llround(saved.at(3));
+    discrete_start_ = saved.at(4);
+    discrete_error_ = saved.at(5);
 }
 
 std::optional<double> Watch::discrete_error() const {

@@ -23,9 +23,9 @@ public:
 
     std::optional<double> discrete_error() const;  // largest |H_d - H_d(0)| / |H_d(0)|, of linear systems
     std::optional<double> position_error() const;  // largest |q - exact q|, where the solution is known in closed form
-    // What it has seen so far, for a later run that goes on.
+    // What it has observed so far, for a run that continues.
     std::vector<double> save() const;
-    void restore(const std::vector<double>& seen);
+    void restore(const std::vector<double>& saved);
 
     bool is_elliptic() const { return closed_ && closed_->kind == ClosedSolution::Kind::pendulum; }
 

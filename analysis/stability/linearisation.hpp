@@ -26,7 +26,7 @@ struct LinearSystem {
     // Why it does not fall into independent oscillators, a clause; "" when it does: D = 0, S is symmetric, and in each
     // block M or -M is positive definite.
     std::string obstacle() const;
-    // Squares of the frequencies, ascending, negative where the motion runs away; nothing where there is an obstacle.
+    // Squares of the frequencies, ascending, negative where the motion grows; nothing where there is an obstacle.
     // Computed to 60 digits, those of blocks of more than 100 coordinates in double precision.
     std::optional<Eigen::VectorXd> squared_frequencies() const;
     // The largest real part of the exponents mu of x = exp(mu t).

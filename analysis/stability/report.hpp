@@ -15,7 +15,7 @@ namespace lobatto {
 
 // One independent oscillator of a linear system, x'' = -squared_frequency x.
 struct Mode {
-    double squared_frequency = 0;  // negative: the motion itself runs away
+    double squared_frequency = 0;  // negative: the motion itself grows
     double z = 0;                  // h^2 times it
     double rate = 0;               // ln of the growth in a step, from the member's exact trace
     bool at_limit = false;         // |trace| = 2 to rounding: states grow in proportion to the number of steps

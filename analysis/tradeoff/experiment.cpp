@@ -20,7 +20,7 @@ constexpr int few_coordinates = 10, some_coordinates = 20;
 constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
 constexpr double reference_share = 0.4;        // of the seconds
 constexpr double longest_radians = 4;          // h omega of the coarsest steps tried; Lobatto's limits are near pi
-const std::string measurements_version = "3";  // of what is measured: older notebooks are begun anew
+const std::string measurements_version = "3";  // of what is measured: older stores are begun anew
 
 // A run to the end of which nothing but error and time was asked.
 bool knows_errors_only(const Measurement& m) {

@@ -62,9 +62,9 @@ long integrate_gauss(State<real, Problem::coordinates>& state, real h, long step
     constexpr int n = Problem::coordinates, d = Problem::separable ? n : 2 * n;
     static const GaussTable<real, s> table;
     const real scale = Problem::separable ? h * h : h, root = square_root(tolerance);
-    auto sweep = Problem::separable ? table.A2 : table.A, predict = Problem::separable ? table.A2E : table.AE;
+    auto iteration_map = Problem::separable ? table.A2 : table.A, predict = Problem::separable ? table.A2E : table.AE;
     for (int j = 0; j < s; ++j)
-        for (int i = 0; i < s; ++i) sweep[j][i] *= scale, predict[j][i] *= scale;
+        for (int i = 0; i < s; ++i) iteration_map[j][i] *= scale, predict[j][i] *= scale;
     const auto function = [](const real* x, real* f) {
         if constexpr (Problem::separable)
             Problem::acceleration(x, f);
@@ -85,13 +85,13 @@ long integrate_gauss(State<real, Problem::coordinates>& state, real h, long step
         for (int i = 0; i < s; ++i)
             for (int k = 0; k < d; ++k) base.at(i, k) = Problem::separable ? y[k] + h * table.c[i] * y[n + k] : y[k];
         X = base;
-        X.add(step == 0 ? sweep : predict, F);
+        X.add(step == 0 ? iteration_map : predict, F);
         real before = 1e300;
         for (int iteration = 0;; ++iteration) {
             X.evaluate(function, F);
             evaluations += s;
             next = base;
-            next.add(sweep, F);
+            next.add(iteration_map, F);
             real increment = 0, largest = 0;
             for (int i = 0; i < s * d; ++i) {
                 increment = std::max(increment, magnitude(next.values[i] - X.values[i]));

@@ -242,6 +242,35 @@ void print(const std::vector<Row>& rows, const Convergence& convergence) {
                    &row == &convergence.rows.front() ? "" : fmt::format("{:.2f}", row.order));
 }
 
+// Tangent maps at `states`, and steps back.
+void symplecticity(std::vector<Row>& rows, const Kernel& kernel, const Kernel& exact_kernel, const Start<double>& start,
+                   const Start<__float128>& exact,
+                   const std::vector<std::pair<std::vector<double>, std::vector<double>>>& states, bool forced) {
+    const QuadrupleStart quadruple{exact.parameters, exact.q, exact.p};
+    const std::string not_symplectic = "the step does not preserve phase-space areas";
+    if (forced) {
+        rows.push_back(not_promised("symplectic step", "forces"));
+    } else {
+        rows.push_back(decided("symplectic defect, double", [&] {
+            // The equations of a step may take digits; in quadruple they take as many.
+            const double conditioned = std::ldexp(worst_defect(exact_kernel, exact, states), 113 - 53);
+            return at_most("symplectic defect, double", worst_defect(kernel, start, states),
+                           std::fmax(1e-14, conditioning_slack * conditioned), not_symplectic);
+        }));
+        rows.push_back(decided("symplectic defect, quadruple", [&] {
+            return at_most("symplectic defect, quadruple", worst_defect(exact_kernel, exact, states), 1e-30,
+                           not_symplectic);
+        }));
+    }
+    rows.push_back(decided("tangent map against differences", [&] {
+        return at_most("tangent map against differences", tangent_defect(exact_kernel, quadruple, start.step), 1e-18,
+                       "the tangent map is not the derivative of the step");
+    }));
+    rows.push_back(decided("steps and back, double", [&] { return reversal(kernel, start, "double", !forced); }));
+    rows.push_back(
+        decided("steps and back, quadruple", [&] { return reversal(exact_kernel, exact, "quadruple", !forced); }));
+}
+
 void verify(const VerifyOptions& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
@@ -271,32 +300,10 @@ void verify(const VerifyOptions& options) {
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
                                     [](const GiNaC::ex& force) { return !force.is_zero(); });
-    if (with_tangent) {
-        const std::string not_symplectic = "the step does not preserve phase-space areas";
-        if (forced) {
-            rows.push_back(not_promised("symplectic step", "forces"));
-        } else {
-            rows.push_back(decided("symplectic defect, double", [&] {
-                // The equations of a step may take digits; in quadruple they take as many.
-                const double conditioned = std::ldexp(worst_defect(exact_kernel, exact, states), 113 - 53);
-                return at_most("symplectic defect, double", worst_defect(kernel, start, states),
-                               std::fmax(1e-14, conditioning_slack * conditioned), not_symplectic);
-            }));
-            rows.push_back(decided("symplectic defect, quadruple", [&] {
-                return at_most("symplectic defect, quadruple", worst_defect(exact_kernel, exact, states), 1e-30,
-                               not_symplectic);
-            }));
-        }
-        rows.push_back(decided("tangent map against differences", [&] {
-            return at_most("tangent map against differences", tangent_defect(exact_kernel, quadruple_start, start.step),
-                           1e-18, "the tangent map is not the derivative of the step");
-        }));
-        rows.push_back(decided("steps and back, double", [&] { return reversal(kernel, start, "double", !forced); }));
-        rows.push_back(
-            decided("steps and back, quadruple", [&] { return reversal(exact_kernel, exact, "quadruple", !forced); }));
-    } else {
+    if (with_tangent)
+        symplecticity(rows, kernel, exact_kernel, start, exact, states, forced);
+    else
         rows.push_back({"symplectic step, reversal", "left out", fmt::format("n > {}", tangent_limit), true, ""});
-    }
     const double of_decimals =
         scene.method.family == Family::splitting ? 100 * std::pow(10.0, -splitting_of(scene.method.points).digits) : 0;
     Convergence convergence;

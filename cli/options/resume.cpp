@@ -52,7 +52,7 @@ std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std
     if (!found) return found;
     if (const std::string what = difference(found->run, run); !what.empty())
         throw InputError(
-            fmt::format("{} belongs to another run: {}. Give that run's options, or run without --resume to begin anew",
+            fmt::format("{} belongs to another run: {}. Give that run's options, or run without --resume to start again",
                         path, what));
     const auto n = static_cast<std::size_t>(kernel->coordinates);
     const TrajectoryResult& result = found->halfway.result;
@@ -61,7 +61,7 @@ std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std
     if (found->files.size() != files || !has_all || std::ssize(found->halfway.stepper) != kernel->stepper_bytes ||
         result.q.size() != n || result.p.size() != n)
         throw MachineError(
-            fmt::format("cannot go on from {}: it is damaged. Run without --resume to begin anew", path));
+            fmt::format("cannot continue from {}: it is damaged. Run without --resume to start again", path));
     return found;
 }
 

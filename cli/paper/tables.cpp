@@ -80,7 +80,7 @@ PaperTable table(PaperSystem system, std::string title, const int (&meshes)[3], 
 
 // The step loop runs inside the kernel, in blocks of records.
 template <class real>
-void run_in(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& look) {
+void run_in(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& observe) {
     LoadedStepper<real> stepper(kernel);
     const auto succeed = [](std::int32_t status) {
         if (status != LOBATTO_OK)
@@ -91,7 +91,7 @@ void run_in(const Kernel& kernel, double step, long steps, const std::function<v
     constexpr real pi = std::numbers::pi_v<real>;
     succeed(stepper.prepare({1, 2 * pi}, static_cast<real>(step)));
     succeed(stepper.start(0, {pi / 2}, {0}));
-    look({0, pi / 2, 0});
+    observe({0, pi / 2, 0});
     if (kernel->two_fold_state != nullptr) {
         std::vector<real> q, q_rest, p, p_rest;  // m = 1: the velocity is the momentum
         for (long done = 1; done <= steps; ++done) {
@@ -100,7 +100,7 @@ void run_in(const Kernel& kernel, double step, long steps, const std::function<v
             succeed(stepper.advance(call));
             stepper.two_fold_state(q, q_rest, p, p_rest);
             const auto sum = [](real value, real rest) { return static_cast<long double>(value) + rest; };
-            look({static_cast<long double>(step) * done, sum(q[0], q_rest[0]), sum(p[0], p_rest[0])});
+            observe({static_cast<long double>(step) * done, sum(q[0], q_rest[0]), sum(p[0], p_rest[0])});
         }
         return;
     }
@@ -113,7 +113,7 @@ void run_in(const Kernel& kernel, double step, long steps, const std::function<v
         call.capacity = 1024;
         succeed(stepper.advance(call));
         for (std::int64_t i = 0; i < call.records_written; ++i)
-            look({records[3 * i], records[3 * i + 1], records[3 * i + 2]});
+            observe({records[3 * i], records[3 * i + 1], records[3 * i + 2]});
         done += call.steps_done;
     }
 }
@@ -159,9 +159,9 @@ std::function<long double(const PaperState&)> discrete_energy_of(const Kernel& k
     };
 }
 
-void run_kernel(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& look) {
-    kernel->real_kind == LOBATTO_LONG_DOUBLE ? run_in<long double>(kernel, step, steps, look)
-                                             : run_in<double>(kernel, step, steps, look);
+void run_kernel(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& observe) {
+    kernel->real_kind == LOBATTO_LONG_DOUBLE ? run_in<long double>(kernel, step, steps, observe)
+                                             : run_in<double>(kernel, step, steps, observe);
 }
 
 std::vector<PaperState> kernel_states(PaperSystem system, int points, double step, int steps) {

@@ -32,7 +32,7 @@ std::function<long double(const PaperState&)> discrete_energy_of(const Kernel& k
 
 // Every state of a run in the kernel's own arithmetic (double or extended; a clean kernel's states are the sums of both
 // their numbers), the first included, in order.
-void run_kernel(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& look);
+void run_kernel(const Kernel& kernel, double step, long steps, const std::function<void(const PaperState&)>& observe);
 std::vector<PaperState> kernel_states(PaperSystem system, int points, double step, int steps);
 std::vector<PaperState> midpoint_states(PaperSystem system, double step, int steps);
 

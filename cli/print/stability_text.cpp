@@ -174,7 +174,7 @@ std::string trajectory_text(const StabilityReport& report) {
             ? fmt::format(
                   "  no eigenvalue of a step is above 1 ({} steps looked at){}\n", motion.looked_at,
                   report.derivation.system.autonomous ? "" : "; as forces change with time it may grow all the same")
-            : fmt::format("  an eigenvalue above 1, so that neighbouring motions part, in {} of {} steps looked at\n",
+            : fmt::format("  an eigenvalue above 1, so that nearby trajectories diverge, in {} of {} steps looked at\n",
                           motion.parting, motion.looked_at);
     if (motion.parting > 0)
         text += fmt::format("  fastest at t = {:.6g}: {} a step; the motion itself {}\n", motion.time,

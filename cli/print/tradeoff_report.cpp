@@ -60,7 +60,7 @@ std::string front_table(const Experiment& experiment) {
     const bool chaotic = experiment.is_chaotic();
     std::string text = chaotic ? fmt::format("  {:>9}  {:>9}  {:>9}", "energy", "momenta", "followed")
                                : fmt::format("  {:>9}  {:>9}", "error", "energy");
-    text += fmt::format("  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}\n", "ns a unit", "method", "step", "precision",
+    text += fmt::format("  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}\n", "ns/unit", "method", "step", "precision",
                         "iterate", "gradients");
     for (const Measurement& m : front_rows_of(experiment)) {
         text += chaotic ? fmt::format("  {:>9}  {:>9}  {:>9.4g}", optional(m.energy_error), optional(m.momentum_error),

@@ -14,7 +14,7 @@ namespace {
 using GiNaC::ex;
 using GiNaC::numeric;
 using Expressions = std::vector<ex>;
-using Rows = std::vector<Expressions>;
+using MatrixRows = std::vector<Expressions>;
 
 // Tables of floats: what is left of an identity, absolute. Measured at most 1e-90: 100 digits, of numbers below 1e10.
 constexpr double table_bound = 1e-50;
@@ -50,8 +50,8 @@ ex integral(const Expressions& f, const Expressions& g) {
     return sum;
 }
 
-Rows rows_of(const GiNaC::matrix& matrix) {
-    Rows rows(matrix.rows());
+MatrixRows rows_of(const GiNaC::matrix& matrix) {
+    MatrixRows rows(matrix.rows());
     for (unsigned i = 0; i < matrix.rows(); ++i)
         for (unsigned j = 0; j < matrix.cols(); ++j) rows[i].push_back(matrix(i, j));
     return rows;
@@ -149,7 +149,7 @@ private:
 
     // (D4). The rule is exact for products of slopes.
     void rigidity() {
-        const Rows K = rows_of(q_.K);
+        const MatrixRows K = rows_of(q_.K);
         Expressions zeros;
         for (std::size_t i = 0; i < controls_; ++i) {
             ex row = 0;
@@ -164,7 +164,7 @@ private:
         inverse_of_K();
     }
     void inverse_of_K() {
-        const Rows K = rows_of(q_.K), G = rows_of(q_.G);
+        const MatrixRows K = rows_of(q_.K), G = rows_of(q_.G);
         Expressions inverse;
         for (std::size_t i = 0; i + 2 < controls_; ++i)
             for (std::size_t j = 0; j + 2 < controls_; ++j) {
@@ -208,7 +208,7 @@ private:
     // (D15): continued to 1 + x, powers remain powers.
     void continuation() {
         Expressions zeros;
-        const auto carried = [&](const Rows& rows, const Expressions& from, const Expressions& to) {
+        const auto carried = [&](const MatrixRows& rows, const Expressions& from, const Expressions& to) {
             for (std::size_t i = 0; i < rows.size(); ++i)
                 for (std::size_t k = 0; k < from.size(); ++k) {
                     ex sum = -power(1 + to[i], k);
@@ -237,7 +237,7 @@ private:
     // a_ij, the integral of node polynomial j from 0 to c_i, by the rule itself on [0, c_i].
     void collocation() {
         const Expressions &c = q_.nodes, &b = q_.weights;
-        Rows a(r_, Expressions(r_));
+        MatrixRows a(r_, Expressions(r_));
         for (std::size_t i = 0; i < r_; ++i)
             for (std::size_t j = 0; j < r_; ++j) {
                 for (std::size_t k = 0; k < r_; ++k) {
@@ -269,7 +269,7 @@ private:
     // (D40). A symmetric matrix with one diagonal beside the main one is known by what it makes of straight paths: of a
     // constant nothing, of theta a pull at the ends.
     void straight_paths() {
-        const Rows K = rows_of(q_.K);
+        const MatrixRows K = rows_of(q_.K);
         Expressions zeros, moment{-1}, mirror;
         for (std::size_t i = 0; i < controls_; ++i) {
             ex row = 0, pull = i == 0 ? 1 : i + 1 == controls_ ? -1 : 0;
@@ -320,7 +320,7 @@ private:
     const Quadrature& q_;
     bool lobatto_, is_straight_;
     std::size_t controls_, r_, m_;
-    Rows A_, basis_, slopes_;
+    MatrixRows A_, basis_, slopes_;
     std::vector<Check> checks_;
 };
 

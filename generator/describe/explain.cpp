@@ -15,7 +15,7 @@ namespace {
 
 using GiNaC::ex;
 
-constexpr int most_swept = 16;  // coordinates of the general form: `most_full` of base/contract.hpp
+constexpr int most_iterated = 16;  // coordinates of the general form: `most_full` of base/contract.hpp
 
 bool holds_any(const SparseMatrix& matrix, const std::vector<GiNaC::symbol>& symbols) {
     return std::any_of(matrix.entries().begin(), matrix.entries().end(), [&](const auto& entry) {
@@ -166,8 +166,8 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    const bool has_fixed_point = !derivation.structure.full() &&
-                                 (derivation.structure.form() == Form::separable || derivation.system.n <= most_swept);
+    const bool has_fixed_point = !derivation.structure.full() && (derivation.structure.form() == Form::separable ||
+                                                                  derivation.system.n <= most_iterated);
     std::string text = derivation.structure.linear ? "once a step, without iteration; "
                        : has_fixed_point
                            ? "by fixed-point iteration over all points at once; where it does not contract, "

@@ -375,7 +375,7 @@ FixedEnds fixed_ends_of(const Elements& elements, const std::vector<GiNaC::symbo
         if (runs_of(element).size() != 1 || element.rows.size() + 1 != q.size()) continue;
         if (std::min(row[0], row[1]) != 0 || std::max(row[0], row[1]) != 1) continue;
         const std::size_t lower = row[0] == 0 ? 0 : 1, upper = 1 - lower;
-        // Whether all terms of one coordinate alone are the formula at its wall, which is then taken away.
+        // Whether all terms of one coordinate alone are the formula at its fixed end, which is then taken away.
         const auto hangs = [&](const GiNaC::symbol& end, std::size_t slot) {
             std::vector<ex> rest;
             ex alone = 0;

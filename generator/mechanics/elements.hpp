@@ -40,11 +40,11 @@ int row_reach(const Elements& elements);
 bool covers(const Element& element, int count);
 
 // Where the formula of all pairs of neighbours holds beyond the first coordinate, or the last, with zero for the one
-// that is not there: a chain between walls.
+// that is not there: a chain with fixed ends.
 struct FixedEnds {
     std::size_t element = 0;  // its number
     bool before = false, behind = false;
-    std::vector<GiNaC::ex> others;  // without what stands for the walls
+    std::vector<GiNaC::ex> others;  // without the terms of the fixed ends
 };
 FixedEnds fixed_ends_of(const Elements& elements, const std::vector<GiNaC::symbol>& q);
 // Whether the slope is that of one formula, of single coordinates or pairs of neighbours, which covers all of them.

@@ -115,14 +115,14 @@ private:
 
 constexpr int sample_attempts = 40, attempts_elsewhere = 3;
 
-// look(point) at two points near the start, and at one elsewhere of each way, where all formulas have values. What
-// `look` throws as DomainError asks for another point; thrown on when there is none near the start.
-template <class Look>
-void at_sample_points(const Scene& scene, const Look& look) {
+// use(point) at two points near the start, and at one elsewhere of each way, where all formulas have values. What
+// `use` throws as DomainError asks for another point; thrown on when there is none near the start.
+template <class Use>
+void at_sample_points(const Scene& scene, const Use& use) {
     for (int attempt = 0, done = 0; done < 2; ++attempt) {
         try {
             NearStart point(scene, attempt);
-            look(point);
+            use(point);
             ++done;
         } catch (const DomainError&) {
             if (attempt == sample_attempts) throw;
@@ -132,7 +132,7 @@ void at_sample_points(const Scene& scene, const Look& look) {
         for (int attempt = 0; attempt < attempts_elsewhere; ++attempt) {
             try {
                 Elsewhere point(scene, way, attempt);
-                look(point);
+                use(point);
                 break;
             } catch (const DomainError&) {
             }

@@ -96,6 +96,15 @@ private:
     std::vector<std::set<int>> neighbours_;
 };
 
+Finding solution_finding(const std::optional<ClosedSolution>& solution) {
+    if (!solution)
+        return {"solution in closed form", false, "this is neither a harmonic oscillator nor a plane pendulum"};
+    const bool is_harmonic = solution->kind == ClosedSolution::Kind::harmonic;
+    return {"solution in closed form", true,
+            std::string(is_harmonic ? "q'' = -w2*q" : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
+                " with w2 = " + canonical_text(solution->omega_squared)};
+}
+
 class Finder {
 public:
     Finder(const Scene& scene, const System& system, const Quadrature& quadrature, bool general)
@@ -118,7 +127,7 @@ public:
         else
             separable();
         time_and_forces();
-        solution();
+        findings_.push_back(solution_finding(result_.closed_solution));
         switch (form_) {
             case Form::linear_map:
                 result_.of_form = LinearMapForm{std::move(separable_)};
@@ -482,16 +491,6 @@ private:
             for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;
             find("constant parameters", true, list + ": numbers in the formulas, not arguments of them");
         }
-    }
-
-    void solution() {
-        const bool closed = result_.closed_solution.has_value();
-        find("solution in closed form", closed,
-             closed ? (result_.closed_solution->kind == ClosedSolution::Kind::harmonic
-                           ? "q'' = -w2*q"
-                           : "q'' = -w2*sin(q), by Jacobi elliptic functions") +
-                          std::string(" with w2 = ") + canonical_text(result_.closed_solution->omega_squared)
-                    : "this is neither a harmonic oscillator nor a plane pendulum");
     }
 
     const Scene& scene_;

@@ -120,7 +120,7 @@ private:
     std::vector<Kind> sampled(const std::vector<ex>& expressions) const {
         std::vector<Kind> kinds(expressions.size());
         try {
-            at_sample_points(scene_, [&](NearStart& point) { look(expressions, point, kinds); });
+            at_sample_points(scene_, [&](NearStart& point) { examine(expressions, point, kinds); });
         } catch (const DomainError& error) {
             refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
                                        "from the singularity, or mend the formula",
@@ -129,7 +129,7 @@ private:
         return kinds;
     }
 
-    void look(const std::vector<ex>& expressions, NearStart& point, std::vector<Kind>& kinds) const {
+    void examine(const std::vector<ex>& expressions, NearStart& point, std::vector<Kind>& kinds) const {
         Formulas formulas;
         point.set_all(formulas);
         const std::vector<Id> roots = formulas.convert(expressions);
@@ -292,13 +292,13 @@ public:
             derivative_of(system_.momentum, system_.v), derivative_of(system_.momentum, system_.q),
             derivative_of(system_.force, system_.v), derivative_of(system_.force, system_.q)};
         // Derivatives and first-order quantities together, each with what it depends on.
-        std::vector<ex> looked_at = system_.momentum;
-        looked_at.insert(looked_at.end(), system_.force.begin(), system_.force.end());
-        const std::size_t first_order = looked_at.size();
+        std::vector<ex> expressions = system_.momentum;
+        expressions.insert(expressions.end(), system_.force.begin(), system_.force.end());
+        const std::size_t first_order = expressions.size();
         for (const SparseMatrix& matrix : derived)
-            for (const auto& [place, value] : matrix.entries()) looked_at.push_back(value);
+            for (const auto& [place, value] : matrix.entries()) expressions.push_back(value);
         const Dependence dependence(scene_, system_, motion_);
-        const std::vector<Dependence::Kind> kinds = dependence.of(looked_at);
+        const std::vector<Dependence::Kind> kinds = dependence.of(expressions);
 
         keep_second_order(derived, {kinds.begin() + static_cast<std::ptrdiff_t>(first_order), kinds.end()});
         keep_first_order(kinds, dependence);
@@ -306,7 +306,7 @@ public:
             if (event.value.has(system_.t)) system_.autonomous = false;  // events are given the time, as all else is
         if (system_.autonomous && mentions(system_, system_.t)) return build_system(without_time(scene_));
         check_mass(scene_, system_);
-        if (system_.separable) look_at_rest(dependence);
+        if (system_.separable) check_rest(dependence);
         if (system_.separable) keep_separable_parts();
         return system_;
     }
@@ -348,7 +348,7 @@ private:
                 const ex kept_value = constant ? constant_form(value, of_motion) : value;
                 kept[block]->put(place.first, place.second, kept_value);
                 system_.linear = system_.linear && constant;
-                if (system_.separable) look_at_second_order(block, place, kept_value, kind, constant);
+                if (system_.separable) check_second_order(block, place, kept_value, kind, constant);
             }
         }
     }
@@ -362,8 +362,8 @@ private:
         }
     }
 
-    void look_at_second_order(std::size_t block, const std::pair<int, int>& place, const ex& value,
-                              const Dependence::Kind& kind, bool constant) {
+    void check_second_order(std::size_t block, const std::pair<int, int>& place, const ex& value,
+                            const Dependence::Kind& kind, bool constant) {
         const std::string of = (block < 2 ? "p_" : "f_") + coordinate_of(static_cast<std::size_t>(place.first));
         const GiNaC::symbol& by =
             (block == 0 || block == 2 ? system_.v : system_.q)[static_cast<std::size_t>(place.second)];
@@ -391,7 +391,7 @@ private:
     }
 
     // Terms linear in the velocities with coefficients free of positions: p = M v + a(t).
-    void look_at_rest(const Dependence& dependence) {
+    void check_rest(const Dependence& dependence) {
         std::vector<ex> at_zero;
         try {
             at_zero = all_at(system_.momentum, system_.v, 0);

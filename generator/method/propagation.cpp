@@ -36,7 +36,7 @@ Fraction fraction(int r, const numeric& end, const ex& z) {
 }
 
 // Kicks and drifts are linear in turn, in q and (h/m) p: kick (h/m) p -= z b q, drift q += a (h/m) p.
-Propagation propagation_in_turn(const Quadrature& quadrature) {
+Propagation propagation_of_composition(const Quadrature& quadrature) {
     Propagation result;
     const ex z = result.z;
     // Rows q and (h/m) p of the states that begin as (1, 0) and (0, 1).
@@ -58,7 +58,7 @@ Propagation propagation_in_turn(const Quadrature& quadrature) {
 }  // namespace
 
 Propagation propagation(const Quadrature& quadrature) {
-    if (quadrature.is_explicit()) return propagation_in_turn(quadrature);
+    if (quadrature.is_explicit()) return propagation_of_composition(quadrature);
     const bool lobatto = quadrature.method.family == Family::lobatto;
     const int r = quadrature.method.points - (lobatto ? 1 : 0);  // degree of the path
     Propagation result;

@@ -21,7 +21,7 @@ template <class Number>
 using Polynomial = std::vector<Number>;
 
 template <class Number>
-using Rows = std::vector<std::vector<Number>>;
+using MatrixRows = std::vector<std::vector<Number>>;
 
 template <class Number>
 Number value(const Polynomial<Number>& f, const Number& x) {
@@ -131,8 +131,8 @@ std::vector<Polynomial<Number>> lagrange(const std::vector<Number>& x) {
 
 // Row i: the values of the polynomials at x_i.
 template <class Number>
-Rows<Number> values(const std::vector<Polynomial<Number>>& basis, const std::vector<Number>& x) {
-    Rows<Number> rows(x.size());
+MatrixRows<Number> values(const std::vector<Polynomial<Number>>& basis, const std::vector<Number>& x) {
+    MatrixRows<Number> rows(x.size());
     for (std::size_t i = 0; i < x.size(); ++i)
         for (const Polynomial<Number>& f : basis) rows[i].push_back(value(f, x[i]));
     return rows;
@@ -140,9 +140,9 @@ Rows<Number> values(const std::vector<Polynomial<Number>>& basis, const std::vec
 
 // The inverse of a square matrix by Gauss-Jordan elimination.
 template <class Number>
-Rows<Number> inverse(Rows<Number> matrix) {
+MatrixRows<Number> inverse(MatrixRows<Number> matrix) {
     const std::size_t n = matrix.size();
-    Rows<Number> result(n, std::vector<Number>(n));
+    MatrixRows<Number> result(n, std::vector<Number>(n));
     for (std::size_t i = 0; i < n; ++i) result[i][i] = Number(1);
     for (std::size_t k = 0; k < n; ++k) {  // without exchange of rows: the matrix is positive definite
         const Number divisor = matrix[k][k];
@@ -170,7 +170,7 @@ std::vector<GiNaC::ex> expressions(const std::vector<Number>& numbers) {
 }
 
 template <class Number>
-GiNaC::matrix matrix_of(const Rows<Number>& rows, std::size_t columns) {
+GiNaC::matrix matrix_of(const MatrixRows<Number>& rows, std::size_t columns) {
     GiNaC::matrix result(static_cast<unsigned>(rows.size()), static_cast<unsigned>(columns));
     for (std::size_t i = 0; i < rows.size(); ++i)
         for (std::size_t j = 0; j < columns; ++j)
@@ -206,21 +206,21 @@ Quadrature tables(const Method& method) {
     }
     for (const auto& f : basis) slopes.push_back(derivative(f));
 
-    const Rows<Number> D = values(slopes, nodes);
-    Rows<Number> K(controls, std::vector<Number>(controls)), interior;
+    const MatrixRows<Number> D = values(slopes, nodes);
+    MatrixRows<Number> K(controls, std::vector<Number>(controls)), interior;
     for (std::size_t i = 0; i < controls; ++i)
         for (std::size_t j = 0; j < controls; ++j)
             for (std::size_t k = 0; k < r; ++k) K[i][j] = K[i][j] + D[k][i] * weights[k] * D[k][j];
     for (std::size_t i = 1; i + 1 < controls; ++i) interior.emplace_back(K[i].begin() + 1, K[i].end() - 1);
-    const Rows<Number> G = inverse(interior);
+    const MatrixRows<Number> G = inverse(interior);
 
-    Rows<Number> A(m, std::vector<Number>(m));
+    MatrixRows<Number> A(m, std::vector<Number>(m));
     if (lobatto) {
         for (std::size_t i = 0; i < m; ++i)
             for (std::size_t j = 0; j < m; ++j)
                 A[i][j] = weights[j + 1] * (inner[i] * (Number(1) - inner[j]) - G[i][j]);
     } else {
-        const Rows<Number> a = values(node_integrals, nodes);  // collocation: a_ij, from 0 to c_i over l_j
+        const MatrixRows<Number> a = values(node_integrals, nodes);  // collocation: a_ij, from 0 to c_i over l_j
         for (std::size_t i = 0; i < m; ++i)
             for (std::size_t j = 0; j < m; ++j)
                 for (std::size_t k = 0; k < m; ++k) A[i][j] = A[i][j] + a[i][k] * a[k][j];

@@ -124,7 +124,7 @@ private:
         if (!d_.structure.neighbours()) return;
         const FixedEnds& fixed_ends = d_.structure.separable().fixed_ends;
         if (!fixed_ends.before && !fixed_ends.behind) return;
-        // The same where the walls of a chain are rows.
+        // The same where the fixed ends of a chain are rows.
         Program inside = program_of({LoopPart::inside, LoopPart::Of::slope});
         add_slopes(inside, fixed_ends.others);
         p_.programs.push_back(std::move(inside));

@@ -322,7 +322,7 @@ TEST_CASE(
     CAPTURE(first.out);
     CAPTURE(first.err);
     REQUIRE(first.exit_code == 0);
-    CHECK(contains(first.out, "ns a unit"));
+    CHECK(contains(first.out, "ns/unit"));
     CHECK(contains(first.out, "explicit extrapolation in __float128 differs from it by"));
     const auto json = nlohmann::json::parse(test::read_file(out + "/tradeoff.json"));
     REQUIRE(json.at("front").size() > 2);

@@ -228,7 +228,7 @@ TEST_CASE("an interrupted run keeps its file under its name, and goes on from th
     CHECK(said(done.out) == said(whole.out));
 }
 
-TEST_CASE("with nothing left to resume a run begins anew, and says so") {
+TEST_CASE("with nothing left to resume a run starts again, and says so") {
     const TemporaryFolder folder;
     const Finished done =
         run({LOBATTO_PROGRAM, "run", LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "-o", folder / "a.csv", "--resume"});
@@ -253,7 +253,7 @@ TEST_CASE("another run's checkpoint, a damaged one, a missing or altered file ar
         const Finished damaged = stopped.resume();
         CHECK(damaged.exit_code == 4);
         CHECK(damaged.err ==
-              "lobatto: cannot go on from " + checkpoint + ": it is damaged. Run without --resume to begin anew\n");
+              "lobatto: cannot continue from " + checkpoint + ": it is damaged. Run without --resume to start again\n");
     }
     write_text(checkpoint, bytes.substr(0, 40));
     CHECK(stopped.resume().exit_code == 4);
@@ -277,8 +277,8 @@ TEST_CASE("another run's checkpoint, a damaged one, a missing or altered file ar
         for (const std::string& each : {stopped.out, event_file}) std::filesystem::remove(each + ".partial");
         const Finished refused = stopped.resume();
         CHECK(refused.exit_code == 4);
-        CHECK(refused.err == "lobatto: cannot go on with the trajectory in " + file +
-                                 ": it is not what the run had written. Run without --resume to begin anew\n");
+        CHECK(refused.err == "lobatto: cannot continue with the trajectory in " + file +
+                                 ": it is not what the run had written. Run without --resume to start again\n");
         write_text(file, whole);
     };
     const auto kept = static_cast<std::size_t>(read_checkpoint(checkpoint)->files[0].size);
@@ -313,7 +313,7 @@ TEST_CASE("a checksum is that of the bytes, however they come, and of no others"
     CHECK(checksum_of(text.substr(1), 64) != whole);
 }
 
-TEST_CASE("a run that begins anew takes the checkpoint of the one before away") {
+TEST_CASE("a run that starts again takes the checkpoint of the one before away") {
     const Interrupted stopped;
     CHECK(std::filesystem::exists(stopped.out + ".checkpoint"));
     run({LOBATTO_PROGRAM, "run", LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "-o", stopped.out});

@@ -368,23 +368,10 @@ Reals wide(const std::vector<double>& values) {
     return {values.begin(), values.end()};
 }
 
-Outcome compare_compiled(const Scene& scene, const Derivation& derivation, Author& author) {
-    const test::TemporaryFolder folder;
-    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
-    const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
-    LoadedStepper<double> stepper(kernel);
-    Mechanics mechanics(derivation);
+// Slopes, momenta, velocities and energies at points around (q, v).
+Outcome compare_pieces(LoadedStepper<double>& stepper, Mechanics& mechanics, const std::vector<double>& parameters,
+                       const std::vector<double>& q, const std::vector<double>& v, Author& author) {
     const std::size_t n = mechanics.n();
-    const std::vector<double> parameters(scene.parameters.size(), 1.3);  // not the scene's
-    std::vector<double> q, v;
-    for (std::size_t k = 0; k < n; ++k) {
-        q.push_back(author.uniform(-0.8, 0.8));
-        v.push_back(author.uniform(-0.5, 0.5));
-    }
-    const double h = scene.evaluate(scene.run.step, "step").to_double();
-    if (stepper.prepare(parameters, h) != LOBATTO_OK) return {"", true};
-
-    // Pieces at points around the start.
     for (int point = 0; point < 4; ++point) {
         std::vector<double> at = q, rate = v, Lv, Lq;
         for (std::size_t k = 0; k < n; ++k) {
@@ -413,6 +400,27 @@ Outcome compare_compiled(const Scene& scene, const Derivation& derivation, Autho
         }
         if (has_energy && far(energy, exact[0])) return {fmt::format("H is {} instead of {}", energy, exact[0]), false};
     }
+    return {};
+}
+
+Outcome compare_compiled(const Scene& scene, const Derivation& derivation, Author& author) {
+    const test::TemporaryFolder folder;
+    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
+    const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    Mechanics mechanics(derivation);
+    const std::size_t n = mechanics.n();
+    const std::vector<double> parameters(scene.parameters.size(), 1.3);  // not the scene's
+    std::vector<double> q, v;
+    for (std::size_t k = 0; k < n; ++k) {
+        q.push_back(author.uniform(-0.8, 0.8));
+        v.push_back(author.uniform(-0.5, 0.5));
+    }
+    const double h = scene.evaluate(scene.run.step, "step").to_double();
+    if (stepper.prepare(parameters, h) != LOBATTO_OK) return {"", true};
+
+    if (const Outcome pieces = compare_pieces(stepper, mechanics, parameters, q, v, author); !pieces.disagreement.empty())
+        return pieces;
 
     // The motion, with h, h/2, h/4, to the same time.
     const auto steps = static_cast<std::int64_t>(std::ceil(1 / h));

@@ -188,7 +188,7 @@ TEST_CASE("what the stage map leaves of the forces is a function of its own, wit
     CHECK(tower.size() < 20000);
     // Nothing is left out of these: no quadratic part; forces for which fixed-point iterations take second derivatives.
     for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
-                                    kernel({"costly", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
+                                    kernel({"stiff", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
         CHECK(none.find("bool has_remainder = false;") != std::string::npos);
         CHECK(none.find("void remainder(") == std::string::npos);
     }

@@ -242,7 +242,7 @@ TEST_CASE("derivatives of a repeated term that are equal and opposite several ti
     CHECK(distance(motion(shortcut, 50), motion(derive(shear, true), 50)) < 1e-12);
 }
 
-TEST_CASE("a formula without a value at zero is no wall") {
+TEST_CASE("a formula without a value at zero is no fixed end") {
     const Scene quotients = scene(
         "lagrangian = \"\"\"sum(i = 1 .. 24, x[i]'^2/2) - sum(i = 1 .. 23, x[i+1]/x[i] + x[i]/x[i+1])\n"
         "  - (x[1] - 1)^2\"\"\"\n[coordinates]\nx = { count = 24, position = 1, velocity = \"sin(i)/10\" }\n" +

@@ -326,7 +326,7 @@ TEST_CASE("a trajectory whose step cannot be solved stops alone, with its last g
 
 TEST_CASE(
     "a lane whose fixed-point iteration cannot contract is continued by Newton's iteration, the others unchanged") {
-    // A force without a function is swept without second derivatives.
+    // A force without a function is iterated without second derivatives.
     const TestMotion quartic{
         "lagrangian = \"q'^2/2 - k*q^4/4\"\n[coordinates]\nq = { position = 1, velocity = 0.25 }\n"
         "[parameters]\nk = 1\n",
@@ -416,7 +416,7 @@ TEST_CASE("a pendulum whose nodes move far in an iteration takes the steps of Ne
         const auto solved = alone(newton, wide, 20, start);
         CHECK(distance(alone(kernel, wide, 20, start), solved) < 5000);
         CHECK(alone(kernel, wide, 20, start) != solved);
-        CHECK(alone(of_lanes, wide, 20, start) == solved);  // there only lanes are swept
+        CHECK(alone(of_lanes, wide, 20, start) == solved);  // there only lanes have fixed-point iterations
     }
 }
 
