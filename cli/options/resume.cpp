@@ -51,9 +51,9 @@ std::optional<Checkpoint> checkpoint_of(const std::string& trajectory, const std
     std::optional<Checkpoint> found = read_checkpoint(path);
     if (!found) return found;
     if (const std::string what = difference(found->run, run); !what.empty())
-        throw InputError(
-            fmt::format("{} belongs to another run: {}. Give that run's options, or run without --resume to start again",
-                        path, what));
+        throw InputError(fmt::format(
+            "{} belongs to another run: {}. Give that run's options, or run without --resume to start again", path,
+            what));
     const auto n = static_cast<std::size_t>(kernel->coordinates);
     const TrajectoryResult& result = found->halfway.result;
     const bool has_all = std::all_of(observers.begin(), observers.end(),

@@ -60,10 +60,10 @@ TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& 
     } else {
         add_to_checksum(kept.size);
         if (file_.read(0, text_.size()) != text_ || checksum_.written() != kept)
-            throw MachineError(
-                fmt::format("cannot continue with the trajectory in {}: it is not what the run had written. Run without "
-                            "--resume to start again",
-                            path));
+            throw MachineError(fmt::format(
+                "cannot continue with the trajectory in {}: it is not what the run had written. Run without "
+                "--resume to start again",
+                path));
         text_.clear();
     }
 }

@@ -419,7 +419,8 @@ Outcome compare_compiled(const Scene& scene, const Derivation& derivation, Autho
     const double h = scene.evaluate(scene.run.step, "step").to_double();
     if (stepper.prepare(parameters, h) != LOBATTO_OK) return {"", true};
 
-    if (const Outcome pieces = compare_pieces(stepper, mechanics, parameters, q, v, author); !pieces.disagreement.empty())
+    if (const Outcome pieces = compare_pieces(stepper, mechanics, parameters, q, v, author);
+        !pieces.disagreement.empty())
         return pieces;
 
     // The motion, with h, h/2, h/4, to the same time.
