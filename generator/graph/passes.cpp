@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <set>
@@ -183,6 +184,27 @@ Id raised_root(Graph& graph, Id root, int exponent) {
     return whole == 0 ? root : graph.raw(Op::multiply, {raised(graph, x, whole), root});
 }
 
+// k where the exponent is the number k/4 with an odd k, and small enough to be written out; else 0.
+int odd_quarters(const Graph& graph, Id exponent) {
+    constexpr int most = 40;
+    if (!graph.is_constant(exponent)) return 0;
+    const cln::cl_R quarters = 4 * graph.constant_of(exponent).value;
+    if (cln::abs(quarters) > most || cln::round1(quarters) != quarters) return 0;
+    const int k = static_cast<int>(std::lround(cln::double_approx(quarters)));
+    return k % 2 != 0 ? k : 0;
+}
+
+// x^(k/4) with an odd k, as a power of y = x or 1/x times its square root, fourth root or both.
+Id raised_fourth_root(Graph& graph, Id x, int k) {
+    const Id y = k > 0 ? x : graph.raw(Op::power, {x}, -1), root = graph.raw(Op::sqrt, {y}),
+             fourth = graph.raw(Op::sqrt, {root});
+    std::vector<Id> factors;
+    if (std::abs(k) >= 4) factors.push_back(raised(graph, y, std::abs(k) / 4));
+    if (std::abs(k) % 4 == 3) factors.push_back(root);
+    factors.push_back(fourth);
+    return factors.size() == 1 ? fourth : graph.raw(Op::multiply, std::move(factors));
+}
+
 }  // namespace
 
 Programs multiply_powers(const Programs& programs) {
@@ -194,6 +216,9 @@ Programs multiply_powers(const Programs& programs) {
             negative[programs.graph[id].operands[0]].insert(programs.graph[id].index);
     return rewrite(programs, [&negative](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
+        if (node.op == Op::raise)
+            if (const int k = odd_quarters(graph, operands[1]); k != 0)
+                return raised_fourth_root(graph, operands[0], k);
         if (node.op != Op::power) return same(graph, node, std::move(operands));
         const bool shares = node.index < 0 && negative[node.operands[0]].size() > 1;
         if (graph[operands.front()].op == Op::sqrt && node.index % 2 != 0 && (node.index != -1 || shares))
