@@ -21,7 +21,21 @@ std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& va
     return numbers;
 }
 
+// Times at which a run with a clock is compared with its companion, where the scene names none: no part of times that
+// one writes, so that a motion is not always met at the same place.
+constexpr int arrivals_of_run = 61;
+
 }  // namespace
+
+Arrivals arrivals_of(const Scene& scene, std::int64_t count) {
+    if (!scene.clock || count == 0) return {};
+    Arrivals arrivals;
+    arrivals.end = scene.evaluate(scene.run.until, "the end time").to_double();
+    arrivals.interval = scene.evaluate(scene.outputs.interval, "the time between states").to_double();
+    arrivals.keeps_chain = arrivals.interval == 0;
+    if (arrivals.keeps_chain) arrivals.interval = arrivals.end / static_cast<double>(count);
+    return arrivals;
+}
 
 GiNaC::numeric step_of(const Scene& scene, const Overrides& overrides) {
     const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
@@ -45,6 +59,14 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
         throw InputError(fmt::format("{}: the end time must not be negative, but is {:.6g}",
                                      overrides.until.empty() ? scene.path : "--until", until.to_double()));
     }
+    if (scene.clock) {
+        const GiNaC::numeric interval = scene.evaluate(scene.outputs.interval, "the time between states");
+        const double count = interval.is_zero() ? arrivals_of_run : std::ceil((until / interval).to_double() - 1e-9);
+        if (!(count < 9e15))
+            throw InputError(fmt::format("{}: {:.3g} states are too many to count; make the time between them larger",
+                                         scene.path, count));
+        return {until.is_zero() ? 0 : static_cast<std::int64_t>(count), true};
+    }
     const double ratio = (until / step).to_double();
     if (!(ratio < 9e15))
         throw InputError(fmt::format(
@@ -61,6 +83,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps;
     request.tolerance = scene.method.tolerance;
+    request.arrivals = arrivals_of(scene, steps);
     request.every = scene.outputs.every;
     request.dense = scene.outputs.dense;
     const bool from_velocity = scene.start == Start::velocity;

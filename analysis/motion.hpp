@@ -16,6 +16,9 @@ struct Steps {
 GiNaC::numeric step_of(const Scene& scene, const Overrides& overrides = {});
 Steps steps_of(const Scene& scene, const Overrides& overrides = {});
 
+// Of a scene with a clock; none for others. `count` of steps_of.
+Arrivals arrivals_of(const Scene& scene, std::int64_t count);
+
 // Prepares and starts the stepper too: a start that is impossible, ComputationError, is known before anything is
 // written.
 TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper);

@@ -92,7 +92,10 @@ void apply(const Overrides& overrides, Scene& scene) {
         throw InputError(
             fmt::format("--every: the scene asks for states between two steps (dense = {}), so all steps are kept",
                         scene.outputs.dense));
-    if (overrides.every) scene.outputs.every = *overrides.every;
+    if (overrides.every && scene.clock)
+        scene.outputs.interval = GiNaC::numeric(static_cast<long>(*overrides.every));
+    else if (overrides.every)
+        scene.outputs.every = *overrides.every;
 }
 
 }  // namespace lobatto

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "generator/formula/limits.hpp"
+#include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/programs/programs.hpp"
 
@@ -17,6 +18,11 @@ namespace {
 // Clean steps and those of splitting methods are steps of systems with a constant mass matrix and forces without
 // velocities.
 void check_method(const Scene& scene, const System& system, bool general) {
+    if (scene.clock && (scene.method.family == Family::splitting || scene.method.arithmetic == StepArithmetic::clean))
+        throw InputError(
+            fmt::format("{}: {} no clock; choose Lobatto or Gauss (--points 8){}", scene.path,
+                        scene.method.family == Family::splitting ? "splitting methods have" : "clean arithmetic has",
+                        scene.method.family == Family::splitting ? "" : " and --arithmetic plain"));
     if (scene.method.family == Family::splitting) {
         if (general)
             throw InputError(scene.path +
@@ -46,13 +52,13 @@ void check_method(const Scene& scene, const System& system, bool general) {
 Derivation derive(const Scene& scene, bool general) {
     const Limits limits(scene.path);
     Derivation derivation;
-    derivation.scene = scene;
-    derivation.system = build_system(scene);
+    derivation.scene = in_clock_time(scene);
+    derivation.system = build_system(derivation.scene);
     check_method(scene, derivation.system, general);
-    check_start(scene, derivation.system);
+    check_start(derivation.scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     std::tie(derivation.structure, derivation.findings) =
-        find_structure(scene, derivation.system, derivation.quadrature, general);
+        find_structure(derivation.scene, derivation.system, derivation.quadrature, general);
     return derivation;
 }
 
@@ -80,6 +86,7 @@ KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
 }
 
 PlainSource emit_plain(Scene scene, Precision precision) {
+    refuse_clock(scene, "the plain text");
     const auto refuse = [&](const std::string& why) { throw InputError(scene.path + ": " + why); };
     if (precision == Precision::quadruple)
         refuse(

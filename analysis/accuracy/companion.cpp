@@ -61,10 +61,12 @@ Companion::Companion(const Derivation& derivation, const Kernel& kernel, const T
     request_.time = request.time;
     request_.step = request.step;
     request_.steps = request.steps;
+    request_.arrivals = request.arrivals;
+    request_.arrivals.keeps_chain = false;
     request_.every = request.every;
     request_.tolerance = request.tolerance;
-    pulses_ = find_pulses(derivation.system, request.parameters, request.time,
-                          request.time + static_cast<double>(request.steps) * request.step, std::fabs(request.step));
+    pulses_ = find_pulses(derivation.system, request.parameters, request.time, time_after(request, request.steps),
+                          std::fabs(request.step));
     const std::int64_t comparisons =
         std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
@@ -83,6 +85,9 @@ void Companion::observe(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
         const double* const row = records.rows + i * records.columns + 1;
         widen_to(least_, most_, row, count);
+        // With a clock the states at its steps stand between the arrivals, which are told by their times.
+        const bool is_arrival = request_.arrivals.interval == 0 || row[-1] == time_after(request_, seen_);
+        if (!is_arrival) continue;
         const std::int64_t number = seen_++;
         if (number % rows_a_step_ != 0) continue;
         const std::int64_t steps = std::min(number / rows_a_step_ * request_.every, request_.steps);
@@ -94,9 +99,15 @@ Companion::Segment Companion::segment(std::size_t number) const {
     Segment result;
     result.begin = static_cast<std::int64_t>(number) * stride_;
     result.steps = std::min(stride_, request_.steps - result.begin);
-    result.taken = result.steps > 0 ? companion_steps(result.steps) : 0;
-    if (is_driven_ && result.steps < fewest_driven_steps) result.taken = companion_steps(fewest_driven_steps);
+    result.taken = is_clocked() ? result.steps : result.steps > 0 ? companion_steps(result.steps) : 0;
+    if (is_driven_ && !is_clocked() && result.steps < fewest_driven_steps)
+        result.taken = companion_steps(fewest_driven_steps);
     return result;
+}
+
+// Steps of the companion for one of the run. With a clock both arrive at the same times, whatever their steps.
+double Companion::ratio_of(const Segment& part) const {
+    return is_clocked() ? clocked_ratio : static_cast<double>(part.taken) / static_cast<double>(part.steps);
 }
 
 void Companion::start() {
@@ -107,6 +118,7 @@ struct Companion::Place {
     LoadedStepper<double> stepper;
     double time, step;  // step: 0 before the first
     std::vector<double> q, p;
+    Arrivals arrivals;
     lobatto_status status = LOBATTO_OK;
 
     struct State {
@@ -132,6 +144,8 @@ struct Companion::Place {
         lobatto_advance call{};
         call.steps = steps;
         call.tolerance = tolerance;
+        call.interval = arrivals.interval;
+        call.end = arrivals.end;
         if (status == LOBATTO_OK) status = stepper.advance(call);
         stepper.state(time, q, p);
         return call.steps_done;
@@ -185,13 +199,12 @@ void Companion::take_one(Place& place, double from, double step) {
 }
 
 void Companion::take(Place& place, const Segment& part) {
-    const double from = request_.time + static_cast<double>(part.begin) * request_.step,
-                 size = request_.step * static_cast<double>(part.steps) / static_cast<double>(part.taken);
+    const double from = time_after(request_, part.begin), size = request_.step / ratio_of(part);
     const std::int64_t piece = std::max<std::int64_t>(1, request_.steps / amplitude_looks);
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;
-        const bool looks = !narrow_.empty() && looked_ < most_looked;
+        const bool looks = !narrow_.empty() && !is_clocked() && looked_ < most_looked;
         std::int64_t count = 0;
         while (!looks && count < std::min(piece, part.taken - done) &&
                (pulses_.empty() || !is_near_pulse(here + static_cast<double>(count) * size, size)))
@@ -210,7 +223,7 @@ void Companion::take(Place& place, const Segment& part) {
 }
 
 void Companion::compute() {
-    Place place{LoadedStepper<double>(kernel_), request_.time, 0, request_.q, request_.p};
+    Place place{LoadedStepper<double>(kernel_), request_.time, 0, request_.q, request_.p, request_.arrivals};
     std::size_t done = 0;
     {
         const std::lock_guard lock(mutex_);
@@ -219,7 +232,7 @@ void Companion::compute() {
             const auto middle = companion_.back().row.begin() + std::ssize(place.q);
             place.q.assign(companion_.back().row.begin(), middle);
             place.p.assign(middle, companion_.back().row.end());
-            place.time = request_.time + static_cast<double>(companion_.back().steps) * request_.step;
+            place.time = time_after(request_, companion_.back().steps);
         }
     }
     if (done == 0) {
@@ -331,10 +344,8 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     } worst;
     const std::size_t count = std::min(run_.size(), companion_.size());
     for (std::size_t j = 0; j < count; ++j) {
-        const Segment part = segment(0);
-        const double ratio = static_cast<double>(part.taken) / static_cast<double>(part.steps),
-                     of_run = 1 / (1 - std::pow(ratio, -order_));
-        error.until = request_.time + static_cast<double>(run_[j].steps) * request_.step;
+        const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -order_));
+        error.until = time_after(request_, run_[j].steps);
         error.end = 0;
         double apart = 0;
         for (std::size_t i = 0; i < 2 * n; ++i) {
@@ -370,7 +381,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
     if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
         const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
-        lose(error, request_.time + static_cast<double>(point.steps) * request_.step, point.row);
+        lose(error, time_after(request_, point.steps), point.row);
     }
     // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
     // difference is what is known.

@@ -49,6 +49,9 @@ std::int64_t companion_steps(std::int64_t steps);
 // Of a run with explicit time between two comparisons, at least: in fewer steps common divisors cannot be avoided.
 inline constexpr std::int64_t fewest_driven_steps = 8;
 
+// Of a companion with a clock: its steps for one of the run, both equally long in the time of the clock.
+inline constexpr double clocked_ratio = 1.5;
+
 // One line.
 std::string text_of(const MeasuredError& error, const Scene& scene);
 
@@ -82,6 +85,8 @@ private:
     struct Place;  // where the companion is, and its stepper
 
     Segment segment(std::size_t number) const;
+    bool is_clocked() const { return request_.arrivals.interval != 0; }
+    double ratio_of(const Segment& part) const;
     void compute();
     void take(Place& place, const Segment& part);
     void take_finely(Place& place, double from, double step);

@@ -55,9 +55,11 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
         }
     };
     companion.from_velocities = request_.from_velocities && begin == 0;
-    companion.time = request_.time + static_cast<double>(begin) * request_.step;
-    const std::int64_t taken = companion_steps(every);
-    companion.step = request_.step * static_cast<double>(every) / static_cast<double>(taken);
+    companion.time = time_after(request_, begin);
+    const bool is_clocked = request_.arrivals.interval != 0;  // then both arrive at the same times
+    const std::int64_t taken = is_clocked ? every : companion_steps(every);
+    companion.step = is_clocked ? request_.step / clocked_ratio
+                                : request_.step * static_cast<double>(every) / static_cast<double>(taken);
     companion.steps = steps / every * taken;
     companion.every = taken;
     companion.counts = nullptr;
@@ -130,7 +132,9 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
                        comparisons = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n),
                        skipped = kept.count - comparisons;  // the start, if it is kept
-    const double ratio = static_cast<double>(companion_steps(every)) / static_cast<double>(every),
+    const double ratio = request_.arrivals.interval != 0
+                             ? clocked_ratio
+                             : static_cast<double>(companion_steps(every)) / static_cast<double>(every),
                  of_run = 1 / (1 - std::pow(ratio, -order_));
     Error error{0, false};
     double largest = 0;

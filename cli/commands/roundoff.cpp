@@ -14,6 +14,7 @@
 #include "cli/print/interruption.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
+#include "generator/mechanics/clock.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 
@@ -92,6 +93,7 @@ void print(const RoundoffResult& result) {
 
 void roundoff(const RoundoffCommand& options) {
     Scene scene = read_scene(options.scene);
+    refuse_clock(scene, "lobatto roundoff");
     options.method.apply(scene);
     if (scene.method.family == Family::splitting)
         throw InputError(scene.path +

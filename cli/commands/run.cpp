@@ -49,7 +49,8 @@ struct RunOptions {
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
     TrajectoryHeader header;
     header.scene = scene.title.empty() ? scene.name : scene.title;
-    header.method = fmt::format("{}, h = {}", scene.method.name(), exact_text(request.step));
+    header.method = fmt::format("{}, h = {}{}", scene.method.name(), exact_text(request.step),
+                                scene.clock ? ", clock = " + scene.clock->text : "");
     header.kernel = source.digest;
     for (std::size_t i = 0; i < scene.parameters.size(); ++i)
         header.parameters.emplace_back(scene.parameters[i].name, request.parameters[i]);
@@ -76,13 +77,12 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult& result) {
+std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult& result, std::int64_t steps) {
     if (kernel.form == LOBATTO_LINEAR_MAP) return "none: the step is a linear map";
     if (kernel.unknowns == 0) return "none: the step is explicit";
     if (kernel.linear != 0) return "none: the equations of a step are linear";
     return fmt::format("{:.2f} per step, at most {}",
-                       static_cast<double>(result.iterations) / static_cast<double>(result.steps_done),
-                       result.iterations_most);
+                       static_cast<double>(result.iterations) / static_cast<double>(steps), result.iterations_most);
 }
 
 std::string defect_text(const LoadedStepper<double>& stepper, const TrajectoryRequest& request) {
@@ -96,13 +96,16 @@ std::string defect_text(const LoadedStepper<double>& stepper, const TrajectoryRe
 // The stepper is prepared.
 void print_table(const Derivation& derivation, const Scene& scene, const LoadedStepper<double>& stepper,
                  const TrajectoryRequest& request, const TrajectoryResult& result, const Watch& watch) {
-    const std::string of_all = result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
-    print_row("steps",
-              fmt::format("{}{}, h = {:.6g}, to t = {:.6g}", result.steps_done, of_all, request.step, result.time));
-    if (result.steps_done == 0) return;
+    const bool clocked = scene.clock.has_value();
+    const std::string of_all =
+        clocked || result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
+    const std::int64_t steps = clocked ? result.chain_steps : result.steps_done;
+    print_row("steps", fmt::format("{}{}, h = {:.6g}{}, to t = {:.6g}", steps, of_all, request.step,
+                                   clocked ? " in the time of the clock " + scene.clock->text : "", result.time));
+    if (steps == 0) return;
     const lobatto_kernel& kernel = stepper.kernel().table();
-    print_row("time per step", duration(result.seconds / static_cast<double>(result.steps_done)));
-    print_row("iterations", iterations_text(kernel, result));
+    print_row("time per step", duration(result.seconds / static_cast<double>(steps)));
+    print_row("iterations", iterations_text(kernel, result, steps));
     const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
     if (scene.outputs.energy) {
         const double H0 = std::fabs(result.energy_start);
@@ -321,6 +324,7 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
                          const Observers& observers) {
     if (result.status != LOBATTO_OK || result.interrupted) return "";
     const std::string departure = observers.energy.departure(run.derivation, run.kernel, request);
+    if (run.scene.clock) return departure;
     return departure.empty() ? linear_departure(run.derivation, run.scene, run.kernel, request, result) : departure;
 }
 
@@ -396,7 +400,7 @@ void run(const RunOptions& options) {
     if (departure.empty()) departure = loss_of(options, scene, request, error);
     std::vector<std::string> warnings;
     if (error && departure.empty()) warnings = warnings_of(*error, scene.run.error);
-    if (result.status == LOBATTO_OK && result.steps_done > 1)
+    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock)
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.derivation, run.kernel, request, result)))
             warnings.push_back(warning);

@@ -286,6 +286,10 @@ void refuse_both(const SweepOptions& options) {
 
 // The one step size and number of steps of all trajectories.
 Steps steps_of(const SweepOptions& options, Scene& scene) {
+    if (options.steps && scene.clock)
+        throw InputError(
+            "--steps: with a clock nobody knows beforehand how many steps a trajectory takes; give the end time with "
+            "--until");
     if (!options.steps) return steps_of(scene, options.overrides);
     if (*options.steps < 0) throw InputError(fmt::format("--steps: {} is not a number of steps", *options.steps));
     scene.run.until = scene.run.step * GiNaC::numeric(static_cast<long>(*options.steps));
@@ -317,15 +321,33 @@ void print_fixed_times(const Scene& scene, const Grid& grid) {
     }
 }
 
+// The first prime number from here on: a motion with so many steps in its period, or a part of them, is rare.
+std::int64_t prime_from(std::int64_t number) {
+    const auto is_prime = [](std::int64_t candidate) {
+        for (std::int64_t factor = 2; factor <= candidate / factor; ++factor)
+            if (candidate % factor == 0) return false;
+        return true;
+    };
+    while (!is_prime(number)) ++number;
+    return number;
+}
+
 // How often states are kept: as often as is asked for, and some 61 times for the companions to be compared with.
 std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool unmeasured) {
     constexpr std::int64_t comparisons = 61, most_tried = 1000;  // no part of times that one writes
     if (unmeasured || steps == 0) return every;
-    if (every == 0 || every > steps) return std::max(fewest_driven_steps, (steps + comparisons - 1) / comparisons);
+    if (every == 0 || every > steps)
+        return prime_from(std::max(fewest_driven_steps, (steps + comparisons - 1) / comparisons));
     const std::int64_t wanted = std::min(comparisons * every / steps, every / fewest_driven_steps);
     for (std::int64_t parts = std::max<std::int64_t>(1, wanted); parts <= std::min(every, wanted + most_tried); ++parts)
         if (every % parts == 0) return every / parts;
     return every;
+}
+
+// Of so many states one is kept, 0: the last alone. With a clock --every is the time between them.
+std::int64_t states_kept(const SweepOptions& options, const Scene& scene) {
+    const std::int64_t every = options.overrides.every.value_or(0);
+    return scene.clock ? std::min<std::int64_t>(every, 1) : every;
 }
 
 EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, const Grid& grid, const Steps& steps) {
@@ -336,7 +358,9 @@ EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, cons
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps.count;
     request.tolerance = scene.method.tolerance;
-    request.every = looked_at(options.overrides.every.value_or(0), steps.count, options.unmeasured);
+    request.arrivals = arrivals_of(scene, steps.count);
+    request.arrivals.keeps_chain = false;
+    request.every = looked_at(states_kept(options, scene), steps.count, options.unmeasured);
     request.threads = options.threads;
     return request;
 }
@@ -379,7 +403,7 @@ void sweep(const SweepOptions& options) {
     };
     request.sink = [&](const EnsembleTrajectory& trajectory) {
         if (trajectory.status != LOBATTO_OK) verdict = judges.judge(trajectory);
-        write(table, scene, grid, request, options.overrides.every.value_or(0), trajectory, verdict);
+        write(table, scene, grid, request, states_kept(options, scene), trajectory, verdict);
         if (verdict.status == LOBATTO_OK || failures.size() == failures_told) return;
         const double time = trajectory.kept.rows[(trajectory.kept.count - 1) * trajectory.kept.columns];
         failures.push_back({trajectory.index, trajectory.steps_done, verdict.status, time});

@@ -15,6 +15,7 @@
 #include "cli/print/tradeoff_page.hpp"
 #include "cli/print/tradeoff_pictures.hpp"
 #include "cli/print/tradeoff_report.hpp"
+#include "generator/mechanics/clock.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
@@ -37,6 +38,7 @@ void write(const std::string& path, const std::string& text) {
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
     const Scene written = read_scene(options.scene);
+    refuse_clock(written, "lobatto tradeoff");
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);

@@ -13,6 +13,7 @@
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
+#include "generator/mechanics/clock.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
@@ -60,6 +61,7 @@ void print(const Choice& choice, const Scene& scene, double error) {
 void tune(const TuneOptions& options) {
     const double error = error_of(options);
     const Scene written = read_scene(options.scene);
+    refuse_clock(written, "lobatto tune");
     Scene scene = written;
     apply(options.overrides, scene);
     const Interruption interruption;

@@ -11,6 +11,7 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "generator/check/check.hpp"
+#include "generator/mechanics/clock.hpp"
 #include "generator/method/splitting.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -273,6 +274,7 @@ void symplecticity(std::vector<Row>& rows, const Kernel& kernel, const Kernel& e
 
 void verify(const VerifyOptions& options) {
     Scene scene = read_scene(options.scene);
+    refuse_clock(scene, "lobatto verify");
     options.method.apply(scene);
     const bool with_tangent = scene.coordinates.size() <= tangent_limit;
     scene.outputs.energy = true;

@@ -396,7 +396,8 @@ private:
 };
 
 // Where the Stepper of a kernel is; as stepping_of in runtime/kernel/base/contract.hpp.
-std::string stepper_of(const Structure& structure) {
+std::string stepper_of(const Scene& scene, const Structure& structure) {
+    if (scene.clock) return "steppers/clocked.hpp";
     if (structure.form() == Form::linear_map) return "steppers/linear.hpp";
     if (structure.form() == Form::general) return "steppers/general.hpp";
     return structure.clean()         ? "steppers/clean.hpp"
@@ -405,7 +406,7 @@ std::string stepper_of(const Structure& structure) {
 }
 
 std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
-    std::set<std::string> parts = {stepper_of(derivation.structure)};
+    std::set<std::string> parts = {stepper_of(derivation.scene, derivation.structure)};
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
     if (!derivation.scene.outputs.events.empty()) parts.insert("steppers/events.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {

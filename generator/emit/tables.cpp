@@ -196,7 +196,12 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");
     line(text, fmt::format("bool has_tangent = {}", has_tangent(d)), "the derivative of a step");
-    line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size()), "in the order of the scene");
+    if (structure.form() == Form::general)
+        line(text, fmt::format("bool clocked = {}", d.scene.clock.has_value()),
+             d.scene.clock ? "steps are equally long in tau, dt = clock(q) dtau" : "steps are equally long in time");
+    line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size() - (d.scene.clock ? 1 : 0)),
+         d.scene.clock ? "in the order of the scene; the one after them is the energy at the start"
+                       : "in the order of the scene");
     line(text, fmt::format("int events = {}", outputs.events.size()), "that are watched for");
     std::vector<int> directions;
     for (const Event& event : outputs.events) directions.push_back(event.direction);

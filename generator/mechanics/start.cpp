@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "generator/graph/notation.hpp"
+#include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/elimination.hpp"
 #include "generator/mechanics/sample.hpp"
 
@@ -315,7 +316,7 @@ void check_start(const Scene& scene, const System& system) {
 }
 
 void check_domains(const Scene& scene, const System& system) {
-    StartCheck(scene, system).require_domains();
+    StartCheck(in_clock_time(scene), system).require_domains();
 }
 
 }  // namespace lobatto

@@ -69,13 +69,22 @@ private:
         }
         p_.programs.push_back(std::move(legendre));
         p_.programs.push_back(std::move(stage));
-        if (d_.scene.outputs.energy) p_.programs.push_back({"energy", {{"", energy(), Effect::give_back}}});
+        if (d_.scene.clock) p_.programs.push_back({"clock", {{"", convert(d_.scene.clock->rate), Effect::give_back}}});
+        if (d_.scene.outputs.energy || d_.scene.clock)
+            p_.programs.push_back({"energy", {{"", energy(), Effect::give_back}}});
+    }
+
+    std::vector<GiNaC::symbol> motion_symbols() const {
+        std::vector<GiNaC::symbol> all = d_.system.q;
+        all.insert(all.end(), d_.system.v.begin(), d_.system.v.end());
+        return all;
     }
 
     // (D26) H = v . dL/dv - L, term by term: a term of degree d in the velocities gives d - 1 times itself, so that no
     // kinetic energy is subtracted from its double.
     Id energy() {
-        const std::vector<ex>& terms = d_.system.terms;
+        const std::vector<ex> terms =
+            d_.scene.clock ? terms_of(d_.scene.clock->lagrangian, motion_symbols()) : d_.system.terms;
         std::vector<ex> radial;  // v . d(term)/dv
         for (const ex& term : terms) {
             const std::vector<ex> slopes = gradient_of({term}, d_.system.v);

@@ -86,7 +86,7 @@ private:
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
-                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic"});
+                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic", "clock"});
         const Entry *family = table.find("family"), *points = table.find("points"), *stages = table.find("stages");
         if (family != nullptr) {
             const Value& value = family->value;
@@ -126,6 +126,7 @@ private:
         }
         if (scene_.method.tolerance > 0 && splitting)
             fail(table.find("tolerance")->at, "splitting methods iterate nothing; leave out the tolerance");
+        if (const Entry* clock = table.find("clock")) read_clock(*clock);
         if (const Entry* arithmetic = table.find("arithmetic")) {
             const Value& value = arithmetic->value;
             const bool text = value.kind == Value::Kind::text;
@@ -138,6 +139,19 @@ private:
                     "clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave one of both "
                     "out");
         }
+    }
+
+    void read_clock(const Entry& entry) {
+        const Scope scope = system_.scope_of("the clock", true);
+        Clock clock;
+        clock.at = entry.value.at;
+        if (entry.value.kind == Value::Kind::text) clock.text = collapsed(entry.value.text.value);
+        const Operand rate = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
+        if (rate.velocities || rate.expression.has(scene_.time))
+            fail(clock.at, "a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
+        if (!rate.moves) fail(clock.at, "this clock holds no position, so that all its steps are equal; leave it out");
+        clock.rate = rate.expression;
+        scene_.clock = clock;
     }
 
     void read_run() {
@@ -198,7 +212,15 @@ private:
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
                           "[output]", {"every", "energy", "momenta", "tangent", "dense", "events"});
         Outputs& outputs = scene_.outputs;
-        if (const Entry* every = table.find("every"))
+        const Entry* every = table.find("every");
+        if (every != nullptr && scene_.clock) {
+            GiNaC::numeric value = 0;
+            outputs.interval = system_.read_formula(*every, system_.scope_of("the time between states", false), &value);
+            if (!value.is_positive())
+                fail(every->value.at,
+                     fmt::format("every is {}; with a clock it is the time from one kept state to the next, above 0",
+                                 shown(value)));
+        } else if (every != nullptr)
             outputs.every = static_cast<long>(
                 integer_of(source_, *every, 1, most_steps,
                            "at least 1 and at most 9e15: states whose step is a multiple of it are kept"));
@@ -208,6 +230,11 @@ private:
         if (const Entry* dense = table.find("dense")) {
             outputs.dense =
                 static_cast<int>(integer_of(source_, *dense, 0, 100, "0 to 100 states between two steps are computed"));
+            if (outputs.dense > 0 && scene_.clock)
+                fail(
+                    dense->at,
+                    "with a clock states are kept at given times: write every = 0.1, the time between them, instead of "
+                    "dense");
             if (outputs.dense > 0 && outputs.every > 1)
                 fail(dense->at, "dense fills the time between two steps, so all steps are kept: remove every");
         }

@@ -4,6 +4,7 @@
 
 #include <ginac/ginac.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,12 +51,23 @@ struct Event {
 
 // What a kernel computes beside the motion itself; it has no code for anything else.
 struct Outputs {
-    long every = 1;       // keep each state whose step index is a multiple of this
-    bool energy = true;   // a column H in the trajectory file, and what the run says of the energy
-    bool momenta = true;  // the columns p_...
-    bool tangent = true;  // the derivative of a step: its symplectic defect, monodromy
-    int dense = 0;        // states between two steps, evenly spaced, from the step's own polynomial
+    long every = 1;          // keep each state whose step index is a multiple of this
+    GiNaC::ex interval = 0;  // with a clock: the time between two kept states; 0: those at its steps are kept
+    bool energy = true;      // a column H in the trajectory file, and what the run says of the energy
+    bool momenta = true;     // the columns p_...
+    bool tangent = true;     // the derivative of a step: its symplectic defect, monodromy
+    int dense = 0;           // states between two steps, evenly spaced, from the step's own polynomial
     std::vector<Event> events;
+};
+
+// A clock: steps are equally long in a time tau with dt = g(q) dtau (generator/mechanics/clock.hpp).
+struct Clock {
+    std::string text;  // as written, white space collapsed: "r^(3/2)"
+    GiNaC::ex rate;    // g, in positions and parameters
+    Position at = {};
+    GiNaC::symbol energy{"energy_of_start"};  // E
+    bool is_applied = false;                  // the scene is one in tau
+    GiNaC::ex lagrangian;                     // then: L(q, w / g), with w = dq/dtau
 };
 
 // Initial rates are given either as velocities or as momenta, for all coordinates.
@@ -82,6 +94,7 @@ struct Scene {
     Start start = Start::velocity;
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
+    std::optional<Clock> clock;
     Run run;
     Outputs outputs;
 

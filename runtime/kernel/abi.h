@@ -22,7 +22,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 4u
+#define LOBATTO_ABI_VERSION 5u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -58,9 +58,14 @@ typedef struct lobatto_advance {
     int64_t event_capacity; /* rows that fit, at least events_of_step; when fewer are left, `advance` returns early */
     double tolerance;       /* of increments, relative: where the iteration of a step may end; 0: rounding */
     int32_t dense;          /* rows between two steps before each record, equally spaced; needs record_every = 1 */
+    /* Of kernels with a clock `steps` are arrivals at the times start + interval, start + 2 interval, ..., none beyond
+     * `end`; on the way the chain takes steps of its own. */
+    double interval, end;
+    int32_t chain_records; /* 1: the states of the chain are rows too */
     /* out */
     int32_t status;           /* the same value that `advance` returns */
     int64_t steps_done;       /* good steps of this call */
+    int64_t chain_steps;      /* of kernels with a clock: steps of the chain, of this call */
     int64_t records_written;  /* rows of this call */
     int64_t events_written;   /* rows of this call */
     int64_t iterations;       /* iterations of this call, in all */
@@ -84,6 +89,7 @@ typedef struct lobatto_kernel {
     int32_t order;          /* of accuracy, in h */
     int32_t unknowns;       /* N; 0: no equations to solve */
     int32_t autonomous;     /* 1: no formula depends on time */
+    int32_t clocked;        /* 1: steps are equally long in the time of a clock */
     int32_t linear;         /* 1: the equations of motion are linear */
     int32_t has_energy;     /* 0: `energy` is unsupported */
     int32_t has_tangent;    /* 0: `tangent` is unsupported */

@@ -86,6 +86,7 @@ struct Export {
 
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
         call->steps_done = call->records_written = call->events_written = call->iterations = 0;
+        call->chain_steps = 0;
         call->iterations_most = 0;
         call->increment_largest = call->increment_failed = 0.0;
         if ((call->dense > 0 && (!has_dense || call->record_every != 1)) ||
@@ -112,8 +113,85 @@ struct Export {
     }
 
     struct NoEvents {};
+    static void count(const S& stepper, lobatto_advance& call) {
+        if constexpr (S::N > 0) {
+            call.iterations += stepper.iterations;
+            if (stepper.iterations > call.iterations_most) call.iterations_most = stepper.iterations;
+            if (static_cast<double>(stepper.increment) > call.increment_largest)
+                call.increment_largest = static_cast<double>(stepper.increment);
+        }
+    }
+
+    // Arrivals at equally spaced times, of a stepper with a clock. What does not fit into one call goes on in the next.
+    template <class AnyEvents>
+    static Status take_intervals(S& stepper, lobatto_advance& call, AnyEvents* events) {
+        constexpr bool has_events = !std::is_same_v<AnyEvents, NoEvents>;
+        constexpr std::int64_t most = 65536;  // steps of the chain in one call
+        stepper.tolerance = static_cast<real>(call.tolerance);
+        const real end = static_cast<real>(call.end), interval = static_cast<real>(call.interval);
+        while (call.steps_done < call.steps) {
+            real target = stepper.origin + real(stepper.arrivals + 1) * interval;
+            if ((target - end) * interval > real(0)) target = end;
+            while (stepper.is_short_of(target)) {
+                if (call.chain_steps == most || (call.record_every > 0 && call.records_written + 2 > call.capacity))
+                    return Status::ok;
+                if constexpr (has_events) {
+                    if (call.events_written + AnyEvents::most > call.event_capacity) return Status::ok;
+                    events->keep(stepper);
+                }
+                if (call.chain_records != 0 && !stepper.is_recorded)
+                    put_row(stepper.now.time, stepper.q, stepper.p, call);
+                stepper.is_recorded = true;
+                const Status status = stepper.step();
+                if (status != Status::ok) {
+                    call.increment_failed = static_cast<double>(stepper.increment);
+                    return status;
+                }
+                ++call.chain_steps;
+                count(stepper, call);
+                if constexpr (has_events) {
+                    const Status found = find_events(stepper, call, *events, end);
+                    if (found != Status::ok) return found;
+                }
+            }
+            if (call.record_every > 0 && call.records_written == call.capacity) return Status::ok;
+            const Status status = stepper.arrive(target);
+            if (status != Status::ok) return status;
+            ++call.steps_done;
+            if (call.record_every > 0 && stepper.arrivals % call.record_every == 0)
+                put_row(stepper.arrival_time, stepper.arrival_q, stepper.arrival_p, call);
+        }
+        return Status::ok;
+    }
+    // The events of a step of the chain that are not beyond the end.
+    template <class AnyEvents>
+    static Status find_events(S& stepper, lobatto_advance& call, AnyEvents& events, real end) {
+        const std::int64_t first = call.events_written;
+        real* const rows = out(call.events);
+        const Status status = events.find(stepper, rows + first * AnyEvents::columns, call.events_written);
+        while (call.events_written > first &&
+               (rows[(call.events_written - 1) * AnyEvents::columns + 1] - end) * stepper.step_size > real(0))
+            --call.events_written;
+        return status;
+    }
+    static void put_row(real time, const real* q, const real* p, lobatto_advance& call) {
+        real* const row = next_row(call);
+        row[0] = time;
+        for (int k = 0; k < n; ++k) {
+            row[1 + k] = q[k];
+            row[1 + n + k] = p[k];
+        }
+    }
+
     template <class AnyEvents>
     static Status take_steps(S& stepper, lobatto_advance& call, AnyEvents* events) {
+        if constexpr (is_clocked<K>())
+            return take_intervals(stepper, call, events);
+        else
+            return take_equal_steps(stepper, call, events);
+    }
+    template <class AnyEvents>
+    static Status take_equal_steps(S& stepper, lobatto_advance& call, AnyEvents* events) {
         constexpr bool has_events = !std::is_same_v<AnyEvents, NoEvents>;
         stepper.tolerance = static_cast<real>(call.tolerance);
         std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
@@ -129,12 +207,7 @@ struct Export {
                 return status;
             }
             ++call.steps_done;
-            if constexpr (S::N > 0) {
-                call.iterations += stepper.iterations;
-                if (stepper.iterations > call.iterations_most) call.iterations_most = stepper.iterations;
-                if (static_cast<double>(stepper.increment) > call.increment_largest)
-                    call.increment_largest = static_cast<double>(stepper.increment);
-            }
+            count(stepper, call);
             if constexpr (has_events) {
                 real* const rows = out(call.events) + call.events_written * AnyEvents::columns;
                 const Status found = events->find(stepper, rows, call.events_written);
@@ -157,9 +230,17 @@ struct Export {
     static real* next_row(lobatto_advance& call) { return out(call.records) + call.records_written++ * (1 + 2 * n); }
 
     static void state(const void* stepper, void* time, void* q, void* p) {
-        *out(time) = of(stepper).time();
-        for (int k = 0; k < n; ++k) out(q)[k] = of(stepper).q[k];
-        of(stepper).momentum(out(p));
+        if constexpr (is_clocked<K>()) {
+            *out(time) = of(stepper).arrival_time;
+            for (int k = 0; k < n; ++k) {
+                out(q)[k] = of(stepper).arrival_q[k];
+                out(p)[k] = of(stepper).arrival_p[k];
+            }
+        } else {
+            *out(time) = of(stepper).time();
+            for (int k = 0; k < n; ++k) out(q)[k] = of(stepper).q[k];
+            of(stepper).momentum(out(p));
+        }
     }
 
     static void read_two_fold(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest) {
@@ -239,6 +320,7 @@ struct Export {
                                              K::order,
                                              S::N,
                                              K::autonomous ? 1 : 0,
+                                             is_clocked<K>() ? 1 : 0,
                                              K::linear ? 1 : 0,
                                              K::has_energy ? 1 : 0,
                                              has_tangent ? 1 : 0,

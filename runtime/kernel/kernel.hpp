@@ -26,6 +26,7 @@
 #include "iteration/stage_map.hpp"
 #include "iteration/tangent.hpp"
 #include "steppers/clean.hpp"
+#include "steppers/clocked.hpp"
 #include "steppers/ensemble.hpp"
 #include "steppers/events.hpp"
 #include "steppers/general.hpp"

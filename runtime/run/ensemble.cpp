@@ -40,8 +40,8 @@ public:
     virtual void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) = 0;
     virtual void start(double time, const std::vector<double>& q, const std::vector<double>& p,
                        std::int32_t* status) = 0;
-    virtual void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
-                         std::int64_t* iterations) = 0;
+    virtual void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status,
+                         std::int64_t* steps_done, std::int64_t* iterations) = 0;
     virtual void state(std::vector<double>& q, std::vector<double>& p) = 0;
     // Of (q, p), the start or the state just read; not numbers without one.
     virtual void energy(const std::vector<double>& q, const std::vector<double>& p,
@@ -59,14 +59,19 @@ public:
         time_ = time;
         if (*status == LOBATTO_OK) *status = stepper_.start(time, q, p);
     }
-    void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
+    void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
                  std::int64_t* iterations) override {
         lobatto_advance call{};
-        call.steps = steps;
-        call.tolerance = tolerance;
-        *status = stepper_.advance(call);
-        *steps_done = call.steps_done;
-        *iterations = call.iterations;
+        call.tolerance = request.tolerance;
+        call.interval = request.arrivals.interval;
+        call.end = request.arrivals.end;
+        *steps_done = *iterations = 0;
+        do {  // a clock may need several calls for one arrival
+            call.steps = steps - *steps_done;
+            *status = stepper_.advance(call);
+            *steps_done += call.steps_done;
+            *iterations += call.iterations;
+        } while (*status == LOBATTO_OK && *steps_done < steps);
     }
     void state(std::vector<double>& q, std::vector<double>& p) override { stepper_.state(time_, q, p); }
     void energy(const std::vector<double>& q, const std::vector<double>& p,
@@ -94,9 +99,9 @@ public:
     void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override {
         kernel_->ensemble_start(memory_.get(), &time, q.data(), p.data(), status);
     }
-    void advance(std::int64_t steps, double tolerance, std::int32_t* status, std::int64_t* steps_done,
+    void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
                  std::int64_t* iterations) override {
-        kernel_->ensemble_advance(memory_.get(), steps, tolerance, status, steps_done, iterations);
+        kernel_->ensemble_advance(memory_.get(), steps, request.tolerance, status, steps_done, iterations);
     }
     void state(std::vector<double>& q, std::vector<double>& p) override {
         kernel_->ensemble_state(memory_.get(), q.data(), p.data());
@@ -239,7 +244,7 @@ private:
             ended.rows.clear();
             ended.energies.clear();
         }
-        ended.rows.push_back(request_.time + static_cast<double>(ended.steps_done) * request_.step);
+        ended.rows.push_back(time_after(request_, ended.steps_done));
         for (const std::vector<double>* numbers : {&q_, &p_}) {
             const auto begin = numbers->begin() + static_cast<std::ptrdiff_t>(lane * n_);
             ended.rows.insert(ended.rows.end(), begin, begin + static_cast<std::ptrdiff_t>(n_));
@@ -281,7 +286,7 @@ private:
 
     // To step number `next`; keeps what is to be kept there, and the last good state of a trajectory that fails.
     void advance(std::int64_t next, std::int64_t steps, std::vector<Ended>& ended) {
-        lanes_->advance(steps, request_.tolerance, status_.data(), steps_done_.data(), iterations_.data());
+        lanes_->advance(request_, steps, status_.data(), steps_done_.data(), iterations_.data());
         const bool kept_here = next == request_.steps || (request_.every != 0 && next % request_.every == 0);
         bool reads = kept_here;
         for (std::size_t lane = 0; lane < ended.size(); ++lane) reads = reads || status_[lane] != ended[lane].status;

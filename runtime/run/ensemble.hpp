@@ -47,6 +47,7 @@ struct EnsembleRequest {
     double step = 0;         // h; may be negative
     double tolerance = 0;    // of a step's iteration; 0: to rounding
     std::int64_t steps = 0;  // >= 0, of each trajectory; count * steps < 2^63
+    Arrivals arrivals;       // of kernels with a clock
     std::int64_t every = 0;  // keep every such state; 0: the last one alone
     int threads = 0;         // that compute; 0: as many as the machine runs at once
     // Whether a trajectory that reached the end counts in the statistics; nothing: all do. Called before the sink.

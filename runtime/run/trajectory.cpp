@@ -136,7 +136,8 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     Checkpoints checkpoints(request);
 
     const std::int64_t rows_of_step = 1 + request.dense;
-    const std::int64_t rows = std::clamp<std::int64_t>(request.steps / request.every, 1,
+    const std::int64_t wanted = request.arrivals.keeps_chain ? rows_at_once : request.steps / request.every;
+    const std::int64_t rows = std::clamp<std::int64_t>(wanted, kernel->clocked != 0 ? 2 : 1,
                                                        std::max<std::int64_t>(rows_at_once / rows_of_step, 1)) *
                               rows_of_step;
     const std::size_t columns = 1 + 2 * request.q.size();
@@ -160,6 +161,9 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         call.records = records.data();
         call.capacity = rows;
         call.dense = request.dense;
+        call.interval = request.arrivals.interval;
+        call.end = request.arrivals.end;
+        call.chain_records = request.arrivals.keeps_chain ? 1 : 0;
         call.events = seeks_events ? events.data() : nullptr;
         call.event_capacity = event_rows;
         const Clock::time_point start = Clock::now();
@@ -169,6 +173,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         const double seconds = seconds_since(start);
 
         result.steps_done += call.steps_done;
+        result.chain_steps += call.chain_steps;
         result.iterations += call.iterations;
         result.iterations_most = std::max(result.iterations_most, call.iterations_most);
         result.increment_largest = std::max(result.increment_largest, call.increment_largest);
@@ -195,7 +200,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
 double passing_step(const Kernel& kernel, const TrajectoryRequest& request, const TrajectoryResult& result) {
     const bool in_a_step = result.status == LOBATTO_NOT_CONVERGED || result.status == LOBATTO_NOT_FINITE ||
                            result.status == LOBATTO_SINGULAR_JACOBIAN;
-    if (!result.started || !in_a_step) return 0;
+    if (!result.started || !in_a_step || kernel->clocked != 0) return 0;
     LoadedStepper<double> stepper(kernel);
     std::vector<double> before, q, p;
     double time = 0;
@@ -277,6 +282,11 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
             advice = "to compile it from a scene whose [output] asks for it";
             break;
         case LOBATTO_TIME_STANDS_STILL:
+            if (request.arrivals.interval != 0) {
+                why = "the clock is not above 0 along the step, or so small that time stands still";
+                advice = "a clock that is positive wherever the motion goes";
+                break;
+            }
             why =
                 fmt::format("t + h equals t in double precision: h = {:.6g} is below the rounding of t", request.step);
             advice = "a larger step, or a start time nearer to zero";
@@ -284,6 +294,8 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
     }
     const std::string where =
         !result.started ? fmt::format("the run cannot begin at t = {:.6g}", result.time)
+        : request.arrivals.interval != 0
+            ? fmt::format("the run stopped in step {}, after t = {:.6g}", result.chain_steps + 1, result.time)
         : result.steps_done == 0
             ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
             : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);

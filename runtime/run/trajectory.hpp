@@ -33,6 +33,7 @@ struct TrajectoryResult {
     bool started = false;  // parameters, step and start were accepted
     bool interrupted = false;
     std::int64_t steps_done = 0;
+    std::int64_t chain_steps = 0;  // of kernels with a clock: steps in its time; steps_done counts arrivals
     std::int64_t iterations = 0;
     std::int32_t iterations_most = 0;
     double increment_largest = 0;
@@ -45,6 +46,13 @@ struct TrajectoryResult {
     double energy_error_largest = 0;  // max over the kept states at steps |H - H(0)|, absolute; H in double, so about
                                       // |H| 2^-53 of it is rounding
     double energy_error_final = 0;    // H - H(0) at the last good state
+};
+
+// Of kernels with a clock: the steps of a request are arrivals at the times start + interval, start + 2 interval, ...,
+// none beyond `end`. Between them the kernel takes steps of its own, equally long in the time of the clock.
+struct Arrivals {
+    double interval = 0, end = 0;
+    bool keeps_chain = false;  // the states at those steps are kept too
 };
 
 // Where a run stood between two steps: what it had found, and all that its stepper knew.
@@ -60,6 +68,7 @@ struct TrajectoryRequest {
     double step = 0;         // h; may be negative
     double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
     std::int64_t steps = 0;  // >= 0
+    Arrivals arrivals;       // of kernels with a clock
     std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
     int dense = 0;           // states between two steps, on the step's polynomial; above 0 needs every = 1
     std::function<void(const Records&)> sink;         // called for each block, in order
@@ -72,6 +81,15 @@ struct TrajectoryRequest {
     std::function<void(const Halfway&)> checkpoint;
     const Halfway* from = nullptr;  // where to go on; of a run with this request and this kernel's object
 };
+
+// The time after so many steps of a request, TrajectoryRequest or EnsembleRequest.
+template <class Request>
+double time_after(const Request& request, std::int64_t steps) {
+    const Arrivals& arrivals = request.arrivals;
+    if (arrivals.interval == 0) return request.time + static_cast<double>(steps) * request.step;
+    const double time = request.time + static_cast<double>(steps) * arrivals.interval;
+    return (time - arrivals.end) * arrivals.interval > 0 ? arrivals.end : time;
+}
 
 TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& request);
 

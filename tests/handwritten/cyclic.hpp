@@ -13,6 +13,7 @@ struct HandwrittenPlane : HandwrittenKernel, Tables {
     using real = number;
     static constexpr int coordinates = 2;
     static constexpr Form form = Form::general;
+    static constexpr bool clocked = false;
     static constexpr bool autonomous = true;
     static constexpr int active = reduced ? 1 : 2, cyclic = reduced ? 1 : 0;
     static constexpr int active_index[2] = {0, 1}, cyclic_index[1] = {1};

@@ -17,6 +17,7 @@ struct HandwrittenDoublePendulum : HandwrittenKernel, Tables {
     static constexpr int coordinates = 2;
     static constexpr int parameter_count = 0;
     static constexpr Form form = Form::general;
+    static constexpr bool clocked = false;
     static constexpr bool autonomous = true, linear = false;
     static constexpr int events = 2;
     static constexpr int event_direction[2] = {1, 0};

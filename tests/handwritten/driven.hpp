@@ -34,6 +34,7 @@ struct HandwrittenDrivenGeneral : HandwrittenDriven<number, Tables> {
     using real = number;
     using Coefficients = DrivenParameters<number>;
     static constexpr Form form = Form::general;
+    static constexpr bool clocked = false;
     static constexpr int active = 1, cyclic = 0, active_index[1] = {0}, cyclic_index[1] = {0};
     static constexpr int entries = 3, entry_row[3] = {0, 1, 1}, entry_column[3] = {0, 1, 0};
     static constexpr int mass_entries = 1, mass_row[1] = {0}, mass_column[1] = {0};

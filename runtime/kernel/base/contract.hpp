@@ -19,9 +19,10 @@
 //   gives a constant part of S to iterate with; `clean` that steps are those of steppers/clean.hpp. Gauss's nodes stand
 //   between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal, D, and
 //   taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
-// Form::general: see steppers/general.hpp; angles, how many arguments of sine and cosine `stage` holds; where there are
-// any it takes one more
-//   argument, AnglesAnew by default, which gives their sines and cosines (base/angles.hpp).
+// Form::general: see steppers/general.hpp. `clocked` says that its Lagrangian is one in the time tau of a clock,
+//   clock(k, q) = dt/dtau (steppers/clocked.hpp). `angles` is how many arguments of sine and cosine `stage` holds;
+//   where there are any it takes one more argument, AnglesAnew by default, which gives their sines and cosines
+//   (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 
@@ -69,6 +70,7 @@ struct Formulas {
     LOBATTO_WITH_TIME(momentum)  // of Form::general
     LOBATTO_WITH_TIME(event)
     LOBATTO_WITH_TIME(energy)
+    LOBATTO_WITH_TIME(clock)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>
     LOBATTO_INLINE static void along_rows(const Given& k, [[maybe_unused]] Time time, Position position, Slope slope) {
@@ -82,17 +84,25 @@ struct Formulas {
 
 // How the steps of systems with constant mass are taken: the equations of inner nodes solved, round-off-clean
 // (steppers/clean.hpp), or kicks and drifts in turn (steppers/splitting.hpp).
-enum class Stepping { solved, clean, composition };
+// The steps of any Lagrangian may be equally long in the time of a clock (steppers/clocked.hpp).
+enum class Stepping { solved, clean, composition, clocked };
 template <class K>
 constexpr Stepping stepping_of() {
     if constexpr (K::form == Form::separable)
         return K::clean ? Stepping::clean : K::is_explicit ? Stepping::composition : Stepping::solved;
+    else if constexpr (K::form == Form::general)
+        return K::clocked ? Stepping::clocked : Stepping::solved;
     else
         return Stepping::solved;
 }
 template <class K>
 constexpr bool is_clean() {
     return stepping_of<K>() == Stepping::clean;
+}
+
+template <class K>
+constexpr bool is_clocked() {
+    return stepping_of<K>() == Stepping::clocked;
 }
 
 // Whether a coordinate may move as soon as its acceleration is known.

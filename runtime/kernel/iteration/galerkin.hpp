@@ -87,6 +87,7 @@ struct GalerkinFixedPoint {
     T kappa[n];        // of the last step
     T evaluations;     // of the last step
     T increment;       // the last one of the last step, relative
+    T elapsed;         // of kernels with a clock: the physical time of the last step, sum_i h b_i clock(Q_i)
     Workspace<Arrays> workspace;
 
     void prepare(real step) {
@@ -205,7 +206,7 @@ private:
             const ActiveMask done = active & (rule.is_small(e) | rule.stagnates(e, e_before));
             if (any(done)) {
                 increment = select(done, e, increment);
-                solved = solved | finish(q, p, kappa_now, done, a);
+                solved = solved | finish(k, time, q, p, kappa_now, done, a);
                 active = active & !done;
             }
             if (!any(active)) break;
@@ -334,13 +335,23 @@ private:
         for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
     }
 
-    ActiveMask finish(T* q, T* p, const T* kappa_now, ActiveMask done, Arrays& a) {
+    template <class Given>
+    ActiveMask finish(const Given& k, [[maybe_unused]] real time, T* q, T* p, const T* kappa_now, ActiveMask done,
+                      Arrays& a) {
         T q1[n], p1[n], not_finite = T(real(0));
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             q1[c] = q[c] + over_nodes(weight, a.v + c, n);
             p1[c] = p[c] + over_nodes(weight, a.F + c, n);
             not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
+        }
+        if constexpr (K::clocked) {
+            V rate[parts];
+            for (int part = 0; part < parts; ++part)
+                rate[part] = Formulas<K>::clock(k, V(time), static_cast<const V*>(a.Q + part * n));
+            const T passed = over_nodes(weight, rate, 1);
+            not_finite += passed - passed;
+            elapsed = select(done, passed, elapsed);
         }
         done = done & (not_finite == T(real(0)));
         if (!any(done)) return done;
@@ -356,9 +367,10 @@ private:
     }
 };
 
-template <class K, class T>
-struct LaneStepper<K, T, Form::general, Stepping::solved> {
+template <class K, class T, Stepping stepping>
+struct LaneStepper<K, T, Form::general, stepping> {
     using real = typename K::real;
+    using Chain = Stepper<FallbackKernel<K>, Form::general, Stepping::solved>;
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
@@ -370,7 +382,8 @@ struct LaneStepper<K, T, Form::general, Stepping::solved> {
     void start(const ScalarFallback<K>& single, const real*, int lane) {
         follow_state(single, lane);
         real velocity[n] = {};
-        single.velocity(single.time(), single.q, single.p, velocity);
+        const Chain& chain = single;  // with a clock: dq/dtau
+        chain.velocity(chain.time(), single.q, single.p, velocity);
         fixed_point.begin(velocity, lane);
     }
     void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {

@@ -34,7 +34,7 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
 template <class K>
 constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
-    if (native == 1 || !K::any_number || is_clean<K>()) return 0;
+    if (native == 1 || !K::any_number || is_clean<K>() || is_clocked<K>()) return 0;
     if constexpr (K::form == Form::separable) {
         if (K::neighbours) return moves_immediately<K>() && trajectories >= native ? native : 0;
     }

@@ -20,7 +20,10 @@ struct Between {
     static constexpr int n = K::coordinates, columns = 1 + 2 * n;
 
     static real time(const S& stepper, real theta) {
-        return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
+        if constexpr (is_clocked<K>())
+            return stepper.time_within(theta);
+        else
+            return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
     }
 
     // t, q[n], p[n] at t + theta h of the last step.
@@ -127,12 +130,18 @@ private:
         if (time + length == time) return;
         Status done = partial->prepare(step->parameters, length);
         partial->tolerance = step->tolerance;
-        if (done == Status::ok) done = partial->start(time, q, p);
+        if (done == Status::ok) {
+            if constexpr (is_clocked<K>())
+                done = partial->start(time, q, p, step->energy_of_start());
+            else
+                done = partial->start(time, q, p);
+        }
         if (done == Status::ok) done = partial->step();
         if (done != Status::ok) {
             status = done;
             return;
         }
+        if constexpr (is_clocked<K>()) row[0] = partial->time();
         for (int k = 0; k < n; ++k) row[1 + k] = partial->q[k];
         partial->momentum(momentum);
     }

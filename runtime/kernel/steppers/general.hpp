@@ -37,6 +37,7 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     };
 
     real q_before[n]{};         // before the last step
+    real elapsed{};             // of kernels with a clock: the physical time of the last step
     bool has_history{};         // there is a last step
     mutable bool is_current{};  // what follows is of the last step; else the iterations' memory is
     mutable real Y[room]{};     // displacements at the control points, then kappa, in the order of the solver
@@ -282,6 +283,7 @@ private:
             }
             iterations = static_cast<std::int32_t>(any.iteration.evaluations);
             increment = any.iteration.increment;
+            if constexpr (K::clocked) elapsed = any.iteration.elapsed;
             any.pause.succeed();
             is_current = false;
             has_history = true;
@@ -313,6 +315,23 @@ private:
             length += fabs(x[k] * a.residual[k]);
         }
         return length;
+    }
+
+    // sum_i h b_i clock(Q_i) of the stages just solved.
+    real time_passed(Arrays& a) const {
+        real passed = real(0);
+        if constexpr (K::clocked) {
+            real Q[n];
+            for (int k = 0; k < n; ++k) Q[k] = q[k];
+            for (int i = 0; i < r; ++i) {
+                this->node_variables(q, p, a.Y, i, a.z);
+                for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
+                passed += K::b[i] * Formulas<K>::clock(coefficients, this->time(), static_cast<const real*>(Q));
+            }
+        } else {
+            (void)a;
+        }
+        return step_size * passed;
     }
 
     Status step_in(Arrays& a) {
@@ -351,6 +370,7 @@ private:
             a.p1[k] = p[k];
         }
         if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.p1, n))) return Status::not_finite;
+        if constexpr (K::clocked) elapsed = time_passed(a);
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
             q[k] = a.q1[k];

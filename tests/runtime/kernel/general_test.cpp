@@ -106,6 +106,7 @@ struct Relativistic : HandwrittenKernel, LobattoFour<double> {
     using real = double;
     static constexpr int coordinates = 1;
     static constexpr Form form = Form::general;
+    static constexpr bool clocked = false;
     static constexpr bool autonomous = true, linear = false;
     static constexpr int active = 1, cyclic = 0, active_index[1] = {0}, cyclic_index[1] = {0};
     static constexpr int position[1] = {0}, group_count = 1, group_first[2] = {0, 1}, group_bandwidth[1] = {0};

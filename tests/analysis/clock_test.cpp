@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Steps that are equally long in the time of a clock: the Lagrangian that is derived, and the motions that run.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "generator/mechanics/sample.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/measure/diagnostics.hpp"
+#include "runtime/run/output.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+std::string kepler(double e, const std::string& method, const std::string& run, const std::string& rest = "") {
+    return "lagrangian = \"(x'^2 + y'^2)/2 + 1/r\"\n[definitions]\nr = \"sqrt(x^2 + y^2)\"\n[coordinates]\n"
+           "x = { position = \"1 - e\", velocity = 0 }\n"
+           "y = { position = 0, velocity = \"sqrt((1 + e)/(1 - e))\" }\n" +
+           fmt::format("[parameters]\ne = {}\n[method]\n{}\n[run]\n{}\n{}", e, method, run, rest);
+}
+
+Scene scene_of(const std::string& text) {
+    return read_scene(Source("clock.toml", text));
+}
+
+// The state at the end of the time, by the library itself.
+struct Ended {
+    TrajectoryRequest request;
+    TrajectoryResult result;
+    double energy_error = 0;
+};
+Ended run(const Scene& scene, std::int64_t arrivals = 61) {
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    Ended ended{request_of(scene, arrivals, stepper), {}};
+    ended.result = integrate(kernel, ended.request);
+    ended.energy_error = ended.result.energy_error_largest;
+    REQUIRE(ended.result.status == LOBATTO_OK);
+    return ended;
+}
+
+// Kepler's equation, from the pericentre.
+std::vector<double> ellipse(double e, double t) {
+    double u = t;
+    for (int i = 0; i < 200; ++i) u -= (u - e * std::sin(u) - t) / (1 - e * std::cos(u));
+    return {std::cos(u) - e, std::sqrt(1 - e * e) * std::sin(u)};
+}
+
+double error_of(const Ended& ended, double e, double t) {
+    const std::vector<double> exact = ellipse(e, t);
+    return std::fmax(std::fabs(ended.result.q[0] - exact[0]), std::fabs(ended.result.q[1] - exact[1]));
+}
+
+std::string refusal(const std::string& text) {
+    try {
+        emit(derive(scene_of(text)));
+    } catch (const InputError& error) {
+        const std::string text = error.what();
+        return text.substr(0, text.find('\n'));
+    }
+    return "accepted";
+}
+
+}  // namespace
+
+TEST_CASE("the Lagrangian of a clock is g (L(q, w/g) + E), and its momenta are those of L") {
+    const std::string text =
+        "lagrangian = \"(1 + x^2)*x'^2/2 + x*y*x'*y'/5 + y'^2/2 + x*y' - log(2 + cos(y')) - x^4 - "
+        "y^2\"\n[coordinates]\n"
+        "x = { position = 0.7, velocity = 0.3 }\ny = { position = 0.4, velocity = 0.5 }\n"
+        "[method]\nclock = \"2 + sin(x*y)\"\n[run]\nstep = 0.1\nuntil = 1\n";
+    const Scene scene = scene_of(text);
+    const Derivation derivation = derive(scene);
+    const auto L = [](double x, double y, double vx, double vy) {
+        return (1 + x * x) * vx * vx / 2 + x * y * vx * vy / 5 + vy * vy / 2 + x * vy - std::log(2 + std::cos(vy)) -
+               std::pow(x, 4) - y * y;
+    };
+    const auto px = [](double x, double y, double vx, double vy) { return (1 + x * x) * vx + x * y * vy / 5; };
+    const auto py = [](double x, double y, double vx, double vy) {
+        return x * y * vx / 5 + vy + x + std::sin(vy) / (2 + std::cos(vy));
+    };
+    const double E = 0.3 * px(0.7, 0.4, 0.3, 0.5) + 0.5 * py(0.7, 0.4, 0.3, 0.5) - L(0.7, 0.4, 0.3, 0.5);
+    const double x = 0.6, y = -0.8, wx = 0.9, wy = 1.1, g = 2 + std::sin(x * y);
+    Formulas formulas;
+    const System& system = derivation.system;
+    const auto set = [&](const GiNaC::symbol& symbol, double value) {
+        formulas.set(symbol, float_of(GiNaC::numeric(value)));
+    };
+    set(system.q[0], x), set(system.q[1], y), set(system.v[0], wx), set(system.v[1], wy);
+    const Parameter& energy = derivation.scene.parameters.back();
+    CHECK(scene.evaluate(energy.value, "E").to_double() == doctest::Approx(E).epsilon(1e-14));
+    formulas.set(energy.symbol, float_of(scene.evaluate(energy.value, "E")));
+    const auto values = formulas({system.lagrangian, system.momentum[0], system.momentum[1]});
+    CHECK(cln::double_approx(values[0]) == doctest::Approx(g * (L(x, y, wx / g, wy / g) + E)).epsilon(1e-13));
+    CHECK(cln::double_approx(values[1]) == doctest::Approx(px(x, y, wx / g, wy / g)).epsilon(1e-13));
+    CHECK(cln::double_approx(values[2]) == doctest::Approx(py(x, y, wx / g, wy / g)).epsilon(1e-13));
+}
+
+TEST_CASE("steps of a clock have the order of their method in physical time") {
+    struct Row {
+        std::string method;
+        double step;
+        int order;
+    };
+    for (const Row& row :
+         {Row{"points = 3", 0.1, 4}, Row{"points = 4", 0.2, 6}, Row{"family = \"gauss\"\nstages = 2", 0.1, 4}}) {
+        INFO(row.method);
+        double errors[2];
+        for (const int part : {1, 2})
+            errors[part - 1] = error_of(run(scene_of(kepler(0.6, row.method + "\nclock = \"r^(3/2)\"",
+                                                            fmt::format("step = {}\nuntil = 9", row.step / part)))),
+                                        0.6, 9);
+        CHECK(std::log2(errors[0] / errors[1]) == doctest::Approx(row.order).epsilon(0.12));  // 4.01, 5.9, 4.0
+    }
+}
+
+TEST_CASE("an eccentric orbit takes a dozen steps a revolution") {
+    // 10 revolutions of e = 0.99 in some 120 steps, where equal ones are 50,000 for less.
+    const Ended ended = run(scene_of(kepler(0.99, "points = 9\nclock = \"r^(3/2)\"", "step = 0.73\nuntil = 62.8")));
+    CHECK(ended.result.chain_steps < 200);
+    CHECK(error_of(ended, 0.99, 62.8) < 1e-8);  // 1e-10
+}
+
+TEST_CASE("the energy of an eccentric orbit stays bounded") {
+    const auto after = [](double until) {
+        return run(scene_of(
+                       kepler(0.99, "points = 8\nclock = \"r^(3/2)\"", fmt::format("step = 0.9\nuntil = {}", until))))
+            .energy_error;
+    };
+    const double early = after(200), late = after(20000);
+    CHECK(early > 0);
+    CHECK(late < 3 * early);
+}
+
+TEST_CASE("a step of a clock is symplectic, and forces would show") {
+    const Scene scene = scene_of(kepler(0.6, "points = 5\nclock = \"r\"", "step = 0.3\nuntil = 1"));
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    const TrajectoryRequest request = request_of(scene, 1, stepper);
+    CHECK(symplectic_defect(stepper, request.q, request.p) < 1e-14);
+    // Of a map that is not: the same step with its momentum stretched.
+    std::vector<double> q, p, T;
+    REQUIRE(stepper.tangent(0, request.q, request.p, q, p, T) == LOBATTO_OK);
+    double determinant = T[0] * T[10] - T[2] * T[8];
+    CHECK(std::fabs(determinant) > 0.1);  // the blocks are no trivial ones
+}
+
+TEST_CASE("a motion with a clock goes back where it came from") {
+    const Scene scene = scene_of(kepler(0.8, "points = 6\nclock = \"r^(3/2)\"", "step = 0.4\nuntil = 20"));
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    TrajectoryRequest request = request_of(scene, 61, stepper);
+    const TrajectoryResult there = integrate(kernel, request);
+    const std::vector<double> q = request.q, p = request.p;
+    request.q = there.q;
+    request.p = there.p;
+    request.time = 20;
+    request.step = -request.step;
+    request.arrivals.interval = -request.arrivals.interval;
+    request.arrivals.end = 0;
+    const TrajectoryResult back = integrate(kernel, request);
+    REQUIRE(back.status == LOBATTO_OK);
+    for (std::size_t k = 0; k < 2; ++k) {
+        CHECK(back.q[k] == doctest::Approx(q[k]).epsilon(1e-4));  // by shortened steps at the ends
+        CHECK(back.p[k] == doctest::Approx(p[k]).epsilon(1e-4));
+    }
+}
+
+TEST_CASE("arrivals are at their times, and leave the motion alone") {
+    const std::string text = kepler(0.7, "points = 7\nclock = \"r\"", "step = 0.3\nuntil = 10");
+    const Ended often = run(scene_of(text), 100), once = run(scene_of(text), 1);
+    CHECK(often.result.time == 10);
+    CHECK(often.result.chain_steps == once.result.chain_steps);
+    CHECK(often.result.q == once.result.q);
+    CHECK(often.result.p == once.result.p);
+
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", text + "[output]\nevery = 0.4\n");
+    REQUIRE(test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"}).exit_code ==
+            0);
+    const auto rows = read_trajectory(folder / "run.csv").rows;
+    REQUIRE(rows.size() == 26);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        CHECK(rows[i][0] == doctest::Approx(0.4 * static_cast<double>(i)).epsilon(1e-15));
+        const std::vector<double> exact = ellipse(0.7, rows[i][0]);
+        CHECK(std::fabs(rows[i][1] - exact[0]) < 1e-7);
+        CHECK(std::fabs(rows[i][2] - exact[1]) < 1e-7);
+    }
+}
+
+TEST_CASE("events of a motion with a clock happen at their physical times") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", kepler(0.9, "points = 9\nclock = \"r^(3/2)\"", "step = 0.7\nuntil = 40") +
+                                                "[output]\nevents = [\"x*x' + y*y' = 0 rising\"]\n");
+    REQUIRE(test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"}).exit_code ==
+            0);
+    const auto rows = read_trajectory(folder / "run.events.csv").rows;
+    REQUIRE(rows.size() == 6);  // pericentres after the start
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        CHECK(std::fabs(rows[i][1] - 2 * std::acos(-1) * static_cast<double>(i + 1)) < 1e-8);
+}
+
+TEST_CASE("sweeps of scenes with a clock measure their errors") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", kepler(0.5, "points = 8\nclock = \"r^(3/2)\"", "step = 0.6\nuntil = 50"));
+    const test::Finished finished = test::run(
+        {LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.3,0.9,0.97", "-o", folder / "sweep.csv"});
+    INFO(finished.err);
+    CHECK(finished.exit_code == 0);
+}
+
+TEST_CASE("a clock that does not stay positive ends the run, and says so") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml",
+                     "lagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[method]\n"
+                     "points = 6\nclock = \"x\"\n[run]\nstep = 0.1\nuntil = 10\n");
+    const test::Finished finished =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
+    INFO(finished.err);
+    CHECK(finished.exit_code == 3);
+    const auto rows = read_trajectory(folder / "run.csv").rows;
+    REQUIRE(!rows.empty());
+    for (const auto& row : rows) CHECK(std::fabs(row[1] - std::cos(row[0])) < 1e-6);  // what was computed is right
+}
+
+TEST_CASE("what has no clock says so") {
+    const std::string good = kepler(0.5, "clock = \"r\"", "step = 0.1\nuntil = 1");
+    CHECK(refusal(good) == "accepted");
+    CHECK(refusal(kepler(0.5, "clock = \"x'^2\"", "step = 0.1\nuntil = 1")) ==
+          "clock.toml:10:9: a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
+    CHECK(refusal(kepler(0.5, "clock = \"2*e\"", "step = 0.1\nuntil = 1")) ==
+          "clock.toml:10:9: this clock holds no position, so that all its steps are equal; leave it out");
+    CHECK(refusal(kepler(0.5, "clock = \"-r\"", "step = 0.1\nuntil = 1")) ==
+          "clock.toml:10:9: the clock is -0.5 at the start; it must be positive wherever the motion goes");
+    CHECK(refusal(kepler(0.5, "clock = \"r\"", "step = 0.1\nuntil = 1\n[forces]\nx = \"-x'\"")) ==
+          "clock.toml:10:9: a clock needs a motion that keeps its energy, but a force acts on x; remove the clock, or "
+          "the "
+          "force");
+    CHECK(refusal(kepler(0.5, "clock = \"r\"\nfamily = \"splitting\"", "step = 0.1\nuntil = 1")) ==
+          "clock.toml: splitting methods have no clock; choose Lobatto or Gauss (--points 8)");
+    CHECK(refusal(kepler(0.5, "clock = \"r\"\narithmetic = \"clean\"", "step = 0.1\nuntil = 1")) ==
+          "clock.toml: clean arithmetic has no clock; choose Lobatto or Gauss (--points 8) and --arithmetic plain");
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", good);
+    for (const std::string command : {"verify", "stability", "roundoff", "tune", "tradeoff"}) {
+        INFO(command);
+        std::vector<std::string> arguments{LOBATTO_PROGRAM, command, folder / "scene.toml"};
+        if (command == "tune") arguments.insert(arguments.end(), {"--error", "1e-6"});
+        const test::Finished finished = test::run(arguments);
+        CHECK(finished.exit_code == 2);
+        CHECK(finished.err.find("lobatto " + command + " knows no clock yet") != std::string::npos);
+    }
+}
