@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/exact_start.hpp"
 
+#include "generator/mechanics/start.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -8,6 +9,13 @@ namespace lobatto {
 ExactStart::ExactStart(const Scene& scene) : from_velocity(scene.start == Start::velocity) {
     for (const Parameter& parameter : scene.parameters)
         parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name));
+    if (!scene.constraints.empty()) {
+        const StartOnConstraints start = start_on_constraints(scene, build_system(scene));
+        for (const cln::cl_R& position : start.q) q.emplace_back(position);
+        for (const cln::cl_R& velocity : start.v) rate.emplace_back(velocity);
+        from_velocity = true;
+        return;
+    }
     for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
         const std::string& name = scene.coordinates[k].name;
         q.push_back(scene.evaluate(scene.initial_position[k], "the initial position of " + name));

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "analysis/exact_start.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -86,9 +87,15 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     request.arrivals = arrivals_of(scene, steps);
     request.every = scene.outputs.every;
     request.dense = scene.outputs.dense;
-    const bool from_velocity = scene.start == Start::velocity;
-    request.q = doubles(scene, scene.initial_position, "position");
-    request.p = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
+    const bool from_velocity = scene.start == Start::velocity || !scene.constraints.empty();
+    if (scene.constraints.empty()) {
+        request.q = doubles(scene, scene.initial_position, "position");
+        request.p = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
+    } else {
+        const ExactStart start(scene);
+        for (const GiNaC::numeric& position : start.q) request.q.push_back(position.to_double());
+        for (const GiNaC::numeric& velocity : start.rate) request.p.push_back(velocity.to_double());
+    }
 
     TrajectoryResult none;
     none.status = stepper.prepare(request.parameters, request.step);

@@ -8,6 +8,7 @@
 
 #include "generator/formula/limits.hpp"
 #include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/programs/programs.hpp"
 
@@ -23,6 +24,7 @@ void check_method(const Scene& scene, const System& system, bool general) {
             fmt::format("{}: {} no clock; choose Lobatto or Gauss (--points 8){}", scene.path,
                         scene.method.family == Family::splitting ? "splitting methods have" : "clean arithmetic has",
                         scene.method.family == Family::splitting ? "" : " and --arithmetic plain"));
+    require_method_of_constraints(scene);
     if (scene.method.family == Family::splitting) {
         if (general)
             throw InputError(scene.path +
@@ -87,6 +89,7 @@ KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
 
 PlainSource emit_plain(Scene scene, Precision precision) {
     refuse_clock(scene, "the plain text");
+    refuse_constraints(scene, "the plain text");
     const auto refuse = [&](const std::string& why) { throw InputError(scene.path + ": " + why); };
     if (precision == Precision::quadruple)
         refuse(

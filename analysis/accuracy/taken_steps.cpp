@@ -162,6 +162,10 @@ double jacobian_defect(const Derivation& derivation, const Kernel& kernel, const
             X.push_back(position[here] + way * random());
             direction.push_back(way * random());
         }
+        for (int c = 0; c < kernel->constraints; ++c) {  // the multipliers of the node before
+            X.push_back(random());
+            direction.push_back(random());
+        }
     }
     while (X.size() < N) {
         X.push_back(real(0));

@@ -15,6 +15,7 @@
 #include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 
@@ -94,6 +95,7 @@ void print(const RoundoffResult& result) {
 void roundoff(const RoundoffCommand& options) {
     Scene scene = read_scene(options.scene);
     refuse_clock(scene, "lobatto roundoff");
+    refuse_constraints(scene, "lobatto roundoff");
     options.method.apply(scene);
     if (scene.method.family == Family::splitting)
         throw InputError(scene.path +

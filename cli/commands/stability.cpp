@@ -16,6 +16,7 @@
 #include "cli/print/stability_text.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
 #include "generator/method/splitting_stability.hpp"
 
 namespace lobatto {
@@ -86,6 +87,7 @@ void show_scene(const StabilityCommand& options) {
     const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart, *options.scene);
     Scene scene = read_scene(*options.scene);
     refuse_clock(scene, "lobatto stability");
+    refuse_constraints(scene, "lobatto stability");
     options.method.apply(scene);
     if (scene.method.family == Family::splitting)
         throw InputError(

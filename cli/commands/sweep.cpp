@@ -43,9 +43,10 @@ const char* const reason[] = {"reached the end",
                               "t + h equals t",
                               "not supported by the kernel",
                               "energy off: beyond stability, or past a singularity",
-                              "not resolved: the error is as large as the motion"};
+                              "not resolved: the error is as large as the motion",
+                              "start off the constraints"};
 constexpr double large_error = 0.03;  // of the amplitude: worth a warning whoever asked
-constexpr int departed = 7, unresolved = 8;
+constexpr int departed = 7, unresolved = 8, last_status = 9;
 
 struct SweepOptions {
     std::string scene;
@@ -132,7 +133,7 @@ std::vector<std::string> comments_of(const Scene& scene, const KernelSource& sou
     }
     if (!parameters.empty()) comments.push_back(fmt::format("parameters: {}", fmt::join(parameters, ", ")));
     for (const Axis& axis : grid.axes()) comments.push_back(fmt::format("vary: {} = {}", axis.name, axis.written));
-    for (int status = 0; status <= unresolved; ++status)
+    for (int status = 0; status <= last_status; ++status)
         if (status != LOBATTO_UNSUPPORTED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
     comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
     return comments;

@@ -16,6 +16,7 @@
 #include "cli/print/tradeoff_pictures.hpp"
 #include "cli/print/tradeoff_report.hpp"
 #include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
@@ -39,6 +40,7 @@ void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
     const Scene written = read_scene(options.scene);
     refuse_clock(written, "lobatto tradeoff");
+    refuse_constraints(written, "lobatto tradeoff");
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);

@@ -14,6 +14,7 @@
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
@@ -62,6 +63,7 @@ void tune(const TuneOptions& options) {
     const double error = error_of(options);
     const Scene written = read_scene(options.scene);
     refuse_clock(written, "lobatto tune");
+    refuse_constraints(written, "lobatto tune");
     Scene scene = written;
     apply(options.overrides, scene);
     const Interruption interruption;

@@ -17,6 +17,7 @@
 #include "runtime/error.hpp"
 #include "runtime/measure/convergence.hpp"
 #include "runtime/measure/diagnostics.hpp"
+#include "runtime/measure/manifold.hpp"
 #include "runtime/measure/promises.hpp"
 #include "runtime/measure/symmetry.hpp"
 #include "runtime/run/trajectory.hpp"
@@ -272,6 +273,24 @@ void symplecticity(std::vector<Row>& rows, const Kernel& kernel, const Kernel& e
         decided("steps and back, quadruple", [&] { return reversal(exact_kernel, exact, "quadruple", !forced); }));
 }
 
+// (D45) On the manifold of the constraints, in differences.
+void symplecticity_on_constraints(std::vector<Row>& rows, const Kernel& exact_kernel, const QuadrupleStart& start,
+                                  __float128 step, bool forced) {
+    constexpr std::int64_t there = 20;  // steps
+    if (forced)
+        rows.push_back(not_promised("symplectic step", "forces"));
+    else
+        rows.push_back(decided("areas on the constraints, quadruple", [&] {
+            return at_most("areas on the constraints, quadruple", area_defect(exact_kernel, start, step), 1e-14,
+                           "the step does not preserve areas in the phase space that the constraints leave");
+        }));
+    rows.push_back(decided("steps and back, quadruple", [&] {
+        return at_most(fmt::format("{} steps and back, quadruple", there),
+                       return_distance(exact_kernel, start, step, there), 1e-20,
+                       "the step is not its own inverse with -h, or so long that it jumps over a singularity");
+    }));
+}
+
 void verify(const VerifyOptions& options) {
     Scene scene = read_scene(options.scene);
     refuse_clock(scene, "lobatto verify");
@@ -302,7 +321,9 @@ void verify(const VerifyOptions& options) {
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
                                     [](const GiNaC::ex& force) { return !force.is_zero(); });
-    if (with_tangent)
+    if (!scene.constraints.empty())
+        symplecticity_on_constraints(rows, exact_kernel, quadruple_start, exact.step, forced);
+    else if (with_tangent)
         symplecticity(rows, kernel, exact_kernel, start, exact, states, forced);
     else
         rows.push_back({"symplectic step, reversal", "left out", fmt::format("n > {}", tangent_limit), true, ""});

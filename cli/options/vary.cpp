@@ -11,6 +11,7 @@
 #include "analysis/overrides.hpp"
 #include "generator/formula/expression.hpp"
 #include "generator/formula/suggest.hpp"
+#include "generator/mechanics/start.hpp"
 
 namespace lobatto {
 
@@ -187,6 +188,12 @@ Grid::Grid(const Scene& scene, const std::vector<std::string>& arguments) : scen
         count_ *= axes_[a].count();
     }
 
+    if (scene.run.assemble) {
+        if (scene.start == Start::momentum)
+            throw InputError(fmt::format(
+                "{}: sweeps assemble starts by their velocities: give velocities in place of momenta", scene.path));
+        assembled_ = build_system(scene);
+    }
     const auto varied = [&](Axis::Role role, std::size_t index) {
         return std::any_of(axes_.begin(), axes_.end(),
                            [&](const Axis& axis) { return axis.role == role && axis.index == index; });
@@ -226,7 +233,7 @@ void Grid::start(std::int64_t trajectory, EnsembleStart& start) const {
                                                                            : start.rate;
         numbers[axis.index] = value(trajectory, a);
     }
-    if (dependents_.empty()) return;
+    if (dependents_.empty() && !assembled_) return;
     const std::lock_guard lock(algebra_);
     std::vector<GiNaC::ex> parameters;
     for (const Parameter& parameter : scene_.parameters) parameters.push_back(parameter.value);
@@ -240,6 +247,27 @@ void Grid::start(std::int64_t trajectory, EnsembleStart& start) const {
         } catch (const InputError&) {  // a root of a negative number, for example
             number = std::numeric_limits<double>::quiet_NaN();
         }
+    }
+    if (assembled_) assemble(parameters, start);
+}
+
+// (D47) The nearest start that keeps the constraints; not a number where there is none.
+void Grid::assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start) const {
+    Scene scene = scene_;
+    for (std::size_t i = 0; i < parameters.size(); ++i) scene.parameters[i].value = parameters[i];
+    for (std::size_t k = 0; k < start.q.size(); ++k) {
+        if (!std::isfinite(start.q[k]) || !std::isfinite(start.rate[k])) return;
+        scene.initial_position[k] = GiNaC::numeric(start.q[k]);
+        scene.initial_rate[k] = GiNaC::numeric(start.rate[k]);
+    }
+    try {
+        const StartOnConstraints found = start_on_constraints(scene, *assembled_);
+        for (std::size_t k = 0; k < start.q.size(); ++k) {
+            start.q[k] = cln::double_approx(found.q[k]);
+            start.rate[k] = cln::double_approx(found.v[k]);
+        }
+    } catch (const InputError&) {
+        start.q.assign(start.q.size(), std::numeric_limits<double>::quiet_NaN());
     }
 }
 

@@ -6,9 +6,11 @@
 
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "generator/mechanics/system.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/run/ensemble.hpp"
 
@@ -52,6 +54,7 @@ private:
         std::size_t coordinate;
     };
     std::int64_t place(std::int64_t trajectory, std::size_t axis) const;
+    void assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start) const;
 
     const Scene& scene_;
     std::vector<Axis> axes_;
@@ -59,7 +62,8 @@ private:
     std::int64_t count_ = 1;
     EnsembleStart base_;
     std::vector<Dependent> dependents_;
-    mutable std::mutex algebra_;  // formulas are not made for several threads
+    std::optional<System> assembled_;  // of a scene whose starts are moved onto its constraints
+    mutable std::mutex algebra_;       // formulas are not made for several threads
 };
 
 }  // namespace lobatto

@@ -72,7 +72,7 @@ public:
         second_derivatives();
         slopes_of_the_action();
         if (derivation_.structure.form() == Form::general) {
-            routhian();
+            if (system_.constraints.empty()) routhian();
         } else {
             stage_equations();
         }
@@ -119,6 +119,8 @@ private:
             g = routhian.gradient;
             H = routhian.second;
             set_cyclic_momenta();
+            Noise of_multipliers(17);
+            for (const auto& lambda : routhian.multipliers) formulas_.set(lambda, of_multipliers.next());
         } else {  // what is not in (D1) vanishes
             z.insert(z.end(), system_.q.begin(), system_.q.end());
             g.insert(g.end(), system_.force.begin(), system_.force.end());

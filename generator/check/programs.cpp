@@ -228,6 +228,7 @@ private:
     void general() {
         const Routhian& routhian = derivation_.structure.routhian();
         set_cyclic_momenta();
+        set_multipliers();
         machine_.set("z", values_of(routhian.z));
         const Numbers g = formulas_(routhian.gradient);
         const std::string at_node = "emitted node: slopes and second derivatives";
@@ -236,6 +237,7 @@ private:
         compare(at_node, formulas_(entries(routhian.second)), machine_.get("H", routhian.second.entries().size()));
         machine_.run("slope");
         compare(at_node, g, machine_.get("g", g.size()));
+        if (!system_.constraints.empty()) constraints();
 
         const std::string claim = "emitted energy, momentum, forces";
         machine_.set("q", values_of(system_.q));
@@ -256,6 +258,36 @@ private:
             machine_.run("energy");
             compare(claim, energy_, {machine_.get("return")}, energy_size_);
         }
+    }
+    void set_multipliers() {
+        Noise noise(17);
+        for (const auto& lambda : derivation_.structure.routhian().multipliers) formulas_.set(lambda, noise.next());
+    }
+    // (D44) phi and its derivatives, each taken of the whole; G^T lambda beside the forces of a node.
+    void constraints() {
+        const std::vector<GiNaC::symbol>& lambda = derivation_.structure.routhian().multipliers;
+        std::vector<ex> phi, phi_t, G, pull;
+        ex constrained = 0;
+        for (std::size_t c = 0; c < lambda.size(); ++c) {
+            phi.push_back(system_.constraints[c].value);
+            phi_t.push_back(phi.back().diff(system_.t));
+            constrained += lambda[c] * phi.back();
+        }
+        for (const auto& [place, value] : system_.constraint_q.entries())
+            G.push_back(
+                phi[static_cast<std::size_t>(place.first)].diff(system_.q[static_cast<std::size_t>(place.second)]));
+        machine_.set("q", values_of(system_.q));
+        machine_.run("constraint");
+        const std::string claim = "emitted constraints and their slopes";
+        compare(claim, formulas_(phi), machine_.get("phi", phi.size()));
+        compare(claim, formulas_(phi_t), machine_.get("phi_t", phi.size()));
+        compare(claim, formulas_(G), machine_.get("G", G.size()));
+        for (const auto& q : system_.q) pull.push_back(constrained.diff(q));
+        Numbers forces = formulas_(pull);
+        for (std::size_t k = 0; k < n_; ++k) forces[k] = forces[k] + force_[k];
+        const Numbers g = machine_.get("g", 2 * n_ + lambda.size());
+        compare(claim, forces,
+                {g.begin() + static_cast<std::ptrdiff_t>(n_), g.begin() + static_cast<std::ptrdiff_t>(2 * n_)});
     }
     void set_cyclic_momenta() {
         const Routhian& routhian = derivation_.structure.routhian();

@@ -4,6 +4,7 @@
 
 #include "generator/check/check.hpp"
 #include "generator/check/discrete_action.hpp"
+#include "generator/mechanics/mass_equations.hpp"
 
 namespace lobatto {
 
@@ -37,6 +38,8 @@ public:
         const auto rounded = [&](const cln::cl_R& value, const cln::cl_R& of) {
             return value + cln::cl_R((cln::plusp(noise.next()) ? 1 : -1)) * of * step_.epsilon;
         };
+        rounding.resize(left.size(), cln::cl_R(0));
+        const auto group = [&](std::size_t i) { return i < controls() * n_ ? i % n_ : i; };  // of one coordinate
         for (int draw = 0; draw < 4; ++draw) {
             Path moved = path_;
             Numbers p0 = step_.p0, p1 = step_.p1;
@@ -49,24 +52,89 @@ public:
             }
             const Numbers there = equations(moved, p0, p1);
             for (std::size_t i = 0; i < there.size(); ++i)
-                rounding[i % n_] = cln::max(rounding[i % n_], cln::abs(there[i] - left[i]));
+                rounding[group(i)] = cln::max(rounding[group(i)], cln::abs(there[i] - left[i]));
         }
         cln::cl_R worst = 0;
         for (std::size_t i = 0; i < left.size(); ++i)
-            if (!cln::zerop(left[i]) && !cln::zerop(rounding[i % n_]))
-                worst = cln::max(worst, cln::abs(left[i]) / rounding[i % n_]);
+            if (!cln::zerop(left[i]) && !cln::zerop(rounding[group(i)]))
+                worst = cln::max(worst, cln::abs(left[i]) / rounding[group(i)]);
         return cln::double_approx(worst);
     }
 
 private:
-    // dL_d/dQ_j, with the momenta at the ends: all of them vanish for a step (D28).
+    // dL_d/dQ_j, with the momenta at the ends: all of them vanish for a step (D28). With constraints, what of them no
+    // multiplier takes away; then the constraints at each control point (D45), and the multipliers that the momentum at
+    // the end would need to keep them on (D46).
     Numbers equations(const Path& path, const Numbers& p0, const Numbers& p1) {
+        if (!system_.constraints.empty()) return constrained_equations(path, p0, p1);
         const Path R = slopes(path);
         Numbers flat;
         for (std::size_t j = 0; j < R.size(); ++j)
             for (std::size_t k = 0; k < n_; ++k)
                 flat.push_back(R[j][k] + (j == 0 ? p0[k] : j + 1 == R.size() ? -p1[k] : cln::cl_R(0)));
         return flat;
+    }
+
+    Numbers constrained_equations(const Path& path, const Numbers& p0, const Numbers& p1) {
+        Path R = slopes(path);
+        Numbers flat, kept;
+        for (std::size_t j = 0; j < R.size(); ++j) {
+            for (std::size_t k = 0; k < n_ && j == 0; ++k) R[j][k] = R[j][k] + p0[k];
+            for (std::size_t k = 0; k < n_ && j + 1 == R.size(); ++k) R[j][k] = R[j][k] - p1[k];
+            formulas_.set(system_.t, t0_ + control_[j] * h_);
+            set(system_.q, path[j]);
+            const Numbers G = values_of(system_.constraint_q.dense());
+            const Numbers free = without_pull(R[j], G);
+            flat.insert(flat.end(), free.begin(), free.end());
+            if (j == 0) continue;
+            for (const Constraint& constraint : system_.constraints)
+                kept.push_back(formulas_({constraint.value}).front());
+        }
+        flat.insert(flat.end(), kept.begin(), kept.end());
+        const Numbers needed = multipliers_of(p1, path);
+        flat.insert(flat.end(), needed.begin(), needed.end());
+        return flat;
+    }
+    // R - G^T (G G^T)^-1 G R.
+    Numbers without_pull(const Numbers& R, const Numbers& G) const {
+        const std::size_t count = system_.constraints.size();
+        Numbers square(count * count, cln::cl_R(0)), right(count, cln::cl_R(0));
+        for (std::size_t c = 0; c < count; ++c)
+            for (std::size_t k = 0; k < n_; ++k) {
+                right[c] = right[c] + G[c * n_ + k] * R[k];
+                for (std::size_t d = 0; d < count; ++d)
+                    square[c * count + d] = square[c * count + d] + G[c * n_ + k] * G[d * n_ + k];
+            }
+        const Numbers lambda = solve(square, right);
+        Numbers free = R;
+        for (std::size_t c = 0; c < count; ++c)
+            for (std::size_t k = 0; k < n_; ++k) free[k] = free[k] - G[c * n_ + k] * lambda[c];
+        return free;
+    }
+    // mu of dL/dv + G^T mu = p1, G v + dphi/dt = 0 at the end of the path, by Newton's iteration.
+    Numbers multipliers_of(const Numbers& p1, const Path& path) {
+        const std::size_t count = system_.constraints.size();
+        formulas_.set(system_.t, t0_ + h_);
+        set(system_.q, path.back());
+        const Numbers G = values_of(system_.constraint_q.dense()), phi_t = formulas_(system_.constraint_t);
+        MassEquations equations(system_, formulas_);
+        Numbers v = values_of(system_.v), mu(count, cln::cl_R(0));
+        for (int iteration = 0; iteration < 12; ++iteration) {  // from the velocity of the path: some five are enough
+            Numbers left = formulas_.evaluate(momentum_);
+            for (std::size_t k = 0; k < n_; ++k) {
+                left[k] = left[k] - p1[k];
+                for (std::size_t c = 0; c < count; ++c) left[k] = left[k] + G[c * n_ + k] * mu[c];
+            }
+            for (std::size_t c = 0; c < count; ++c) {
+                left.push_back(phi_t[c]);
+                for (std::size_t k = 0; k < n_; ++k) left.back() = left.back() + G[c * n_ + k] * v[k];
+            }
+            const Numbers step = equations.eliminate(left).vector;
+            for (std::size_t k = 0; k < n_; ++k) v[k] = v[k] - step[k];
+            for (std::size_t c = 0; c < count; ++c) mu[c] = mu[c] - step[n_ + c];
+            set(system_.v, v);
+        }
+        return mu;
     }
 
     // (D40) Kicks and drifts, one after another; the end stays the one that was taken.

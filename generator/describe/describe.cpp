@@ -306,6 +306,21 @@ protected:
         for (std::size_t k = 0; k < n_; ++k) energy += system.momentum[k] * system.v[k];
         scalar("energy", "D26", "", "energy, p.q' - L", "H", energy);
     }
+    // (D44)
+    void constraints() {
+        const System& system = d_.system;
+        section("The constraints");
+        Names phi, phi_t;
+        std::vector<ex> values;
+        for (const Constraint& constraint : system.constraints) {
+            phi.push_back("phi_" + constraint.name);
+            phi_t.push_back("dphi_" + constraint.name + "/dt");
+            values.push_back(constraint.value);
+        }
+        vector("constraints", "D44", "", "constraints, phi = 0", phi, values);
+        matrix("constraint_slopes", "D44", "their slopes, dphi/dq", "G", system.constraint_q);
+        if (!system.autonomous) vector("constraint_rates", "D44", "", "and by the time", phi_t, system.constraint_t);
+    }
     void second_derivatives(const std::string& id, const std::string& what, const std::string& left,
                             const SparseMatrix& value) {
         if (!value.entries().empty()) matrix(id, "D25", what, left, value);
@@ -358,13 +373,31 @@ protected:
                 sum += q.weights[i] * (q.D(at(i), at(j)) * node["g_v"][i] + h * q.B(at(i), at(j)) * node["g_q"][i]);
             return sum;
         };
+        const bool constrained = !d_.system.constraints.empty();
+        for (const char* block : {"lambda", "phi", "G", "GT"})
+            for (std::size_t i = 1; i <= r && constrained; ++i) {
+                node[block].emplace_back(fmt::format("{}_{}", block, i));
+                rename(node[block].back(), node[block].back().get_name());
+            }
+        const auto pull = [&](std::size_t j) -> ex {
+            return constrained ? h * q.weights[j] * node["GT"][j] * node["lambda"][j] : ex(0);
+        };
         std::vector<ex> residual;
         Names names;
         for (std::size_t j = 0; j < unknowns; ++j) {
-            residual.push_back(slope(j) + (j == 0 ? ex(left) : ex(0)));
+            residual.push_back(slope(j) + (j == 0 ? ex(left) : ex(0)) + pull(j));
             names.push_back(fmt::format("R_{}", j + 1));
         }
-        GiNaC::matrix J(at(unknowns + (multiplier ? 1 : 0)), at(unknowns + (multiplier ? 1 : 0)));
+        for (std::size_t j = 0; j < unknowns && constrained; ++j) {
+            residual.push_back(node["phi"][j + 1]);
+            names.push_back(fmt::format("R_phi_{}", j + 2));
+        }
+        const std::size_t size = constrained ? 2 * unknowns : unknowns + (multiplier ? 1 : 0);
+        GiNaC::matrix J(at(size), at(size));
+        for (std::size_t j = 0; j < unknowns && constrained; ++j) {
+            J(at(j), at(unknowns + j)) = h * q.weights[j] * node["GT"][j];
+            J(at(unknowns + j), at(j)) = node["G"][j + 1];
+        }
         for (std::size_t j = 0; j < unknowns; ++j)
             for (std::size_t k = 1; k <= unknowns; ++k)
                 for (std::size_t i = 0; i < r; ++i) {
@@ -391,14 +424,24 @@ protected:
         }
         vector("step_equations", "D30", "",
                "R = 0: g_v and g_q are momentum and force at the nodes" +
-                   std::string(multiplier ? ", g_P the negative velocity of the cyclic coordinates" : ""),
+                   std::string(multiplier    ? ", g_P the negative velocity of the cyclic coordinates"
+                               : constrained ? ", GT = G^T, lambda the multipliers of the constraints"
+                                             : ""),
                names, residual);
         matrix("step_jacobian", "D30", "",
-               "its Jacobian: H are the second derivatives at the nodes; columns: positions 2 to " +
-                   std::to_string(controls_) + (multiplier ? ", kappa" : ""),
+               "its Jacobian: H are the second derivatives at the nodes" +
+                   std::string(constrained ? ", those of phi times lambda among H_qq" : "") +
+                   "; columns: positions 2 to " + std::to_string(controls_) +
+                   (multiplier    ? ", kappa"
+                    : constrained ? fmt::format(", lambda_1 to lambda_{}", unknowns)
+                                  : ""),
                "J", J);
         vector("arrival_momentum", "D30", "", "arrival, explicit: the momentum after the step", {"p_1"},
-               {slope(controls_ - 1)});
+               {slope(controls_ - 1) + pull(controls_ - 1)});
+        if (constrained)
+            vector("hidden_constraint", "D46", "",
+                   fmt::format("where lambda_{} keeps the velocity on the constraints", r), {"0"},
+                   {node["G"].back() * GiNaC::symbol("v_1") + GiNaC::symbol("phi_t")});
     }
 };
 
@@ -419,7 +462,10 @@ public:
             separable_system();
         if (written_out_ && !general_) discrete_equations();
         if (general_) {
-            if (written_out_) general_equations();
+            if (!d_.system.constraints.empty())
+                constraints();
+            else if (written_out_)
+                general_equations();
             if (!d_.structure.routhian().cyclic.empty()) routhian();
             general_step();
         } else if (written_out_) {

@@ -64,6 +64,13 @@ const std::vector<Declaration>& general() {
          true,
          true},
         {"clock", "(D42) g = dt/dtau; q: n.", "real", {{in, "q"}}, true, true},
+        {"constraint",
+         "(D44) phi(q, t), dphi/dt at fixed q, and the entries of G = dphi/dq listed in constraint_row, "
+         "constraint_column.",
+         "void",
+         {{in, "q"}, {out, "phi"}, {out, "phi_t"}, {out, "G"}},
+         true,
+         true},
         {"momentum", "(D2) p = dL/dvelocity; n each.", "void", {{in, "q"}, {in, "velocity"}, {out, "p"}}, true, true},
         {"legendre",
          "(D27) p and its derivative M in the velocity, the entries listed in mass_row, mass_column.",
@@ -84,8 +91,9 @@ const std::vector<Declaration>& general() {
          true,
          true},
         {"node",
-         "(D25) At one node, z = (velocities, positions of the active coordinates, momenta of the cyclic ones): g = "
-         "dR/dz, with the force beside dR/dq, and the entries of H = dg/dz listed in entry_row, entry_column.",
+         "(D25) At one node, z = (velocities, positions of the active coordinates, momenta of the cyclic ones, "
+         "multipliers): g = dR/dz, with the force beside dR/dq, and the entries of H = dg/dz listed in entry_row, "
+         "entry_column.",
          "void",
          {{in, "z"}, {out, "g"}, {out, "H"}},
          true,
@@ -156,6 +164,10 @@ const std::set<std::string>& member_names() {
                                                 "mass_entries",
                                                 "mass_row",
                                                 "mass_column",
+                                                "constraints",
+                                                "constraint_entries",
+                                                "constraint_row",
+                                                "constraint_column",
                                                 "position",
                                                 "group_count",
                                                 "group_first",

@@ -80,7 +80,12 @@ std::string general_shapes(const Derivation& d) {
     line(text, fmt::format("int entries = {}", entries.size()), "of H = d2R/dzdz that are not identically zero");
     text += places("entry", entries);
     line(text, fmt::format("int mass_entries = {}", mass.size()), "of M = d2L/dvdv that are not identically zero");
-    return text + places("mass", mass);
+    text += places("mass", mass);
+    const auto slopes = places_of(d.system.constraint_q);
+    line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
+    line(text, fmt::format("int constraint_entries = {}", slopes.size()),
+         "of G = dphi/dq that are not identically zero");
+    return text + places("constraint", slopes);
 }
 
 // Where the unknowns of each coordinate stand, and the groups that are solved by themselves.
@@ -174,11 +179,12 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     static constexpr const char* forms[] = {"linear_map", "separable", "general"};
     const int controls = static_cast<int>(d.quadrature.control.size());
     const bool multiplier = d.scene.method.family == Family::lobatto;
-    const int unknowns = structure.form() == Form::linear_map || structure.is_explicit() ? 0
-                         : structure.form() == Form::separable
-                             ? d.system.n * (d.quadrature.points - 2)
-                             : static_cast<int>(structure.routhian().active.size()) * (controls - 1) +
-                                   (multiplier ? static_cast<int>(structure.routhian().cyclic.size()) : 0);
+    const int unknowns =
+        structure.form() == Form::linear_map || structure.is_explicit() ? 0
+        : structure.form() == Form::separable
+            ? d.system.n * (d.quadrature.points - 2)
+            : static_cast<int>(structure.routhian().active.size() + d.system.constraints.size()) * (controls - 1) +
+                  (multiplier ? static_cast<int>(structure.routhian().cyclic.size()) : 0);
     std::string text = fmt::format("    using real = {};\n\n", type_name(precision));
     text += fmt::format(
         "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n"
@@ -189,9 +195,10 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int coordinates = {}", d.system.n), "n");
     line(text, fmt::format("int order = {}", d.quadrature.order()), "of accuracy in h");
     line(text, fmt::format("int unknowns = {}", unknowns), "of the equations of a step; 0: none to solve");
-    line(text, fmt::format("bool any_number = {}", !structure.full()),
-         structure.full() ? "Newton's iteration alone"
-                          : "formulas are templates on the type of numbers: fixed-point iteration first");
+    const bool iterates = !structure.full() && d.system.constraints.empty();
+    line(text, fmt::format("bool any_number = {}", iterates),
+         iterates ? "formulas are templates on the type of numbers: fixed-point iteration first"
+                  : "Newton's iteration alone");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");
@@ -223,7 +230,7 @@ bool has_lanes(Precision precision) {
 }
 
 bool has_tangent(const Derivation& d) {
-    return d.scene.outputs.tangent && d.system.n <= tangent_limit;
+    return d.scene.outputs.tangent && d.system.n <= tangent_limit && d.system.constraints.empty();
 }
 
 std::string tables(const Derivation& d, Precision precision) {

@@ -102,6 +102,35 @@ std::vector<int> find_cyclic(const Scene& scene, const System& system) {
     return cyclic;
 }
 
+namespace {
+
+// L + phi . lambda (D44), its slopes and second derivatives.
+void add_constraints(const System& system, Routhian& routhian) {
+    const int n = system.n, count = static_cast<int>(system.constraints.size());
+    SparseMatrix second(2 * n + count, 2 * n + count);
+    for (const auto& [place, value] : routhian.second.entries()) second.put(place.first, place.second, value);
+    for (const Constraint& constraint : system.constraints)
+        routhian.multipliers.emplace_back("lambda_" + constraint.name);
+    std::vector<ex> pull(static_cast<std::size_t>(n), ex(0));  // G^T lambda
+    for (const auto& [place, slope] : system.constraint_q.entries()) {
+        const auto [c, k] = place;
+        pull[static_cast<std::size_t>(k)] += slope * routhian.multipliers[static_cast<std::size_t>(c)];
+        second.put(n + k, 2 * n + c, slope);
+        second.put(2 * n + c, n + k, slope);
+    }
+    for (int k = 0; k < n; ++k) routhian.gradient[static_cast<std::size_t>(n + k)] += pull[static_cast<std::size_t>(k)];
+    const SparseMatrix bend = derivative_of(pull, system.q);
+    for (const auto& [place, value] : bend.entries()) {
+        const auto row = static_cast<std::size_t>(n + place.first), column = static_cast<std::size_t>(n + place.second);
+        second.put(n + place.first, n + place.second, second(row, column) + value);
+    }
+    for (const Constraint& constraint : system.constraints) routhian.gradient.push_back(constraint.value);
+    routhian.z.insert(routhian.z.end(), routhian.multipliers.begin(), routhian.multipliers.end());
+    routhian.second = second;
+}
+
+}  // namespace
+
 Routhian reduce(const System& system, const std::vector<int>& cyclic) {
     Routhian routhian;
     routhian.cyclic = cyclic;
@@ -147,6 +176,7 @@ Routhian reduce(const System& system, const std::vector<int>& cyclic) {
               std::tuple{&system.force_v, n, 0}, std::tuple{&system.force_q, n, n}})
             for (const auto& [place, value] : matrix->entries())
                 routhian.second.put(row + place.first, column + place.second, value);
+        if (!system.constraints.empty()) add_constraints(system, routhian);
         return routhian;
     }
     routhian.gradient = gradient_of(terms, routhian.z);

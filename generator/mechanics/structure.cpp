@@ -242,27 +242,33 @@ private:
     }
 
     void general() {
-        const std::vector<int> cyclic = general_.full ? std::vector<int>{} : find_cyclic(scene_, system_);
+        const bool constrained = !system_.constraints.empty();
+        const std::vector<int> cyclic =
+            general_.full || constrained ? std::vector<int>{} : find_cyclic(scene_, system_);
         general_.routhian = reduce(system_, cyclic);
-        const int active = static_cast<int>(general_.routhian.active.size());
+        const int active = static_cast<int>(general_.routhian.active.size()),
+                  blocks = active + static_cast<int>(system_.constraints.size());
+        if (constrained) constraint_finding();
         if (general_.full) {
             Group all;
-            for (int k = 0; k < active; ++k) all.coordinates.push_back(k);
-            all.bandwidth = active - 1;
+            for (int k = 0; k < blocks; ++k) all.coordinates.push_back(k);
+            all.bandwidth = blocks - 1;
             result_.groups = {all};
             return;
         }
         linearity();
         find("cyclic coordinates", !cyclic.empty(),
-             cyclic.empty()
+             constrained ? "none is looked for beside constraints"
+             : cyclic.empty()
                  ? "every coordinate itself occurs, or its velocity more than squared, or its mass may vanish"
                  : names(cyclic) +
                        ": L holds only the velocity, so the momentum is constant and the motion "
                        "follows from it without equations");
-        Couplings couplings(static_cast<std::size_t>(active));
+        Couplings couplings(static_cast<std::size_t>(blocks));
+        const auto block_of = [&](int slot) { return slot < active ? slot : slot - active; };
         for (const auto& [place, value] : general_.routhian.second.entries())
-            if (place.first < 2 * active && place.second < 2 * active)
-                couplings.add(place.first % active, place.second % active);
+            if (constrained || (place.first < 2 * active && place.second < 2 * active))
+                couplings.add(block_of(place.first), block_of(place.second));
         result_.groups = couplings.groups();
         if (!cyclic.empty() && result_.groups.size() > 1) {  // one multiplier may couple all of them
             Group all;
@@ -279,7 +285,17 @@ private:
                  : fmt::format("{} of {} second derivatives of L are not zero, and only they are computed", present,
                                size * size));
         describe_groups();
-        if (cyclic.empty()) repetition();
+        if (cyclic.empty() && !constrained) repetition();
+    }
+
+    void constraint_finding() {
+        std::string list;
+        for (const Constraint& constraint : scene_.constraints)
+            if (list.size() < 200) list += (list.empty() ? "" : ", ") + constraint.written;
+        const std::size_t count = scene_.constraints.size();
+        find("constraints", true,
+             fmt::format("{} ({}): {} of {} coordinates are free, and multipliers at the nodes of a step keep the rest",
+                         count == 1 ? "one" : std::to_string(count), list, static_cast<std::size_t>(n_) - count, n_));
     }
 
     // Terms of V, or of L, that are one formula of many variables.
@@ -450,7 +466,8 @@ private:
         const auto listed = [&](const Group& group) {
             std::vector<int> coordinates;
             for (const int k : group.coordinates)
-                coordinates.push_back(in.empty() ? k : in[static_cast<std::size_t>(k)]);
+                if (in.empty() || k < static_cast<int>(in.size()))  // not a constraint
+                    coordinates.push_back(in.empty() ? k : in[static_cast<std::size_t>(k)]);
             return names(coordinates);
         };
         std::string reason;

@@ -35,14 +35,16 @@ struct ClosedSolution {
 struct Routhian {
     std::vector<int> active, cyclic;  // coordinates, in scene order
     std::vector<GiNaC::symbol> P;     // one a cyclic coordinate
-    std::vector<GiNaC::symbol> z;     // 2 active + cyclic
+    // One a constraint; with constraints nothing is cyclic, and R = L + phi . multipliers.
+    std::vector<GiNaC::symbol> multipliers;
+    std::vector<GiNaC::symbol> z;     // 2 active + cyclic + multipliers
     std::vector<GiNaC::ex> gradient;  // dR/dz; beside dR/dq stands the force F; dR/dP = -v of the cyclic
     SparseMatrix second;              // its derivative in z, not symmetric where forces are
 };
 
 // Coordinates whose equations are solved together, in an order that keeps coupled ones near.
 struct Group {
-    std::vector<int> coordinates;  // indices into the unknowns' coordinates
+    std::vector<int> coordinates;  // indices into the unknowns' coordinates, and after these into the constraints
     int bandwidth = 0;             // the largest distance in this order of two that are coupled
 };
 

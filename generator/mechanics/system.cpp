@@ -15,7 +15,7 @@
 #include <set>
 
 #include "generator/graph/notation.hpp"
-#include "generator/mechanics/elimination.hpp"
+#include "generator/mechanics/mass_equations.hpp"
 #include "generator/mechanics/sample.hpp"
 
 namespace lobatto {
@@ -168,30 +168,19 @@ private:
 
 // Refuses a mass matrix that is singular near the start.
 void check_mass(const Scene& scene, const System& system) {
-    std::vector<ex> entries;
-    std::vector<std::pair<int, int>> places;
-    for (const auto& [place, value] : system.momentum_v.entries()) {
-        places.push_back(place);
-        entries.push_back(value);
-    }
-    const auto elimination_at = [&](Formulas& formulas) {
-        const std::vector<Sized> values = formulas.evaluate_sized(formulas.convert(entries));
-        std::map<std::pair<int, int>, Sized> matrix;
-        for (std::size_t i = 0; i < places.size(); ++i) matrix[places[i]] = values[i];
-        return eliminate(matrix, std::vector<cln::cl_R>(static_cast<std::size_t>(system.n), cln::cl_R(0)));
-    };
     for (int attempt = 0;; ++attempt) {
         try {
             Formulas formulas;
             NearStart(scene, attempt).set_all(formulas);
-            const Elimination elimination = elimination_at(formulas);
-            if (elimination.singular)
-                refuse(scene,
-                       "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
-                       "do not follow from momenta. No kinetic energy opposes the direction " +
-                           direction_text(system, elimination.vector) +
-                           "; add the missing mass, or remove a coordinate");
-            break;
+            MassEquations equations(system, formulas);
+            const Elimination elimination = equations.eliminate({});
+            if (!elimination.singular) break;
+            if (const std::string dependent = equations.dependent_constraints(elimination); !dependent.empty())
+                scene.source.fail(system.constraints.front().at, dependent);
+            refuse(scene,
+                   "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
+                   "do not follow from momenta. No kinetic energy opposes the direction " +
+                       direction_text(system, elimination.vector) + "; add the missing mass, or remove a coordinate");
         } catch (const DomainError&) {
             if (attempt == sample_attempts) throw;
         }
@@ -209,7 +198,7 @@ std::string slope_text(const std::string& of, const GiNaC::symbol& by, const ex&
 std::string direction_text(const System& system, const std::vector<cln::cl_R>& direction) {
     std::string text;
     int shown = 0;
-    for (std::size_t k = 0; k < direction.size(); ++k) {
+    for (std::size_t k = 0; k < system.v.size(); ++k) {
         if (cln::abs(direction[k]) < cln::expt(cln::cl_RA(10), -30)) continue;
         if (++shown > 8) return text + ", ...";
         text += (text.empty() ? "" : ", ") + system.v[k].get_name() + " = " + decimal(direction[k], 6);
@@ -331,6 +320,21 @@ private:
         for (std::size_t k = 0; k < system_.force.size(); ++k) system_.force[k] += system_.outer_force[k];
         system_.linear = true;
         system_.separable = true;
+        differentiate_constraints();
+    }
+
+    void differentiate_constraints() {
+        system_.constraints = scene_.constraints;
+        if (system_.constraints.empty()) return;
+        std::vector<ex> values;
+        for (const Constraint& constraint : system_.constraints) {
+            values.push_back(constraint.value);
+            system_.constraint_t.push_back(constraint.value.diff(system_.t));
+            if (constraint.value.has(system_.t)) system_.autonomous = false;
+        }
+        system_.constraint_q = derivative_of(values, system_.q);
+        system_.linear = false;
+        refuse_separable("the constraint " + system_.constraints.front().written + " pulls on coordinates");
     }
 
     // dp/dv, dp/dq, df/dv, df/dq, whose entries are of these kinds, one after another.

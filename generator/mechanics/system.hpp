@@ -29,7 +29,11 @@ struct System {
     // n x n each, what vanishes identically left out: dp/dv, dp/dq, df/dv, df/dq.
     SparseMatrix momentum_v, momentum_q, force_v, force_q;
 
-    bool autonomous = true;  // neither L nor F depends on the time
+    std::vector<Constraint> constraints;  // phi(q, t) = 0
+    std::vector<GiNaC::ex> constraint_t;  // dphi/dt at fixed q, one each
+    SparseMatrix constraint_q;            // G = dphi/dq, one row each
+
+    bool autonomous = true;  // neither L nor F nor a constraint depends on the time
     bool linear = false;     // p and f are affine in q and v, with constant coefficients
     // L = 1/2 v^T M v - V(q, t) with a constant M, and forces F(q, t): only interior nodes are implicit (D11 ... D17).
     bool separable = false;

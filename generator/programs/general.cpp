@@ -27,9 +27,13 @@ private:
     // g = dR/dz with the forces beside dR/dq, and its derivative.
     void node() {
         const Routhian& routhian = d_.structure.routhian();
-        const std::size_t active = routhian.active.size();
+        const std::size_t active = routhian.active.size(), multipliers = routhian.multipliers.size();
         const GiNaC::exmap before = symbols_;
-        for (std::size_t i = 0; i < routhian.z.size(); ++i) {
+        for (std::size_t c = 0; c < multipliers; ++c) {
+            const std::size_t i = routhian.z.size() - multipliers + c;
+            symbols_[routhian.z[i]] = g().input({at("z", i), routhian.z[i].get_name(), Phase::iterate, 0.1});
+        }
+        for (std::size_t i = 0; i + multipliers < routhian.z.size(); ++i) {
             const std::size_t kind = i / active;  // 0: v, 1: q, 2: P
             const std::vector<int>& coordinates = kind < 2 ? routhian.active : routhian.cyclic;
             const auto k = static_cast<std::size_t>(coordinates[i - std::min<std::size_t>(kind, 2) * active]);
@@ -69,9 +73,24 @@ private:
         }
         p_.programs.push_back(std::move(legendre));
         p_.programs.push_back(std::move(stage));
+        constraints();
         if (d_.scene.clock) p_.programs.push_back({"clock", {{"", convert(d_.scene.clock->rate), Effect::give_back}}});
         if (d_.scene.outputs.energy || d_.scene.clock)
             p_.programs.push_back({"energy", {{"", energy(), Effect::give_back}}});
+    }
+
+    // (D44) phi, dphi/dt and G.
+    void constraints() {
+        if (d_.system.constraints.empty()) return;
+        Program program{"constraint", {}};
+        std::size_t c = 0, e = 0;
+        for (const Constraint& constraint : d_.system.constraints)
+            program.outputs.push_back({at("phi", c++), convert(constraint.value)});
+        c = 0;
+        for (const ex& rate : d_.system.constraint_t) program.outputs.push_back({at("phi_t", c++), convert(rate)});
+        for (const auto& [place, slope] : d_.system.constraint_q.entries())
+            program.outputs.push_back({at("G", e++), convert(slope)});
+        p_.programs.push_back(std::move(program));
     }
 
     std::vector<GiNaC::symbol> motion_symbols() const {

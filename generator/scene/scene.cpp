@@ -42,8 +42,8 @@ public:
         : source_(source),
           document_(read_document(source)),
           root_(source, document_.entries, {1, 1}, "a scene",
-                {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "method", "run",
-                 "output"}),
+                {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "constraints",
+                 "method", "run", "output"}),
           system_(source, root_, scene_) {}
 
     Scene run() {
@@ -158,7 +158,7 @@ private:
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
         const Table table(source_, table_of(source_, section, example), section.at, "[run]",
-                          {"step", "steps_per_period", "period", "until", "error", "beyond_horizon"});
+                          {"step", "steps_per_period", "period", "until", "error", "beyond_horizon", "assemble"});
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
         const Entry* period = table.find("period");
@@ -192,6 +192,11 @@ private:
             fail(until.value.at,
                  fmt::format("the run has {} steps; at most 9e15: make until smaller or the step larger",
                              shown(end / h)));
+        if (const Entry* assemble = table.find("assemble")) {
+            scene_.run.assemble = boolean_of(source_, *assemble);
+            if (scene_.constraints.empty())
+                fail(assemble->at, "without constraints there is nothing to assemble; leave it out");
+        }
         if (const Entry* beyond = table.find("beyond_horizon"))
             scene_.run.beyond_horizon = boolean_of(source_, *beyond);
         if (const Entry* error = table.find("error")) {

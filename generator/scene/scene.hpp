@@ -39,6 +39,7 @@ struct Run {
     GiNaC::ex until;              // end time, >= 0; in parameters
     double error = 0;             // that is wanted, relative to the amplitude of the motion; 0: nothing is said
     bool beyond_horizon = false;  // goes on where nothing of the motion is left: statistics of chaos
+    bool assemble = false;        // a start that does not keep the constraints is moved to the nearest that does
 };
 
 // An event: the value crosses zero. Located on the step's own polynomial.
@@ -70,6 +71,15 @@ struct Clock {
     GiNaC::ex lagrangian;                     // then: L(q, w / g), with w = dq/dtau
 };
 
+// A holonomic constraint: phi(q, t) = 0 at all times.
+struct Constraint {
+    std::string name;            // an identifier; element 3 of an array link is link_3
+    std::string written = name;  // in the scene: link[3]
+    std::string text = {};       // of its equation as written, white space collapsed
+    GiNaC::ex value = 0;         // phi: left side minus right side, in positions, time and parameters
+    Position at = {};
+};
+
 // Initial rates are given either as velocities or as momenta, for all coordinates.
 enum class Start { velocity, momentum };
 
@@ -92,6 +102,7 @@ struct Scene {
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;
+    std::vector<Constraint> constraints;
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
     std::optional<Clock> clock;

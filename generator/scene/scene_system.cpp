@@ -16,7 +16,7 @@ namespace lobatto {
 namespace {
 
 constexpr std::size_t most_coordinates = 4096, most_parameters = 10000;
-constexpr std::size_t longest_unit = 40;
+constexpr std::size_t longest_unit = 40, most_constraints = 4096, longest_equation = 1000;
 
 // A key with brackets, "x[i]", stands in quotes, which are not a part of it.
 Text text_of_key(const Entry& entry) {
@@ -57,6 +57,7 @@ void SystemReader::read() {
     read_definitions();
     read_lagrangian();
     read_forces();
+    read_constraints();
     names_.records = false;
     read_places();
     names_.records = true;
@@ -304,6 +305,85 @@ void SystemReader::read_forces() {
             coordinate.force += evaluate(source_, formula, scope, indices).expression;
         }
     }
+}
+
+// rod = "x^2 + y^2 = l^2", or "link[i]" = { equation = "...", count = "n" } for i = 1 ... n.
+void SystemReader::read_constraints() {
+    const Entry* section = root_.find("constraints");
+    if (section == nullptr) return;
+    const std::string example = "[constraints] with lines such as rod = \"x^2 + y^2 = l^2\"";
+    const std::vector<Entry>& entries = table_of(source_, *section, example);
+    if (entries.empty())
+        fail(section->at, "there is no constraint; add rod = \"x^2 + y^2 = l^2\", or remove the section");
+    for (const Entry& entry : entries) read_constraint(entry);
+}
+
+void SystemReader::read_constraint(const Entry& entry) {
+    const Subject subject =
+        parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, "[constraints]", true, {}});
+    const std::string name(subject.name.text);
+    declarations_.declare(name, subject.name.at, "constraint");
+    const bool array = subject.subscripted;
+    if (array && subject.indices.size() != 1)
+        fail(subject.subscript.at.at,
+             fmt::format("an array of constraints has one index without another meaning: write \"{}[i]\"", name));
+    const Entry* equation = &entry;
+    long count = 1;
+    if (entry.value.kind == Value::Kind::table) {
+        const Table table(source_, entry.value.entries, entry.at, "constraint " + name, {"equation", "count"});
+        equation = &table.get("equation", "for example equation = \"x^2 + y^2 = l^2\"");
+        const Entry* given = table.find("count");
+        if (given != nullptr && !array)
+            fail(given->at,
+                 fmt::format("a count makes an array: write \"{}[i]\" = {{ equation = ..., count = ... }}", name));
+        if (given != nullptr) {
+            const Scope scope{&names_, "count", false, {}};
+            count = evaluate_whole(source_, parse_formula(source_, formula_of(source_, *given), scope), scope);
+            if (count < 1 || count > static_cast<long>(most_constraints))
+                fail(given->value.at, fmt::format("count is {}; at least 1 and at most {}", count, most_constraints));
+        } else if (array) {
+            fail(entry.at, fmt::format("how many constraints {}[i] are there? add count = 3", name));
+        }
+    } else if (array) {
+        fail(entry.at, fmt::format("an array of constraints has a count: write \"{}[i]\" = {{ equation = \"...\", "
+                                   "count = 3 }}",
+                                   name));
+    }
+    if (equation->value.kind != Value::Kind::text)
+        fail(equation->value.at,
+             fmt::format("a constraint must be an equation in quotes such as \"x^2 + y^2 = l^2\", not {}",
+                         equation->value.kind_name()));
+    if (array) declarations_.declare_elements(name, entry.at, static_cast<std::size_t>(count));
+    Scope scope{&names_, "the constraint " + name, true, {}};
+    if (array) scope.indices = {std::string(subject.indices.front().text)};
+    const EventSyntax sides = parse_crossing(source_, equation->value.text, scope);
+    if (sides.direction != 0)
+        fail(equation->value.at, "a constraint holds at all times: leave out 'rising' or 'falling'");
+    for (long i = 1; i <= count; ++i) {
+        const std::vector<long> indices(scope.indices.size(), i);
+        const Operand value = evaluate(source_, sides.difference, scope, indices);
+        Constraint constraint{array ? element_name(name, static_cast<std::size_t>(i)) : name};
+        if (array) constraint.written = fmt::format("{}[{}]", name, i);
+        constraint.text = collapsed(equation->value.text.value);
+        if (constraint.text.size() > longest_equation)
+            fail(equation->value.at,
+                 fmt::format("an equation of {} bytes; at most {}", constraint.text.size(), longest_equation));
+        constraint.value = value.expression;
+        constraint.at = equation->value.at;
+        if (value.velocities)
+            fail(constraint.at, fmt::format("the constraint {} holds a velocity; a constraint is an equation of "
+                                            "positions and the time (holonomic)",
+                                            constraint.written));
+        const GiNaC::exset held = symbols_of(constraint.value);
+        if (std::none_of(scene_.coordinates.begin(), scene_.coordinates.end(),
+                         [&](const Coordinate& c) { return held.count(c.position) > 0; }))
+            fail(constraint.at,
+                 fmt::format("the constraint {} holds no coordinate; mend it, or remove it", constraint.written));
+        scene_.constraints.push_back(constraint);
+    }
+    if (scene_.constraints.size() >= scene_.coordinates.size())
+        fail(entry.at, fmt::format("{} constraints on {} coordinates up to here: nothing is left that could move",
+                                   scene_.constraints.size(), scene_.coordinates.size()));
 }
 
 const SystemReader::Group& SystemReader::group_of(const Subject& subject) const {

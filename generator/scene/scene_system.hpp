@@ -57,6 +57,8 @@ private:
     void read_definitions();
     void read_lagrangian();
     void read_forces();
+    void read_constraints();
+    void read_constraint(const Entry& entry);
     const Group& group_of(const Subject& subject) const;
     void read_places();
     void read_initial_values();

@@ -167,6 +167,23 @@ lobatto_status LoadedStepper<real>::velocity(real time, const std::vector<real>&
 }
 
 template <class real>
+void LoadedStepper<real>::constraint(real time, const std::vector<real>& q, std::vector<real>& phi,
+                                     std::vector<real>& phi_t, std::vector<real>& G) const {
+    const auto count = static_cast<std::size_t>(kernel_->constraints);
+    phi.resize(count);
+    phi_t.resize(count);
+    G.resize(count * q.size());
+    if (count > 0) kernel_->constraint(stepper_, &time, q.data(), phi.data(), phi_t.data(), G.data());
+}
+
+template <class real>
+std::vector<real> LoadedStepper<real>::multipliers() const {
+    std::vector<real> lambda(static_cast<std::size_t>(kernel_->constraints));
+    if (!lambda.empty()) kernel_->multipliers(stepper_, lambda.data());
+    return lambda;
+}
+
+template <class real>
 void LoadedStepper<real>::slopes(real time, const std::vector<real>& q, const std::vector<real>& velocity,
                                  std::vector<real>& Lv, std::vector<real>& Lq) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);

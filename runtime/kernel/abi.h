@@ -8,7 +8,8 @@
  *   matrices  row-major.
  *   X         unknowns, node-major, N. Form separable: X[i * n + k] is coordinate k at interior node i + 2 (the paper's
  *             q_xi, q_{1-xi} for four points). Form general: X[j * n_a + a] is the active coordinate a at control point
- *             j + 1, the last of which is the end of the step; then kappa of every cyclic coordinate.
+ *             j + 1, the last of which is the end of the step, or a multiplier at control point j (n_a coordinates and
+ *             the multipliers of the constraints together); then kappa of every cyclic coordinate.
  * Every function that can fail returns a lobatto_status and leaves the state of the last good step untouched. No
  * function allocates, locks, prints or keeps a pointer it was given. A stepper may keep its work arrays in its memory:
  * do not use one from two threads, not even through `const void*`.
@@ -22,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 5u
+#define LOBATTO_ABI_VERSION 6u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -31,7 +32,8 @@ typedef enum lobatto_status {
     LOBATTO_SINGULAR_JACOBIAN = 3, /* the Jacobian of the step's equations has no inverse */
     LOBATTO_SINGULAR_MASS = 4,     /* the mass matrix has no inverse for these parameters or at this state */
     LOBATTO_TIME_STANDS_STILL = 5, /* t + h equals t in this precision */
-    LOBATTO_UNSUPPORTED = 6        /* the kernel was compiled without this */
+    LOBATTO_UNSUPPORTED = 6,       /* the kernel was compiled without this */
+    LOBATTO_OFF_CONSTRAINTS = 9    /* a start does not keep the constraints; 7 and 8 are what sweeps say of motions */
 } lobatto_status;
 
 typedef enum lobatto_real {
@@ -91,6 +93,7 @@ typedef struct lobatto_kernel {
     int32_t autonomous;     /* 1: no formula depends on time */
     int32_t clocked;        /* 1: steps are equally long in the time of a clock */
     int32_t linear;         /* 1: the equations of motion are linear */
+    int32_t constraints;    /* phi(q, t) = 0 */
     int32_t has_energy;     /* 0: `energy` is unsupported */
     int32_t has_tangent;    /* 0: `tangent` is unsupported */
     int32_t has_dense;      /* 0: `dense` is unsupported, in `advance` too */
@@ -120,6 +123,9 @@ typedef struct lobatto_kernel {
                         void* velocity); /* its inverse, n */
     void (*slopes)(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv,
                    void* Lq); /* dL/dq' and dL/dq + forces, n each */
+    void (*constraint)(const void* stepper, const void* time, const void* q, void* phi, void* phi_t,
+                       void* G); /* phi, dphi/dt at fixed q, and dphi/dq, constraints x n; null without constraints */
+    void (*multipliers)(const void* stepper, void* lambda); /* at the end of the last step; null without constraints */
     int32_t (*residual)(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                         void* F); /* the step's equations at X, N */
     int32_t (*jacobian)(const void* stepper, const void* time, const void* q, const void* p, const void* X,

@@ -62,6 +62,7 @@ struct Export {
     // Beside lanes, which have functions of their own, a single trajectory takes steps and does no more.
     static constexpr bool is_whole = E::lanes == 0;
     static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
+    static constexpr int constraint_count = constraints_of<K>();
     static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
     using S = std::conditional_t<(event_count > 0), WatchedStepper<K>, Stepper<K>>;
 
@@ -277,6 +278,23 @@ struct Export {
     static void slopes(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv, void* Lq) {
         of(stepper).slopes(*in(time), in(q), in(velocity), out(Lv), out(Lq));
     }
+    static void read_constraint(const void* stepper, const void* time, const void* q, void* phi, void* phi_t, void* G) {
+        if constexpr (constraint_count > 0) {
+            real entries[K::constraint_entries];
+            Formulas<K>::constraint(of(stepper).coefficients, *in(time), in(q), out(phi), out(phi_t), +entries);
+            for (int i = 0; i < constraint_count * n; ++i) out(G)[i] = real(0);
+            for (int e = 0; e < K::constraint_entries; ++e)
+                out(G)[K::constraint_row[e] * n + K::constraint_column[e]] = entries[e];
+        }
+    }
+    static void read_multipliers(const void* stepper, void* lambda) {
+        if constexpr (constraint_count > 0) {
+            for (int c = 0; c < constraint_count; ++c) out(lambda)[c] = of(stepper).last_multiplier[c];
+        }
+    }
+    static constexpr auto constraint = constraint_count > 0 ? read_constraint : nullptr;
+    static constexpr auto multipliers = constraint_count > 0 ? read_multipliers : nullptr;
+
     static std::int32_t residual(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                                  void* F) {
         if constexpr (is_whole) return code(of(stepper).residual(*in(time), in(q), in(p), in(X), out(F)));
@@ -322,6 +340,7 @@ struct Export {
                                              K::autonomous ? 1 : 0,
                                              is_clocked<K>() ? 1 : 0,
                                              K::linear ? 1 : 0,
+                                             constraint_count,
                                              K::has_energy ? 1 : 0,
                                              has_tangent ? 1 : 0,
                                              has_dense ? 1 : 0,
@@ -339,6 +358,8 @@ struct Export {
                                              momentum,
                                              velocity,
                                              slopes,
+                                             constraint,
+                                             multipliers,
                                              residual,
                                              jacobian,
                                              tangent,

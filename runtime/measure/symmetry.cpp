@@ -4,6 +4,7 @@
 //
 // The condition is linear in the entries of B and d: with p = dL/dv and f = dL/dq + F at a sampled (t, q, v)
 //     sum_kl B_kl (f_k q_l + p_k v_l) + sum_k d_k f_k = 0.
+// Constraints phi(q, t) = 0 must not change either: with G = dphi/dq, sum_kl B_kl G_ck q_l + sum_k d_k G_ck = 0.
 #include "runtime/measure/symmetry.hpp"
 
 #include <fmt/format.h>
@@ -147,6 +148,19 @@ Samples sample_conditions(const Kernel& kernel, LoadedStepper<double>& stepper, 
         sizes.row(row).tail(n) = f0.cwiseAbs();
         sizes.row(row + 1).tail(n) = added.cwiseAbs();
         row += 2;
+        if (kernel->constraints == 0 || row >= 2 * wanted) continue;
+        std::vector<double> phi, phi_t, G;
+        stepper.constraint(time, sample, phi, phi_t, G);
+        for (int i = 0; i < 2; ++i, ++row) {  // two sums of the constraints, which do not change either
+            VectorXd slope = VectorXd::Zero(n);
+            for (Eigen::Index c = 0; c < kernel->constraints; ++c)
+                slope += random() * Eigen::Map<const VectorXd>(G.data() + c * n, n);
+            if (const double size = slope.cwiseAbs().maxCoeff(); size > 0) slope /= size;
+            for (Eigen::Index unknown = 0; unknown < entries; ++unknown)
+                conditions(row, unknown) = slope(unknown / n) * x(unknown % n);
+            conditions.row(row).tail(n) = slope;
+            sizes.row(row) = conditions.row(row).cwiseAbs();
+        }
     }
     if (row < 2 * wanted)
         throw ComputationError("symmetries cannot be looked for: the forces are not finite around the start");

@@ -281,6 +281,10 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
                 "maps";
             advice = "to compile it from a scene whose [output] asks for it";
             break;
+        case LOBATTO_OFF_CONSTRAINTS:
+            why = "the start does not keep the constraints: its positions or its momenta are off";
+            advice = "positions and velocities that keep them, or assemble = true under [run] of the scene";
+            break;
         case LOBATTO_TIME_STANDS_STILL:
             if (request.arrivals.interval != 0) {
                 why = "the clock is not above 0 along the step, or so small that time stands still";

@@ -23,6 +23,7 @@ struct HandwrittenPlane : HandwrittenKernel, Tables {
     static constexpr int entry_row[5] = {0, 1, 1, 2, 2};
     static constexpr int entry_column[5] = {0, 1, 2, 1, 2};
     static constexpr int mass_entries = 2, mass_row[2] = {0, 1}, mass_column[2] = {0, 1};
+    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
 };
 
 // The spherical pendulum, polar angle x, azimuth y: L = (x'^2 + sin(x)^2 y'^2)/2 + cos x, P = sin(x)^2 y',

@@ -20,9 +20,10 @@
 //   between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal, D, and
 //   taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
 // Form::general: see steppers/general.hpp. `clocked` says that its Lagrangian is one in the time tau of a clock,
-//   clock(k, q) = dt/dtau (steppers/clocked.hpp). `angles` is how many arguments of sine and cosine `stage` holds;
-//   where there are any it takes one more argument, AnglesAnew by default, which gives their sines and cosines
-//   (base/angles.hpp).
+//   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
+//   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq. `angles`
+//   is how many arguments of sine and cosine `stage` holds; where there are any it takes one more argument, AnglesAnew
+//   by default, which gives their sines and cosines (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 
@@ -43,7 +44,8 @@ enum class Status : std::int32_t {
     singular_jacobian = 3,
     singular_mass = 4,
     time_stands_still = 5,
-    unsupported = 6
+    unsupported = 6,
+    off_constraints = 9
 };
 
 // The same values as lobatto_form in abi.h.
@@ -71,6 +73,7 @@ struct Formulas {
     LOBATTO_WITH_TIME(event)
     LOBATTO_WITH_TIME(energy)
     LOBATTO_WITH_TIME(clock)
+    LOBATTO_WITH_TIME(constraint)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>
     LOBATTO_INLINE static void along_rows(const Given& k, [[maybe_unused]] Time time, Position position, Slope slope) {
@@ -103,6 +106,15 @@ constexpr bool is_clean() {
 template <class K>
 constexpr bool is_clocked() {
     return stepping_of<K>() == Stepping::clocked;
+}
+
+// Systems with constant mass have none: what pulls on coordinates is of the general form.
+template <class K>
+constexpr int constraints_of() {
+    if constexpr (K::form == Form::general)
+        return K::constraints;
+    else
+        return 0;
 }
 
 // Whether a coordinate may move as soon as its acceleration is known.

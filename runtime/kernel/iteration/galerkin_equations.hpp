@@ -15,6 +15,12 @@
 //     P1 = P,  cyclic positions + h sum_i b_i v_c(i).
 // The unknowns are the displacements Y_j = X_j - X_0, j = 1 ... m, and kappa.
 //
+// Constraints phi(q, t) = 0, G = dphi/dq, add L + phi . Lambda, where Lambda_i belongs to node i and control points are
+// nodes (Lobatto; D45): z and g have one slot more for each, the multiplier and phi itself. Their equations and
+// unknowns are those of one more block each,
+//     phi(X_j, t + x_j h) = 0, j = 1 ... m;  Lambda_0 ... Lambda_(m - 1);
+// Lambda_m follows from the momentum at the end (iteration/velocity_of_momentum.hpp).
+//
 // A kernel of this form provides: active, cyclic and their tables; nodes (r), controls (m + 1), c, b, control, B, D,
 // extrapolation (l_k(1 + x_j)), legendre_polynomial (pi_i, all zero for Gauss); the tables of base/solve.hpp for the
 // active coordinates; node(k, z, g, H), slope(k, z, g); entries, entry_row, entry_column of H;
@@ -31,20 +37,25 @@
 
 namespace lobatto {
 
-// The three kinds of slots of z.
-enum class Slot { velocity, position, momentum };
+// The kinds of slots of z.
+enum class Slot { velocity, position, momentum, multiplier };
 
 // The tables of a kernel's nodes, in the sums that a step needs. Where a table has zeros is known to the compiler.
 template <class K>
 struct NodeTables {
     using real = typename K::real;
-    static constexpr int active = K::active, cyclic = K::cyclic, Z = 2 * active + cyclic;
+    static constexpr int active = K::active, cyclic = K::cyclic, constraints = K::constraints;
+    static constexpr int blocks = active + constraints, Z = 2 * active + cyclic + constraints;
     static constexpr int r = K::nodes, m = K::controls - 1;
+    static_assert(cyclic == 0 || constraints == 0, "with constraints all coordinates are active");
 
     static constexpr Slot kind(int slot) {
-        return slot < active ? Slot::velocity : slot < 2 * active ? Slot::position : Slot::momentum;
+        return slot < active                ? Slot::velocity
+               : slot < 2 * active          ? Slot::position
+               : slot < 2 * active + cyclic ? Slot::momentum
+                                            : Slot::multiplier;
     }
-    // The block of unknowns that a slot depends on: a coordinate, or after them a kappa.
+    // The block of unknowns that a slot depends on: a coordinate, or after them a kappa or a multiplier.
     static constexpr int block(int slot) { return slot < active ? slot : slot - active; }
 
     static constexpr bool has_kappa() {
@@ -99,9 +110,11 @@ struct GalerkinEquations : Motion<K> {
     using Motion<K>::n, Motion<K>::coefficients, Motion<K>::step_size;
     using Tables = NodeTables<K>;
     static constexpr int active = K::active, cyclic = K::cyclic, Z = Tables::Z, r = Tables::r, m = Tables::m;
+    static constexpr int constraints = Tables::constraints, blocks = Tables::blocks;
     static constexpr int kappas = Tables::has_kappa() ? cyclic : 0;
     static constexpr bool nodal = Tables::is_nodal();
-    static constexpr int N = active * m + kappas;
+    static_assert(nodal || constraints == 0, "constraints hold at control points, and multipliers belong to nodes");
+    static constexpr int N = blocks * m + kappas;
     static constexpr int nodes = K::nodes;
     static constexpr int room = N > 0 ? N : 1, entry_room = K::entries > 0 ? K::entries : 1;
     static constexpr int cyclic_room = cyclic > 0 ? cyclic : 1, mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
@@ -111,7 +124,7 @@ struct GalerkinEquations : Motion<K> {
         bool factor() { return true; }
         void solve(real*) const {}
     };
-    using Layout = Grouped<K, active, m, kappas>;
+    using Layout = Grouped<K, blocks, m, kappas>;
     using Matrix = std::conditional_t<(N > 0), GroupedMatrix<real, Layout>, Empty>;
     struct Arrays {
         real Y[room], delta[room], kappa_scale[cyclic_room];
@@ -124,6 +137,7 @@ struct GalerkinEquations : Motion<K> {
     Workspace<Arrays> workspace;
 
     // R at the positions X of the control points 1 ... m, control-major, and kappa; rows j * n_a + a, then kappa's.
+    // With constraints Lambda_(j - 1) follows each X_j, and phi(X_j) each row.
     Status residual(real time, const real* position, const real* momentum, const real* X, real* F) const {
         workspace.with([&](Arrays& a) {
             take_unknowns(position, X, a.Y);
@@ -132,10 +146,9 @@ struct GalerkinEquations : Motion<K> {
                 Formulas<K>::slope(coefficients, time + K::c[i] * step_size, a.z + i * Z, a.g + i * Z);
             }
             sum_over_nodes(a.g, a.delta);
-            for (int b = 0; b < active; ++b) {
-                a.delta[Layout::index(b, 0)] += momentum[K::active_index[b]];
-                for (int j = 0; j < m; ++j) F[j * active + b] = a.delta[Layout::index(b, j)];
-            }
+            for (int b = 0; b < active; ++b) a.delta[Layout::index(b, 0)] += momentum[K::active_index[b]];
+            for (int b = 0; b < blocks; ++b)
+                for (int j = 0; j < m; ++j) F[j * blocks + b] = a.delta[Layout::index(b, j)];
             for (int c = 0; c < kappas; ++c) F[active * m + c] = a.delta[active * m + c];
         });
         return Status::ok;
@@ -148,13 +161,13 @@ struct GalerkinEquations : Motion<K> {
             evaluate_nodes(time, position, momentum, a.Y, a);
             a.matrix.clear();
             assemble(a.H, entry_room, a.matrix);
-            const auto index = [](int u, int j) { return u < active ? j * active + u : active * (m - 1) + u; };
+            const auto index = [](int u, int j) { return u < blocks ? j * blocks + u : blocks * (m - 1) + u; };
             for (int i = 0; i < N * N; ++i) J[i] = real(0);
             for (int e = 0; e < K::entries; ++e) {
                 const int u = Tables::block(K::entry_row[e]), v = Tables::block(K::entry_column[e]);
-                if ((u >= active || v >= active) && kappas == 0) continue;
-                for (int j = 0; j < (u < active ? m : 1); ++j)
-                    for (int k = 0; k < (v < active ? m : 1); ++k)
+                if ((u >= blocks || v >= blocks) && kappas == 0) continue;
+                for (int j = 0; j < (u < blocks ? m : 1); ++j)
+                    for (int k = 0; k < (v < blocks ? m : 1); ++k)
                         J[index(u, j) * N + index(v, k)] = a.matrix(u, j, v, k);
             }
         });
@@ -165,7 +178,9 @@ protected:
     static void take_unknowns(const real* position, const real* X, real* Y_sorted) {
         for (int a = 0; a < active; ++a)
             for (int j = 0; j < m; ++j)
-                Y_sorted[Layout::index(a, j)] = X[j * active + a] - position[K::active_index[a]];
+                Y_sorted[Layout::index(a, j)] = X[j * blocks + a] - position[K::active_index[a]];
+        for (int c = active; c < blocks; ++c)
+            for (int j = 0; j < m; ++j) Y_sorted[Layout::index(c, j)] = X[j * blocks + c];
         for (int c = 0; c < kappas; ++c) Y_sorted[active * m + c] = X[active * m + c];
     }
 
@@ -186,6 +201,7 @@ protected:
         }
         for (int c = 0; c < cyclic; ++c)
             dz[2 * active + c] = kappas > 0 ? K::legendre_polynomial[i] * dX[active * m + c] : real(0);
+        for (int c = active; c < blocks; ++c) dz[active + c] = i < m ? dX[Layout::index(c, i)] : real(0);
     }
 
     void node_variables(const real* position, const real* momentum, const real* displacement, int i, real* z) const {
@@ -216,6 +232,8 @@ protected:
                 }
                 sum[Layout::index(a, j)] = from_velocity + step_size * from_position;
             }
+        for (int c = active; c < blocks; ++c)
+            for (int j = 0; j < m; ++j) sum[Layout::index(c, j)] = g[(j + 1) * Z + active + c];
         for (int c = 0; c < kappas; ++c) {
             real from_momentum = real(0);
             for (int i = 0; i < r; ++i)
@@ -271,6 +289,9 @@ protected:
             case Slot::momentum:
                 if constexpr (kappas > 0) assemble_entry<row, Slot::momentum>(H, stride, u, v, at);
                 break;
+            case Slot::multiplier:  // of dL/dq + G^T Lambda
+                for (int j = 0; j < m; ++j) at(u, j, v, j) += step_size * K::b[j] * H[j * stride];
+                break;
         }
     }
 
@@ -287,6 +308,11 @@ protected:
                     break;
                 case Slot::momentum:
                     if constexpr (kappas > 0) assemble_row<Slot::momentum>(H + e, stride, e, at);
+                    break;
+                case Slot::multiplier:  // of phi: an entry of G
+                    for (int j = 0; j < m; ++j)
+                        at(Tables::block(K::entry_row[e]), j, Tables::block(K::entry_column[e]), j) +=
+                            H[e + (j + 1) * stride];
                     break;
             }
         }

@@ -15,8 +15,8 @@ namespace lobatto {
 template <class K>
 struct GalerkinNewton : GalerkinEquations<K> {
     using Equations = GalerkinEquations<K>;
-    using Equations::n, Equations::active, Equations::cyclic, Equations::Z, Equations::r, Equations::m,
-        Equations::kappas, Equations::N, Equations::room, Equations::entry_room, Equations::coefficients,
+    using Equations::n, Equations::active, Equations::blocks, Equations::cyclic, Equations::Z, Equations::r,
+        Equations::m, Equations::kappas, Equations::N, Equations::room, Equations::entry_room, Equations::coefficients,
         Equations::step_size, Equations::q, Equations::p, Equations::iterations, Equations::increment,
         Equations::workspace;
     using typename Equations::real, typename Equations::Arrays, typename Equations::Matrix, typename Equations::Layout,
@@ -83,6 +83,8 @@ private:
             }
             if (change > e * size) e = change / size;
         }
+        for (int c = active; c < blocks; ++c)
+            for (int j = 0; j < m; ++j) a.Y[Layout::index(c, j)] += a.delta[Layout::index(c, j)];
         for (int c = 0; c < kappas; ++c) {
             real& kappa = a.Y[active * m + c];
             const real change = fabs(a.delta[active * m + c]);
@@ -150,6 +152,11 @@ private:
                 rounding[active * m + c] +=
                     fabs(step_size * K::b[i] * K::legendre_polynomial[i] * a.g[i * Z + 2 * active + c]);
         for (int b = 0; b < active; ++b) rounding[Layout::index(b, 0)] += fabs(p[K::active_index[b]]);
+        for (int e = 0; e < K::entries; ++e)  // phi at positions that are rounded
+            if (Tables::kind(K::entry_row[e]) == Slot::multiplier)
+                for (int j = 0; j < m; ++j)
+                    rounding[Layout::index(Tables::block(K::entry_row[e]), j)] +=
+                        fabs(a.H[(j + 1) * entry_room + e] * a.z[(j + 1) * Z + K::entry_column[e]]);
         for (int i = 0; i < N; ++i) rounding[i] *= a.delta[i] < real(0) ? real(-1) : real(1);
         a.matrix.solve(rounding);
         real most = real(0), largest = real(0);

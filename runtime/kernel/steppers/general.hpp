@@ -11,23 +11,18 @@
 #include "../base/solve.hpp"
 #include "../iteration/galerkin.hpp"
 #include "../iteration/galerkin_newton.hpp"
+#include "../iteration/velocity_of_momentum.hpp"
 
 namespace lobatto {
 
 template <class K>
 struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     using Newton = GalerkinNewton<K>;
-    using Newton::n, Newton::active, Newton::cyclic, Newton::Z, Newton::r, Newton::m, Newton::kappas, Newton::N,
-        Newton::room, Newton::entry_room, Newton::cyclic_room, Newton::coefficients, Newton::step_size, Newton::q,
-        Newton::p, Newton::iterations, Newton::increment, Newton::workspace;
+    using Newton::n, Newton::active, Newton::constraints, Newton::cyclic, Newton::Z, Newton::r, Newton::m,
+        Newton::kappas, Newton::N, Newton::room, Newton::entry_room, Newton::cyclic_room, Newton::coefficients,
+        Newton::step_size, Newton::q, Newton::p, Newton::iterations, Newton::increment, Newton::workspace;
     using typename Newton::real, typename Newton::Arrays, typename Newton::Layout, typename Newton::Nothing;
-    static constexpr int nodes = K::nodes, mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
-
-    using MassLayout = std::conditional_t<cyclic == 0, Grouped<K, n, 1, 0>, Whole<n>>;
-    struct MassArrays {
-        real p[n], entries[mass_room], residual[n], increment[n], next[n], trial[n];
-        GroupedMatrix<real, MassLayout> matrix;
-    };
+    static constexpr int nodes = K::nodes, multiplier_room = constraints > 0 ? constraints : 1;
 
     // Fixed-point iterations need the mass matrix of a node alone, which is full for them.
     static constexpr bool has_fixed_point = K::any_number && !K::linear && N > 0 && n <= most_full;
@@ -44,7 +39,8 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     mutable real cyclic_rates[r * cyclic_room]{};  // -g_P at the nodes
     std::conditional_t<has_fixed_point, FixedPointState, Nothing> fixed_point{};
     std::conditional_t<(cyclic > 0), real[m * m], Nothing> integration{};  // inverse of D at the first m nodes
-    Workspace<MassArrays> mass_workspace;
+    real last_multiplier[multiplier_room]{};                               // at the end of the last step
+    VelocityOfMomentum<K> velocity_of_momentum;
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         step_size = h;
@@ -74,8 +70,9 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
             p[k] = momentum[k];
         }
         if (!is_finite(time + not_finite_part(q, n) + not_finite_part(p, n))) return Status::not_finite;
-        real v[n];
-        const Status status = velocity(time, q, p, v);
+        real v[n], mu[multiplier_room];
+        Status status = velocity(time, q, p, v, mu);
+        if (status == Status::ok) status = check_constraints(v, mu);
         is_current = true;
         if constexpr (has_fixed_point) begin_fixed_point(fixed_point, v);
         if constexpr (K::events > 0) {
@@ -145,58 +142,9 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
         Formulas<K>::slopes(coefficients, time, position, velocity, Lv, Lq);
     }
 
-    // The velocity of a momentum: Newton's iteration on p = dL/dv from rest, or, where rest is impossible, as in a
-    // frame that rotates faster than light, from the velocity at the end of the last step. Its increments are halved
-    // while the next one would be longer or is not finite, as with Lagrangians like -sqrt(1 - v^2); lengths: sum
-    // |increment residual|.
     Status velocity(real time, const real* position, const real* momentum, real* v) const {
-        return mass_workspace.with([&](MassArrays& a) {
-            const auto evaluate = [&](const real* trial) {
-                Formulas<K>::legendre(coefficients, time, position, trial, a.p, a.entries);
-                for (int k = 0; k < n; ++k) a.residual[k] = momentum[k] - a.p[k];
-                return is_finite(not_finite_part(a.residual, n) + not_finite_part(a.entries, K::mass_entries));
-            };
-            const auto solve_from = [&]() -> Status {
-                if (!evaluate(v)) return Status::not_finite;
-                for (int iteration = 0; iteration < 100; ++iteration) {
-                    if (iteration > 0 && is_near(a, momentum, v, real(2) * Limits<real>::epsilon)) return Status::ok;
-                    a.matrix.clear();
-                    for (int e = 0; e < K::mass_entries; ++e)
-                        a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.entries[e];
-                    if (!a.matrix.factor()) return Status::singular_mass;
-                    const real length = solve_mass(a, a.increment);
-                    const bool next_is_rounding = iteration > 0 && is_near(a, momentum, v, Limits<real>::root_epsilon);
-                    for (real part = real(1);; part *= real(0.5)) {
-                        if (part < Limits<real>::epsilon) return Status::not_converged;
-                        for (int k = 0; k < n; ++k) a.trial[k] = v[k] + part * a.increment[k];
-                        if (next_is_rounding || (evaluate(a.trial) && solve_mass(a, a.next) <= length)) break;
-                    }
-                    for (int k = 0; k < n; ++k) v[k] = a.trial[k];
-                    if (next_is_rounding) return Status::ok;
-                }
-                return Status::not_converged;
-            };
-            for (int k = 0; k < n; ++k) v[k] = real(0);
-            Status status = solve_from();
-            if (status != Status::ok && has_history) {
-                polynomial(real(1), a.trial, v);
-                status = solve_from();
-            }
-            if (status == Status::ok) return status;
-            // At rest there is no inverse, as of v^4: from the multiple of the momentum whose own momentum is nearest.
-            const Status at_rest = status;
-            real best = real(0), nearest = -real(1);
-            for (real scale = real(0x1p-40); scale <= real(0x1p40); scale *= real(2)) {
-                for (int k = 0; k < n; ++k) v[k] = scale * momentum[k];
-                if (!evaluate(v)) continue;
-                real apart = real(0);
-                for (int k = 0; k < n; ++k) apart += a.residual[k] * a.residual[k];
-                if (nearest < real(0) || apart < nearest) best = scale, nearest = apart;
-            }
-            for (int k = 0; k < n; ++k) v[k] = best * momentum[k];
-            status = solve_from();
-            return status == Status::ok ? status : at_rest;
-        });
+        real mu[multiplier_room];
+        return velocity(time, position, momentum, v, mu);
     }
 
     // One step from (q, p) at `time` and d(q1, p1)/d(q, p), 2n x 2n: J dY = -dR for each column.
@@ -295,26 +243,56 @@ private:
         return false;
     }
 
-    // Whether |p - dL/dv| is within a bound of what it is computed from.
-    bool is_near(const MassArrays& a, const real* momentum, const real* v, real bound) const {
-        real size[n];
-        for (int k = 0; k < n; ++k) size[k] = fabs(momentum[k]);
-        for (int e = 0; e < K::mass_entries; ++e) size[K::mass_row[e]] += fabs(a.entries[e] * v[K::mass_column[e]]);
-        for (int k = 0; k < n; ++k)
-            if (!(fabs(a.residual[k]) <= bound * size[k])) return false;
-        return true;
+    // With the multipliers that the momentum would need to keep the constraints.
+    Status velocity(real time, const real* position, const real* momentum, real* v, real* mu) const {
+        const auto of_last_step = [this](real* guess) {
+            real position_there[n];
+            if (has_history) polynomial(real(1), position_there, guess);
+            return has_history;
+        };
+        return velocity_of_momentum.find(coefficients, time, position, momentum, of_last_step, v, mu);
     }
 
-    // x = M^-1 residual; sum |x_k residual_k|.
-    static real solve_mass(MassArrays& a, real* x) {
-        real sorted[n], length = real(0);
-        for (int k = 0; k < n; ++k) sorted[MassLayout::index(k, 0)] = a.residual[k];
-        a.matrix.solve(sorted);
-        for (int k = 0; k < n; ++k) {
-            x[k] = sorted[MassLayout::index(k, 0)];
-            length += fabs(x[k] * a.residual[k]);
+    // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers.
+    Status check_constraints(const real* v, const real* mu) const {
+        if constexpr (constraints > 0) {
+            real phi[constraints], phi_t[constraints], G[K::constraint_entries], size[constraints], force[n];
+            Formulas<K>::constraint(coefficients, this->time(), static_cast<const real*>(q), +phi, +phi_t, +G);
+            for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
+            for (int k = 0; k < n; ++k) force[k] = real(0);
+            for (int e = 0; e < K::constraint_entries; ++e) {
+                const int c = K::constraint_row[e], k = K::constraint_column[e];
+                size[c] += fabs(G[e]) * (fabs(q[k]) + fabs(step_size * v[k]));
+                force[k] += G[e] * mu[c];
+            }
+            for (int c = 0; c < constraints; ++c)
+                if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return Status::off_constraints;
+            real largest = real(0), apart = real(0);
+            for (int k = 0; k < n; ++k) {
+                largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
+                apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
+            }
+            if (!(apart <= Limits<real>::root_epsilon * largest)) return Status::off_constraints;
+        } else {
+            (void)v, (void)mu;
         }
-        return length;
+        return Status::ok;
+    }
+
+    // (D46) The multipliers of the end, which keep dphi/dt = 0 there, and their part of the momentum p1.
+    Status end_on_constraints(const real* q1, real* p1) {
+        if constexpr (constraints > 0) {
+            real v[n], mu[constraints], phi[constraints], phi_t[constraints], G[K::constraint_entries];
+            const Status status = velocity(this->next_time(), q1, p1, v, mu);
+            if (status != Status::ok) return status;
+            Formulas<K>::constraint(coefficients, this->next_time(), q1, +phi, +phi_t, +G);
+            for (int e = 0; e < K::constraint_entries; ++e)
+                p1[K::constraint_column[e]] -= G[e] * mu[K::constraint_row[e]];
+            for (int c = 0; c < constraints; ++c) last_multiplier[c] = -mu[c] / (step_size * K::b[r - 1]);
+        } else {
+            (void)q1, (void)p1;
+        }
+        return Status::ok;
     }
 
     // sum_i h b_i clock(Q_i) of the stages just solved.
@@ -346,6 +324,13 @@ private:
                 }
             }
             for (int c = 0; c < kappas; ++c) a.Y[active * m + c] = Y[active * m + c];
+            for (int c = 0; c < constraints; ++c)  // at the nodes 0 ... m - 1, from those of the last step and its end
+                for (int j = 0; j < m; ++j) {
+                    real sum = K::extrapolation[j * (m + 1) + m] * last_multiplier[c];
+                    for (int k = 0; k < m; ++k)
+                        sum += K::extrapolation[j * (m + 1) + k] * Y[Layout::index(active + c, k)];
+                    a.Y[Layout::index(active + c, j)] = sum;
+                }
             status = solve_stages(a);
         }
         if (status != Status::ok) {  // straight on
@@ -356,6 +341,8 @@ private:
                 for (int j = 0; j < m; ++j)
                     a.Y[Layout::index(b, j)] = step_size * K::control[j + 1] * v[K::active_index[b]];
             for (int c = 0; c < kappas; ++c) a.Y[active * m + c] = real(0);
+            for (int c = 0; c < constraints; ++c)
+                for (int j = 0; j < m; ++j) a.Y[Layout::index(active + c, j)] = real(0);
             status = solve_stages(a);
         }
         if (status != Status::ok) return status;
@@ -370,6 +357,8 @@ private:
             a.p1[k] = p[k];
         }
         if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.p1, n))) return Status::not_finite;
+        status = end_on_constraints(a.q1, a.p1);
+        if (status != Status::ok) return status;
         if constexpr (K::clocked) elapsed = time_passed(a);
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];

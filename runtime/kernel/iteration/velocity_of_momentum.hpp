@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+// The velocity of a momentum: Newton's iteration for p = dL/dv(q, v, t) (D27). With constraints phi(q, t) = 0, G =
+// dphi/dq, it is the velocity that keeps them, with multipliers mu (D46):
+//     dL/dv + G^T mu = p,  G v + dphi/dt = 0.
+// p - G^T mu is then the nearest momentum, in the metric of the mass, whose velocity keeps the constraints.
+#ifndef LOBATTO_KERNEL_VELOCITY_OF_MOMENTUM_HPP
+#define LOBATTO_KERNEL_VELOCITY_OF_MOMENTUM_HPP
+
+#include <type_traits>
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "../base/solve.hpp"
+
+namespace lobatto {
+
+template <class K>
+class VelocityOfMomentum {
+public:
+    using real = typename K::real;
+    static constexpr int n = K::coordinates, constraints = K::constraints, unknowns = n + constraints;
+
+    // v with the momentum p, and mu where there are constraints. The iteration begins at rest; where rest is
+    // impossible, as in a frame that rotates faster than light, at a velocity that guess(v) writes, if it knows one.
+    template <class Guess>
+    Status find(const typename K::Coefficients& k, real time, const real* q, const real* p, const Guess& guess, real* v,
+                real* mu) const {
+        return workspace_.with([&](Arrays& a) {
+            const State at{k, time, q, p};
+            if constexpr (constraints > 0) {
+                real phi[constraints];
+                Formulas<K>::constraint(k, time, q, +phi, +a.phi_t, +a.G);
+            }
+            rest(a);
+            Status status = solve(at, a);
+            if (status != Status::ok) {
+                rest(a);
+                if (guess(a.x)) status = solve(at, a);
+            }
+            if (status != Status::ok) {
+                begin_at_momentum(at, a);
+                if (solve(at, a) == Status::ok) status = Status::ok;
+            }
+            for (int i = 0; i < n; ++i) v[i] = a.x[i];
+            for (int c = 0; c < constraints; ++c) mu[c] = a.x[n + c];
+            return status;
+        });
+    }
+
+private:
+    using Layout = std::conditional_t<K::cyclic == 0, Grouped<K, unknowns, 1, 0>, Whole<n>>;
+    static constexpr int mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
+    static constexpr int slope_room = K::constraint_entries > 0 ? K::constraint_entries : 1;
+    // x: v, then mu.
+    struct Arrays {
+        real x[unknowns], trial[unknowns], residual[unknowns], increment[unknowns], next[unknowns];
+        real p[n], mass[mass_room], phi_t[constraints > 0 ? constraints : 1], G[slope_room];
+        GroupedMatrix<real, Layout> matrix;
+    };
+    struct State {
+        const typename K::Coefficients& k;
+        real time;
+        const real *q, *p;
+    };
+
+    static void rest(Arrays& a) {
+        for (int i = 0; i < unknowns; ++i) a.x[i] = real(0);
+    }
+
+    // Both equations at x; whether they have values there.
+    static bool evaluate(const State& at, const real* x, Arrays& a) {
+        Formulas<K>::legendre(at.k, at.time, at.q, x, a.p, a.mass);
+        for (int i = 0; i < n; ++i) a.residual[i] = at.p[i] - a.p[i];
+        for (int c = 0; c < constraints; ++c) a.residual[n + c] = -a.phi_t[c];
+        each_slope([&](int e, int c, int i) {
+            a.residual[i] -= a.G[e] * x[n + c];
+            a.residual[n + c] -= a.G[e] * x[i];
+        });
+        return is_finite(not_finite_part(a.residual, unknowns) + not_finite_part(a.mass, K::mass_entries));
+    }
+
+    // use(e, c, i) for the entries e of G, dphi_c/dq_i.
+    template <class Use>
+    static void each_slope(const Use& use) {
+        for (int e = 0; e < K::constraint_entries; ++e) use(e, K::constraint_row[e], K::constraint_column[e]);
+    }
+
+    // Increments are halved while the next one would be longer or is not finite, as with Lagrangians like -sqrt(1 -
+    // v^2); lengths: sum |increment residual|.
+    static Status solve(const State& at, Arrays& a) {
+        if (!evaluate(at, a.x, a)) return Status::not_finite;
+        for (int iteration = 0; iteration < 100; ++iteration) {
+            if (iteration > 0 && is_near(at, a, real(2) * Limits<real>::epsilon)) return Status::ok;
+            a.matrix.clear();
+            for (int e = 0; e < K::mass_entries; ++e) a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.mass[e];
+            each_slope([&](int e, int c, int i) {
+                a.matrix(i, 0, n + c, 0) += a.G[e];
+                a.matrix(n + c, 0, i, 0) += a.G[e];
+            });
+            if (!a.matrix.factor()) return Status::singular_mass;
+            const real length = solve_for(a, a.increment);
+            const bool next_is_rounding = iteration > 0 && is_near(at, a, Limits<real>::root_epsilon);
+            for (real part = real(1);; part *= real(0.5)) {
+                if (part < Limits<real>::epsilon) return Status::not_converged;
+                for (int i = 0; i < unknowns; ++i) a.trial[i] = a.x[i] + part * a.increment[i];
+                if (next_is_rounding || (evaluate(at, a.trial, a) && solve_for(a, a.next) <= length)) break;
+            }
+            for (int i = 0; i < unknowns; ++i) a.x[i] = a.trial[i];
+            if (next_is_rounding) return Status::ok;
+        }
+        return Status::not_converged;
+    }
+
+    // At rest there is no inverse, as of v^4: the multiple of the momentum whose own momentum is nearest.
+    static void begin_at_momentum(const State& at, Arrays& a) {
+        real best = real(0), nearest = -real(1);
+        rest(a);
+        for (real scale = real(0x1p-40); scale <= real(0x1p40); scale *= real(2)) {
+            for (int i = 0; i < n; ++i) a.x[i] = scale * at.p[i];
+            if (!evaluate(at, a.x, a)) continue;
+            real apart = real(0);
+            for (int i = 0; i < n; ++i) apart += a.residual[i] * a.residual[i];
+            if (nearest < real(0) || apart < nearest) best = scale, nearest = apart;
+        }
+        for (int i = 0; i < n; ++i) a.x[i] = best * at.p[i];
+    }
+
+    // Whether what is left is within a bound of what it is computed from.
+    static bool is_near(const State& at, const Arrays& a, real bound) {
+        real size[unknowns];
+        for (int i = 0; i < n; ++i) size[i] = fabs(at.p[i]);
+        for (int c = 0; c < constraints; ++c) size[n + c] = fabs(a.phi_t[c]);
+        for (int e = 0; e < K::mass_entries; ++e) size[K::mass_row[e]] += fabs(a.mass[e] * a.x[K::mass_column[e]]);
+        each_slope([&](int e, int c, int i) {
+            size[i] += fabs(a.G[e] * a.x[n + c]);
+            size[n + c] += fabs(a.G[e] * a.x[i]);
+        });
+        for (int i = 0; i < unknowns; ++i)
+            if (!(fabs(a.residual[i]) <= bound * size[i])) return false;
+        return true;
+    }
+
+    // x = matrix^-1 residual; sum |x_i residual_i|.
+    static real solve_for(const Arrays& a, real* x) {
+        real sorted[unknowns], length = real(0);
+        for (int i = 0; i < unknowns; ++i) sorted[Layout::index(i, 0)] = a.residual[i];
+        a.matrix.solve(sorted);
+        for (int i = 0; i < unknowns; ++i) {
+            x[i] = sorted[Layout::index(i, 0)];
+            length += fabs(x[i] * a.residual[i]);
+        }
+        return length;
+    }
+
+    Workspace<Arrays> workspace_;
+};
+
+}  // namespace lobatto
+
+#endif

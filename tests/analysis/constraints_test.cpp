@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Motions with constraints: against steps written by hand, the same systems in minimal coordinates, and their promises.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "analysis/exact_start.hpp"
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "generator/mechanics/start.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/measure/manifold.hpp"
+#include "runtime/measure/symmetry.hpp"
+#include "runtime/run/trajectory.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+Scene scene_of(const std::string& text) {
+    return read_scene(Source("mechanism.toml", text));
+}
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+// [method] and [run] of a scene.
+std::string method(int points, double step, double until, const std::string& more = "") {
+    return fmt::format("[method]\npoints = {}\n[run]\nstep = {:.17g}\nuntil = {:.17g}\n{}", points, step, until, more);
+}
+
+const std::string rod =
+    "lagrangian = \"m*(x'^2 + y'^2)/2 - m*g*y\"\n[coordinates]\nx = { position = 0.6, velocity = 0.4 }\n"
+    "y = { position = -0.8, velocity = 0.3 }\n[constraints]\nrod = \"x^2 + y^2 = l^2\"\n[parameters]\nm = 2\n"
+    "g = 1.5\nl = 1\n";
+
+const std::string two_rods =
+    "lagrangian = \"sum(i = 1 .. 2, (x[i]'^2 + y[i]'^2)/2 - y[i])\"\n[definitions]\nX1 = \"x[1]\"\n"
+    "[coordinates]\nx = { position = [\"sin(1)\", \"sin(1) + sin(2)\"], velocity = 0 }\n"
+    "y = { position = [\"-cos(1)\", \"-cos(1) - cos(2)\"], velocity = 0 }\n"
+    "[constraints]\nfirst = \"X1^2 + y[1]^2 = 1\"\nsecond = \"(x[2] - x[1])^2 + (y[2] - y[1])^2 = 1\"\n";
+const std::string two_angles =
+    "lagrangian = \"(x1'^2 + y1'^2 + x2'^2 + y2'^2)/2 - y1 - y2\"\n[definitions]\nx1 = \"sin(a)\"\ny1 = \"-cos(a)\"\n"
+    "x2 = \"x1 + sin(b)\"\ny2 = \"y1 - cos(b)\"\n[coordinates]\na = { position = 1, velocity = 0 }\n"
+    "b = { position = 2, velocity = 0 }\n";
+
+struct Ended {
+    TrajectoryRequest request;
+    TrajectoryResult result;
+};
+Ended run(const Scene& scene) {
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    Ended ended{request_of(scene, steps_of(scene, {}).count, stepper), {}};
+    ended.result = integrate(kernel, ended.request);
+    REQUIRE(ended.result.status == LOBATTO_OK);
+    return ended;
+}
+std::vector<double> end_of(const Scene& scene) {
+    return run(scene).result.q;
+}
+
+double apart(const std::vector<double>& a, const std::vector<double>& b) {
+    double most = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) most = std::fmax(most, std::fabs(a[k] - b[k]));
+    return most;
+}
+
+// The order that the errors of steps h and h/2 show.
+double order_of(const std::string& system, int points, double step, double until, const std::vector<double>& exact) {
+    const double coarse = apart(end_of(scene_of(system + method(points, step, until))), exact),
+                 fine = apart(end_of(scene_of(system + method(points, step / 2, until))), exact);
+    CAPTURE(coarse);
+    CAPTURE(fine);
+    return std::log2(coarse / fine);
+}
+
+QuadrupleStart quadruple_start(const Scene& scene, const Kernel& kernel, __float128 step) {
+    const StartIn<__float128> start = start_in<__float128>(ExactStart(scene), kernel, step);
+    return {start.parameters, start.q, start.p};
+}
+
+std::string refusal(const std::string& text) {
+    try {
+        const Scene scene = scene_of(text);
+        emit(derive(scene));
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+}  // namespace
+
+TEST_CASE("two points are RATTLE, written by hand") {
+    // A point of mass 2 on a rod of length 1 under gravity 1.5, 40 steps of 0.05.
+    const double m = 2, g = 1.5, h = 0.05;
+    double x = 0.6, y = -0.8, px = m * 0.4, py = m * 0.3;
+    for (int step = 0; step < 40; ++step) {
+        const double free_px = px, free_py = py - h / 2 * m * g;
+        double lambda = 0, x1 = 0, y1 = 0;
+        for (int i = 0; i < 30; ++i) {  // x1^2 + y1^2 = 1
+            x1 = x + h / m * (free_px + h / 2 * 2 * x * lambda);
+            y1 = y + h / m * (free_py + h / 2 * 2 * y * lambda);
+            const double slope = 2 * x1 * h * h / m * x + 2 * y1 * h * h / m * y;
+            lambda -= (x1 * x1 + y1 * y1 - 1) / slope;
+        }
+        const double half_px = free_px + h * x * lambda, half_py = free_py + h * y * lambda - h / 2 * m * g;
+        const double mu = -(x1 * half_px + y1 * half_py) / (x1 * x1 + y1 * y1);
+        x = x1, y = y1;
+        px = half_px + mu * x1;
+        py = half_py + mu * y1;
+    }
+    const Ended ended = run(scene_of(rod + method(2, h, 40 * h)));
+    CHECK(apart(ended.result.q, {x, y}) < 1e-13);
+    CHECK(apart(ended.result.p, {px, py}) < 1e-13);
+}
+
+TEST_CASE("a double pendulum of rods moves like the one in angles, with order 2s - 2") {
+    const std::vector<double> angles = end_of(scene_of(two_angles + method(10, 0.02, 2)));
+    const double a = angles[0], b = angles[1];
+    const std::vector<double> exact{std::sin(a), std::sin(a) + std::sin(b), -std::cos(a), -std::cos(a) - std::cos(b)};
+    CHECK(order_of(two_rods, 2, 0.02, 2, exact) == doctest::Approx(2).epsilon(0.05));
+    CHECK(order_of(two_rods, 3, 0.05, 2, exact) == doctest::Approx(4).epsilon(0.05));
+    CHECK(order_of(two_rods, 4, 0.1, 2, exact) == doctest::Approx(6).epsilon(0.06));
+    CHECK(order_of(two_rods, 5, 0.1, 2, exact) == doctest::Approx(8).epsilon(0.1));
+    CHECK(apart(end_of(scene_of(two_rods + method(8, 0.05, 2))), exact) < 1e-13);
+}
+
+TEST_CASE("constraints and their rates stay at rounding") {
+    const Scene scene = scene_of(two_rods + method(4, 0.1, 5000));
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    TrajectoryRequest request = request_of(scene, 50000, stepper);
+    double position = 0, rate = 0;
+    std::vector<double> phi, phi_t, G, v;
+    request.every = 100;
+    request.sink = [&](const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i) {
+            const double* const row = records.rows + i * records.columns + 1;
+            const std::vector<double> q(row, row + 4), p(row + 4, row + 8);
+            stepper.constraint(0, q, phi, phi_t, G);
+            for (std::size_t c = 0; c < 2; ++c) {
+                position = std::fmax(position, std::fabs(phi[c]));
+                double sum = 0;  // of unit masses
+                for (std::size_t k = 0; k < 4; ++k) sum += G[c * 4 + k] * p[k];
+                rate = std::fmax(rate, std::fabs(sum));
+            }
+        }
+    };
+    CHECK(integrate(kernel, request).status == LOBATTO_OK);
+    CHECK(position < 4e-15);
+    CHECK(rate < 2e-14);
+}
+
+TEST_CASE("a constraint that moves: a pendulum whose pivot is shaken") {
+    const std::string shaken =
+        "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 0, velocity = 0.9 }\n"
+        "y = { position = -1, velocity = 0 }\n[constraints]\nrod = \"(x - 0.3*sin(3*t))^2 + y^2 = 1\"\n";
+    const std::string angle =
+        "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - y\"\n[definitions]\nx = \"0.3*sin(3*t) + sin(a)\"\n"
+        "y = \"-cos(a)\"\n[coordinates]\na = { position = 0, velocity = 0 }\n";
+    const double a = end_of(scene_of(angle + method(10, 0.02, 3)))[0];
+    const std::vector<double> exact{0.3 * std::sin(9.0) + std::sin(a), -std::cos(a)};
+    CHECK(order_of(shaken, 3, 0.05, 3, exact) == doctest::Approx(4).epsilon(0.06));
+    CHECK(order_of(shaken, 4, 0.1, 3, exact) == doctest::Approx(6).epsilon(0.08));
+    CHECK(apart(end_of(scene_of(shaken + method(8, 0.05, 3))), exact) < 1e-13);
+}
+
+TEST_CASE("a charge on a sphere in a magnetic field, with friction: any Lagrangian may be constrained") {
+    const std::string sphere =
+        "lagrangian = \"(1 + z^2)*(x'^2 + y'^2 + z'^2)/2 + 0.7*(x*y' - y*x')/2 - z\"\n[coordinates]\n"
+        "x = { position = \"sin(1)\", velocity = 0 }\ny = { position = 0, velocity = \"sin(1)\" }\n"
+        "z = { position = \"cos(1)\", velocity = 0 }\n[forces]\nx = \"-0.2*x'\"\ny = \"-0.2*y'\"\nz = \"-0.2*z'\"\n"
+        "[constraints]\nball = \"x^2 + y^2 + z^2 = 1\"\n";
+    const std::string angles =
+        "lagrangian = \"(1 + z^2)*(x'^2 + y'^2 + z'^2)/2 + 0.7*(x*y' - y*x')/2 - z\"\n[definitions]\n"
+        "x = \"sin(a)*cos(b)\"\ny = \"sin(a)*sin(b)\"\nz = \"cos(a)\"\n[coordinates]\n"
+        "a = { position = 1, velocity = 0 }\nb = { position = 0, velocity = 1 }\n[forces]\na = \"-0.2*a'\"\n"
+        "b = \"-0.2*sin(a)^2*b'\"\n";
+    const std::vector<double> end = end_of(scene_of(angles + method(10, 0.02, 2)));
+    const std::vector<double> exact{std::sin(end[0]) * std::cos(end[1]), std::sin(end[0]) * std::sin(end[1]),
+                                    std::cos(end[0])};
+    CHECK(order_of(sphere, 3, 0.1, 2, exact) == doctest::Approx(4).epsilon(0.08));
+    CHECK(order_of(sphere, 4, 0.2, 2, exact) == doctest::Approx(6).epsilon(0.1));
+    CHECK(apart(end_of(scene_of(sphere + method(8, 0.05, 2))), exact) < 1e-12);
+}
+
+namespace {
+
+// A rigid body's quaternion, whose mass matrix is singular along it.
+const std::string body =
+    "lagrangian = \"(w1^2 + 2*w2^2 + 3*w3^2)/2\"\n[coordinates]\nq0 = { position = 1, velocity = 0 }\n"
+    "q1 = { position = 0, velocity = 0.15 }\nq2 = { position = 0, velocity = 1 }\n"
+    "q3 = { position = 0, velocity = 0.05 }\n[definitions]\nw1 = \"2*(-q1*q0' + q0*q1' + q3*q2' - q2*q3')\"\n"
+    "w2 = \"2*(-q2*q0' - q3*q1' + q0*q2' + q1*q3')\"\nw3 = \"2*(-q3*q0' + q2*q1' - q1*q2' + q0*q3')\"\n"
+    "[constraints]\nunit = \"q0^2 + q1^2 + q2^2 + q3^2 = 1\"\n";
+
+}  // namespace
+
+TEST_CASE("a free body in a quaternion turns as Euler's equations say") {
+    // w' = J^-1 (J w x w), q' = q w / 2, by Runge and Kutta's classical steps.
+    using State = std::array<double, 7>;
+    const auto rate = [](const State& s) {
+        const double w1 = s[4], w2 = s[5], w3 = s[6];
+        return State{(-s[1] * w1 - s[2] * w2 - s[3] * w3) / 2,
+                     (s[0] * w1 + s[2] * w3 - s[3] * w2) / 2,
+                     (s[0] * w2 + s[3] * w1 - s[1] * w3) / 2,
+                     (s[0] * w3 + s[1] * w2 - s[2] * w1) / 2,
+                     (2 - 3) * w2 * w3 / 1,
+                     (3 - 1) * w3 * w1 / 2,
+                     (1 - 2) * w1 * w2 / 3};
+    };
+    State s{1, 0, 0, 0, 0.3, 2, 0.1};
+    const int steps = 6000;
+    const double h = 3.0 / steps;
+    const auto moved = [](const State& from, const State& by, double length) {
+        State to = from;
+        for (std::size_t i = 0; i < to.size(); ++i) to[i] += length * by[i];
+        return to;
+    };
+    for (int i = 0; i < steps; ++i) {
+        const State k1 = rate(s), k2 = rate(moved(s, k1, h / 2)), k3 = rate(moved(s, k2, h / 2)),
+                    k4 = rate(moved(s, k3, h));
+        for (std::size_t j = 0; j < s.size(); ++j) s[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
+    }
+    const std::vector<double> exact(s.begin(), s.begin() + 4);
+    CHECK(apart(end_of(scene_of(body + method(6, 0.05, 3))), exact) < 1e-12);
+    CHECK(order_of(body, 3, 0.1, 3, exact) == doctest::Approx(4).epsilon(0.06));
+}
+
+TEST_CASE("steps preserve areas on the constraints, and run backwards; friction is told apart") {
+    const auto defect = [](const std::string& text) {
+        const Scene scene = scene_of(text);
+        EmitOptions options;
+        options.precision = Precision::quadruple;
+        const Kernel kernel = kernel_of(emit(derive(scene), options), options.precision);
+        const __float128 step = number_of<__float128>(scene.evaluate(scene.run.step, "the step"));
+        const QuadrupleStart start = quadruple_start(scene, kernel, step);
+        CHECK(return_distance(kernel, start, step, 20) < 1e-28);
+        return area_defect(kernel, start, step);
+    };
+    CHECK(defect(two_rods + method(4, 0.1, 1)) < 1e-15);
+    CHECK(defect(body + method(3, 0.1, 1)) < 1e-15);
+    CHECK(defect(two_rods + "[forces]\n\"x[2]\" = \"-0.1*x[2]'\"\n" + method(4, 0.1, 1)) > 1e-4);
+}
+
+TEST_CASE("momenta of symmetries that the constraints have are conserved, others are not looked for") {
+    const Scene scene = scene_of(body + method(4, 0.1, 10));
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    const auto start = start_in<double>(ExactStart(scene), kernel, 0.1);
+    const auto symmetries = find_symmetries(kernel, start.parameters, start.q, 0.1, {"q0", "q1", "q2", "q3"});
+    CHECK(symmetries.size() == 3);  // of space; the body's own moments differ
+    for (const Symmetry& symmetry : symmetries)
+        CHECK(momentum_variation(kernel, symmetry, start.parameters, start.q, start.p, 0.1, 200).variation < 1e-13);
+
+    // Free of forces L does not change with x, but the rod does.
+    const Scene held = scene_of(
+        "lagrangian = \"(x'^2 + y'^2)/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+        "y = { position = 0, velocity = 1 }\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n" +
+        method(4, 0.1, 1));
+    const Kernel of_held = kernel_of(emit(derive(held)), Precision::double_);
+    const auto there = start_in<double>(ExactStart(held), of_held, 0.1);
+    const auto found = find_symmetries(of_held, there.parameters, there.q, 0.1, {"x", "y"});
+    REQUIRE(found.size() == 1);
+    CHECK(found[0].kind == "rotation in the (x, y) plane");
+}
+
+TEST_CASE("equations of neighbours stay banded") {
+    const Scene chain = scene_of(
+        "lagrangian = \"sum(i = 1 .. n, (x[i]'^2 + y[i]'^2)/2 - y[i])\"\n[coordinates]\n"
+        "x = { count = \"n\", position = \"i\", velocity = 0 }\ny = { count = \"n\", position = 0, velocity = 0 }\n"
+        "[parameters]\nn = { value = 20, constant = true }\n[constraints]\nfirst = \"x[1]^2 + y[1]^2 = 1\"\n"
+        "\"rod[i]\" = { equation = \"(x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 = 1\", count = \"n - 1\" }\n" +
+        method(3, 0.05, 0.5));
+    const Derivation derivation = derive(chain);
+    REQUIRE(derivation.structure.groups.size() == 1);
+    CHECK(derivation.structure.groups[0].coordinates.size() == 60);
+    CHECK(derivation.structure.groups[0].bandwidth <= 8);
+    const Ended ended = run(chain);
+    for (std::size_t i = 1; i < 20; ++i) {
+        const double dx = ended.result.q[i] - ended.result.q[i - 1],
+                     dy = ended.result.q[20 + i] - ended.result.q[19 + i];
+        CHECK(std::fabs(dx * dx + dy * dy - 1) < 1e-13);
+    }
+}
+
+TEST_CASE("starts off the constraints are errors that tell the nearest start") {
+    const std::string free =
+        "lagrangian = \"(x'^2 + 4*y'^2)/2 - y\"\n[coordinates]\nx = { position = PX, velocity = VX }\n"
+        "y = { position = PY, velocity = 0 }\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n";
+    const auto with = [&](const std::string& px, const std::string& py, const std::string& vx) {
+        std::string text = free;
+        text.replace(text.find("PX"), 2, px);
+        text.replace(text.find("PY"), 2, py);
+        text.replace(text.find("VX"), 2, vx);
+        return text;
+    };
+    const std::string off = refusal(with("1.1", "0", "0") + method(3, 0.1, 1));
+    CHECK(contains(off, "does not keep the constraint rod (x^2 + y^2 = 1)"));
+    CHECK(contains(off, "0.21"));
+    CHECK(contains(off, "x = 1"));
+    CHECK(contains(off, "assemble = true"));
+    const std::string moving = refusal(with("0.6", "0.8", "1") + method(3, 0.1, 1));
+    CHECK(contains(moving, "at the rate 1.2"));
+    CHECK(contains(moving, "x' = "));
+    CHECK(refusal(with("0.6", "0.8", "0") + method(3, 0.1, 1)) == "");
+
+    // The nearest in the metric of the mass: M (q - q0) along the slope of the constraint.
+    const Scene assembled = scene_of(with("2", "1", "1") + method(3, 0.1, 1, "assemble = true\n"));
+    const StartOnConstraints start = start_on_constraints(assembled, build_system(assembled));
+    const auto number = [](const cln::cl_R& x) { return cln::double_approx(x); };
+    const double x = number(start.q[0]), y = number(start.q[1]), vx = number(start.v[0]), vy = number(start.v[1]);
+    CHECK(x * x + y * y == doctest::Approx(1).epsilon(1e-15));
+    CHECK((x - 2) * y == doctest::Approx(4 * (y - 1) * x).epsilon(1e-12));
+    CHECK(std::fabs(x * vx + y * vy) < 1e-15);
+    CHECK((vx - 1) * y == doctest::Approx(4 * vy * x).epsilon(1e-12));
+    CHECK(run(assembled).result.steps_done == 10);
+}
+
+TEST_CASE("momenta at the start must be those of a velocity that keeps the constraints") {
+    const std::string by_momentum =
+        "lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 1, momentum = 0.5 }\n"
+        "y = { position = 0, momentum = 2 }\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n";
+    CHECK(contains(refusal(by_momentum + method(3, 0.1, 1)), "those of no velocity that keeps it"));
+    const Ended ended = run(scene_of(by_momentum + method(3, 0.1, 0.1, "assemble = true\n")));
+    CHECK(apart(ended.request.p, {0, 2}) < 1e-15);
+}
+
+TEST_CASE("what cannot be constrained so is one clear error") {
+    const std::string two =
+        "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 - y\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+        "y = { position = 0, velocity = 0 }\nz = { position = 0, velocity = 0 }\n";
+    const auto constrained = [&](const std::string& lines) {
+        return refusal(two + "[constraints]\n" + lines + method(3, 0.1, 1));
+    };
+    CHECK(contains(constrained("a = \"x^2 + y^2 = 1\"\nb = \"2*x^2 = 2 - 2*y^2\"\n"),
+                   "the constraints a, b depend on one another"));
+    CHECK(contains(constrained("a = \"y^2 = 0\"\n"), "has no slope"));
+    CHECK(contains(constrained("a = \"x'^2 + y^2 = 1\"\n"), "holds a velocity"));
+    CHECK(contains(constrained("a = \"1 = 1\"\n"), "holds no coordinate"));
+    CHECK(contains(constrained("a = \"x = 1 rising\"\n"), "leave out 'rising'"));
+    CHECK(contains(constrained("a = \"x = 1\"\nb = \"y = 0\"\nc = \"z = 0\"\n"), "nothing is left that could move"));
+    CHECK(contains(constrained("\"a[i]\" = \"x = 1\"\n"), "has a count"));
+    CHECK(contains(constrained("a = { equation = \"x = 1\", count = 2 }\n"), "a count makes an array"));
+    CHECK(contains(constrained("a = 3\n"), "must be an equation in quotes"));
+    CHECK(contains(constrained("x = \"x = 1\"\n"), "x"));
+    CHECK(contains(constrained("a = \"x^2 + y^2 = -1\"\n"), "cannot close"));
+    CHECK(contains(refusal(two + method(3, 0.1, 1, "assemble = true\n")), "nothing to assemble"));
+    for (const char* const other :
+         {"family = \"gauss\"\n", "family = \"splitting\"\n", "arithmetic = \"clean\"\n", "clock = \"x\"\n"})
+        CHECK(contains(refusal(two + "[constraints]\na = \"x^2 + y^2 = 1\"\n[method]\n" + other +
+                               "[run]\nstep = 0.1\nuntil = 1\n"),
+                       "constraints need"));
+}
+
+TEST_CASE("a mass that is missing along the constraints is told, one that is missing across them is none") {
+    CHECK(contains(refusal("lagrangian = \"(x' + y')^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                           "y = { position = 1, velocity = 0 }\n[constraints]\nboth = \"x + y = 2\"\n" +
+                           method(3, 0.1, 1)),
+                   "No kinetic energy opposes the direction"));
+    // x moves with the mass of both: q'' = 0.
+    const Ended ended =
+        run(scene_of("lagrangian = \"(x' + y')^2/2\"\n[coordinates]\nx = { position = 1, velocity = 2 }\n"
+                     "y = { position = 1, velocity = 2 }\n[constraints]\nside = \"x - y = 0\"\n" +
+                     method(3, 0.1, 1)));
+    CHECK(apart(ended.result.q, {3, 3}) < 1e-14);
+}
+
+TEST_CASE("a sweep refuses the trajectories that start off the constraints, and assembles them where it is asked to") {
+    const test::TemporaryFolder folder;
+    const std::string scene = folder / "rod.toml", table = folder / "table.csv";
+    const std::string text =
+        "lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+        "y = { position = 0, velocity = 0 }\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n[run]\nstep = 0.1\nuntil = 1\n";
+    const auto rows = [&](const std::string& more) {
+        test::write_text(scene, text + more);
+        const test::Finished done =
+            test::run({LOBATTO_PROGRAM, "sweep", scene, "--vary", "x=1,1.1", "--quiet", "-o", table});
+        return std::pair{done.exit_code, test::read_file(table)};
+    };
+    const auto [refused, off] = rows("");
+    CHECK(refused == 3);
+    CHECK(contains(off, "9 start off the constraints"));
+    CHECK(contains(off, ",9,"));
+    const auto [taken, assembled] = rows("assemble = true\n");
+    CHECK(taken == 0);
+    CHECK(!contains(assembled, ",9,"));
+}
