@@ -60,6 +60,7 @@ public:
                                        std::numeric_limits<double>::infinity());
         compare(*states, took);
         if (reference_.disagreement.back() > request_.wanted) compare_with_looser(*states, looser * tolerance, took);
+        if (reference_.first.empty() && reference_.is_late) fail_slow(covered_);
         if (reference_.first.empty())
             throw ComputationError("the reference fails: the steps of " + std::string(kernel_->method) +
                                    " do not converge on this motion, however short");
@@ -223,7 +224,8 @@ private:
         return largest;
     }
 
-    // The family's own way with `ratio` steps between two samples; nothing when a step fails, or after `limit` seconds.
+    // The family's own way with `ratio` steps between two samples; nothing when a step fails, or after `limit` seconds,
+    // which is told by is_late.
     std::optional<std::vector<double>> disagreement_with(const States& states, std::int64_t ratio, double limit) {
         const int samples = reference_.samples;
         const real h = static_cast<real>(request_.until) / static_cast<real>(samples * ratio);
@@ -235,9 +237,12 @@ private:
             check_interruption();
             lobatto_advance call{};
             call.steps = ratio;
-            if (stepper_.advance(call) != LOBATTO_OK || seconds_since(began) > limit) return nullptr;
+            if (stepper_.advance(call) != LOBATTO_OK) return nullptr;
             real time;
             stepper_.state(time, row, p);
+            covered_ = static_cast<double>(time);
+            reference_.is_late = seconds_since(began) > limit;
+            if (reference_.is_late) return nullptr;
             row.insert(row.end(), p.begin(), p.end());
             return &row;
         });
@@ -258,6 +263,7 @@ private:
                 disagreement_with(states, ratio, std::fmax(left, request_.seconds_limit * (overtime - 1)));
             last = seconds_since(began);
             const double before = reference_.disagreement.back();
+            if (!measured && reference_.is_late) break;
             const double now = measured ? measured->back() : std::numeric_limits<double>::infinity();
             if (now < before)
                 agree(*measured, fmt::format("{} with {} steps in {}", kernel_->method, ratio * reference_.samples,
@@ -301,6 +307,7 @@ private:
     StartIn<real> start_;
     std::vector<real> scale_;
     std::int64_t evaluations_ = 0;
+    double covered_ = 0;  // the time that the family's last way came to
     Reference reference_;
 };
 
