@@ -39,7 +39,11 @@ public:
             return value + cln::cl_R((cln::plusp(noise.next()) ? 1 : -1)) * of * step_.epsilon;
         };
         rounding.resize(left.size(), cln::cl_R(0));
-        const auto group = [&](std::size_t i) { return i < controls() * n_ ? i % n_ : i; };  // of one coordinate
+        // Equations of one coordinate, or of one constraint, at all control points: a single one may round to nothing.
+        const std::size_t motion = controls() * n_, count = system_.constraints.size();
+        const auto group = [&](std::size_t i) {
+            return i < motion ? i % n_ : i < motion + (controls() - 1) * count ? motion + (i - motion) % count : i;
+        };
         for (int draw = 0; draw < 4; ++draw) {
             Path moved = path_;
             Numbers p0 = step_.p0, p1 = step_.p1;

@@ -167,7 +167,7 @@ std::string solver_text(const Derivation& derivation) {
         known->second.push_back(solve.coordinates.front());
     }
     const bool has_fixed_point =
-        !derivation.structure.full() && derivation.system.constraints.empty() &&
+        !derivation.structure.full() && (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
         (derivation.structure.form() == Form::separable || derivation.system.n <= most_iterated);
     std::string text = derivation.structure.linear ? "once a step, without iteration; "
                        : has_fixed_point

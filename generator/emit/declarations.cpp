@@ -164,6 +164,7 @@ const std::set<std::string>& member_names() {
                                                 "mass_entries",
                                                 "mass_row",
                                                 "mass_column",
+                                                "constant_mass",
                                                 "constraints",
                                                 "constraint_entries",
                                                 "constraint_row",

@@ -81,6 +81,8 @@ std::string general_shapes(const Derivation& d) {
     text += places("entry", entries);
     line(text, fmt::format("int mass_entries = {}", mass.size()), "of M = d2L/dvdv that are not identically zero");
     text += places("mass", mass);
+    line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
+         d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
     const auto slopes = places_of(d.system.constraint_q);
     line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
     line(text, fmt::format("int constraint_entries = {}", slopes.size()),

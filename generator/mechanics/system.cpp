@@ -296,6 +296,9 @@ public:
         if (system_.autonomous && mentions(system_, system_.t)) return build_system(without_time(scene_));
         check_mass(scene_, system_);
         if (system_.separable) check_rest(dependence);
+        system_.constant_mass = system_.separable;
+        if (!system_.constraints.empty())
+            refuse_separable("the constraint " + system_.constraints.front().written + " pulls on coordinates");
         if (system_.separable) keep_separable_parts();
         return system_;
     }
@@ -334,7 +337,6 @@ private:
         }
         system_.constraint_q = derivative_of(values, system_.q);
         system_.linear = false;
-        refuse_separable("the constraint " + system_.constraints.front().written + " pulls on coordinates");
     }
 
     // dp/dv, dp/dq, df/dv, df/dq, whose entries are of these kinds, one after another.

@@ -37,6 +37,8 @@ struct System {
     bool linear = false;     // p and f are affine in q and v, with constant coefficients
     // L = 1/2 v^T M v - V(q, t) with a constant M, and forces F(q, t): only interior nodes are implicit (D11 ... D17).
     bool separable = false;
+    // The same but for constraints: M is constant, and forces hold no velocity.
+    bool constant_mass = false;
     std::string not_separable;  // why not, a clause: "dp_x/dx' = 1 + x^2 depends on the position"
 
     // Of separable systems only.

@@ -13,6 +13,7 @@
 #include "base/shifts.hpp"
 #include "base/solve.hpp"
 #include "base/trigonometry.hpp"
+#include "iteration/constrained_fixed_point.hpp"
 #include "iteration/convergence.hpp"
 #include "iteration/ensemble_fixed_point.hpp"
 #include "iteration/fixed_point.hpp"

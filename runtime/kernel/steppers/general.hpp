@@ -9,6 +9,7 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/solve.hpp"
+#include "../iteration/constrained_fixed_point.hpp"
 #include "../iteration/galerkin.hpp"
 #include "../iteration/galerkin_newton.hpp"
 #include "../iteration/velocity_of_momentum.hpp"
@@ -25,9 +26,11 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     static constexpr int nodes = K::nodes, multiplier_room = constraints > 0 ? constraints : 1;
 
     // Fixed-point iterations need the mass matrix of a node alone, which is full for them.
-    static constexpr bool has_fixed_point = K::any_number && !K::linear && N > 0 && n <= most_full;
+    static constexpr bool iterates_on_constraints = constraints > 0 && K::constant_mass;
+    static constexpr bool has_fixed_point =
+        (K::any_number || iterates_on_constraints) && !K::linear && N > 0 && n <= most_full;
     struct FixedPointState {
-        GalerkinFixedPoint<K, real> iteration;
+        std::conditional_t<iterates_on_constraints, ConstrainedFixedPoint<K>, GalerkinFixedPoint<K, real>> iteration;
         Pause pause;
     };
 
@@ -56,7 +59,10 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
                 }
             lobatto::solve<m, m>(D, integration);
         }
-        if constexpr (has_fixed_point) fixed_point.iteration.prepare(h);
+        if constexpr (has_fixed_point && iterates_on_constraints)
+            fixed_point.iteration.prepare(coefficients, h);
+        else if constexpr (has_fixed_point)
+            fixed_point.iteration.prepare(h);
         if constexpr (K::linear) return freeze(frozen);
         return Status::ok;
     }
@@ -197,9 +203,16 @@ private:
             const auto& memory = fixed_point.iteration;
             for (int b = 0; b < active; ++b)
                 for (int j = 0; j < m; ++j) Y[Layout::index(b, j)] = memory.displacement(K::active_index[b], j);
+            for (int c = 0; c < constraints; ++c) {
+                if constexpr (constraints > 0) {
+                    for (int j = 0; j < m; ++j) Y[Layout::index(active + c, j)] = memory.lambda[c * r + j];
+                }
+            }
             for (int c = 0; c < cyclic; ++c) {
-                if (kappas > 0) Y[active * m + c] = memory.kappa[K::cyclic_index[c]];
-                for (int i = 0; i < r; ++i) cyclic_rates[i * cyclic + c] = memory.v[K::cyclic_index[c] * r + i];
+                if constexpr (cyclic > 0) {
+                    if (kappas > 0) Y[active * m + c] = memory.kappa[K::cyclic_index[c]];
+                    for (int i = 0; i < r; ++i) cyclic_rates[i * cyclic + c] = memory.v[K::cyclic_index[c] * r + i];
+                }
             }
             is_current = true;
         }
@@ -232,6 +245,8 @@ private:
             iterations = static_cast<std::int32_t>(any.iteration.evaluations);
             increment = any.iteration.increment;
             if constexpr (K::clocked) elapsed = any.iteration.elapsed;
+            if constexpr (constraints > 0)
+                for (int c = 0; c < constraints; ++c) last_multiplier[c] = any.iteration.lambda[c * r + r - 1];
             any.pause.succeed();
             is_current = false;
             has_history = true;
