@@ -53,7 +53,7 @@ bool is_too_coarse(ExactEnergy& energy, const std::vector<State>& states, double
                 third = third + square(bend - before);
             }
         }
-        if (third > cln::cl_R(coarse * coarse) * second) return true;
+        if (third > cln::rational(cln::cl_R(coarse * coarse)) * second) return true;
     }
     return false;
 }
@@ -183,7 +183,8 @@ std::string EnergyWatch::departure(const Derivation& derivation, const Kernel& k
             const cln::cl_R error = cln::abs(here->value - start->value);
             if (error < cln::cl_R(departed * scale_of(state))) continue;
             const double steps = std::fabs((state.time - request.time) / request.step);
-            if (!too_coarse && error <= cln::max(cln::cl_R(a_rounding) * here->size, rounding_of(energy, state, steps)))
+            if (!too_coarse &&
+                error <= cln::max(cln::rational(cln::cl_R(a_rounding)) * here->size, rounding_of(energy, state, steps)))
                 continue;
             return Departure{state, error};
         }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdlib>
 #include <sstream>
 
 namespace lobatto {
@@ -138,22 +139,34 @@ private:
         return {below + "^" + (simple ? exponent : "(" + exponent + ")"), power};
     }
 
+    struct Range {
+        long largest, digits;  // binary: numbers are below 2^largest
+    };
+    Range range() const {
+        return precision_ == Precision::single     ? Range{128, 24}
+               : precision_ == Precision::double_  ? Range{1024, 53}
+               : precision_ == Precision::extended ? Range{16384, 64}
+                                                   : Range{16384, 113};
+    }
+    static long exponent_of(const cln::cl_R& value) {
+        return cln::zerop(value) ? 0
+                                 : cln::cl_I_to_long(cln::float_exponent(cln::cl_float(value, cln::float_format(20))));
+    }
+    bool is_too_small(const cln::cl_R& value) const { return exponent_of(value) < 4 - range().largest; }
+
+    // The number nearest to a value; what rounds to zero is zero.
     std::string literal(const cln::cl_R& value) const {
-        const long largest = precision_ == Precision::single ? 128 : precision_ == Precision::double_ ? 1024 : 16384;
-        const long exponent =
-            cln::zerop(value) ? 0 : cln::cl_I_to_long(cln::float_exponent(cln::cl_float(value, cln::float_format(20))));
-        // What rounds to zero among the kernel's numbers is zero; what keeps few of its digits is refused.
-        const long kept = precision_ == Precision::single     ? 24
-                          : precision_ == Precision::double_  ? 53
-                          : precision_ == Precision::extended ? 64
-                                                              : 113;
-        if (exponent < 2 - largest - kept) return literal(cln::cl_float(0, cln::float_format(20)));
-        if (exponent > largest || exponent < 4 - largest)
+        const auto [largest, kept] = range();
+        const long exponent = exponent_of(value);
+        if (exponent < 3 - largest - kept) return literal(cln::cl_float(0, cln::float_format(20)));
+        if (exponent > largest)
             throw DomainError("the formulas derived from it contain the number " + decimal(value, 3) +
                               ", beyond the range of the kernel's number type; choose other units");
         if (precision_ == Precision::double_) {
             std::array<char, 40> buffer{};
-            const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), cln::double_approx(value)).ptr;
+            const double nearest =
+                is_too_small(value) ? std::strtod(decimal(value, 40).c_str(), nullptr) : cln::double_approx(value);
+            const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), nearest).ptr;
             std::string text(buffer.data(), end);
             return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
         }
@@ -172,13 +185,28 @@ private:
         return {c.label, c.label.find_first_of("+- ") == std::string::npos ? power : sum};
     }
 
-    // Whether a sum can take in this product with one rounding: two factors or more, no quotient, and no change of
-    // sign, which would be an operation of its own.
+    // A constant factor: numbers whose product it is. Other factors go between them, so that what is too small by
+    // itself, such as exp(-900) beside exp(q), keeps its digits.
+    std::vector<std::string> literals(cln::cl_R value) const {
+        constexpr std::size_t most = 4;
+        const long part = range().largest - range().digits;
+        std::vector<std::string> result;
+        for (; is_too_small(value) && result.size() + 1 < most;
+             value = cln::scale_float(cln::cl_float(value, cln::float_format(60)), part))
+            result.push_back(literal(cln::scale_float(cln::cl_float(1, cln::float_format(20)), -part)));
+        result.insert(result.begin(), literal(value));
+        return result;
+    }
+
+    // Whether a sum can take in this product with one rounding: two factors or more, no quotient, no number in several
+    // parts, and no change of sign, which would be an operation of its own.
     bool can_fuse(Id term) const {
         const Node& node = graph_[term];
         return fuses_ && node.op == Op::multiply && (!naming_ || naming_(term).empty()) &&
                std::none_of(node.operands.begin(), node.operands.end(), [this](Id factor) {
-                   return graph_.is_number(factor, -1) || (graph_[factor].op == Op::power && graph_[factor].index < 0);
+                   return graph_.is_number(factor, -1) ||
+                          (graph_[factor].op == Op::power && graph_[factor].index < 0) ||
+                          (graph_[factor].op == Op::constant && is_too_small(graph_.constant_of(factor).value));
                });
     }
 
@@ -219,8 +247,7 @@ private:
     // Factors as numerator over denominator, with the sign in front.
     Printed fraction(const std::vector<Id>& factors) const {
         bool negative = false;
-        std::vector<std::string> above, below;
-        std::vector<Printed> alone;
+        std::vector<std::string> above, below, last;
         for (const Id factor : factors) {
             const Node& node = graph_[factor];
             const bool named = naming_ && factors.size() > 1 && !naming_(factor).empty();
@@ -231,7 +258,13 @@ private:
                     value = -value;
                 }
                 if (is_cpp()) {
-                    if (value != 1 || factors.size() == 1) above.push_back(literal(value));
+                    if (factors.size() == 1) {
+                        above.push_back(literal(value));
+                    } else if (value != 1) {
+                        last = literals(value);
+                        above.push_back(last.front());
+                        last.erase(last.begin());
+                    }
                 } else if (!is_rational(value)) {
                     above.push_back(decimal(value, shown_digits));
                 } else {
@@ -250,6 +283,7 @@ private:
                 above.push_back(enclosed(print(factor), factors.size() == 1 ? sum : power));
             }
         }
+        above.insert(above.end(), last.begin(), last.end());
         if (above.size() == 1 && above.front() == "1" && !below.empty()) above.clear();
         const std::string minus = negative ? "-" : "";
         if (below.empty())

@@ -168,6 +168,21 @@ TEST_CASE("a pulse far from the start is not taken for nothing, and what rounds 
     }
 }
 
+TEST_CASE("a constant smaller than all numbers keeps its digits beside large factors, or is the number nearest to it") {
+    // A wall exp(q - 715); exp(-715) by itself is a number of 43 bits.
+    const Place wall(scene_of("q'^2/2 - exp(-715)*exp(q)", "q = { position = 708, velocity = 0.05 }", four, 0.1, 200)),
+        shifted(scene_of("q'^2/2 - exp(q)", "q = { position = -7, velocity = 0.05 }", four, 0.1, 200)),
+        subnormal(scene_of("q'^2/2 - q^2/2 + 1e-310*q + 4e-324*q", swinging, four, 0.05, 50));
+    const test::Finished of_wall = wall.run(), of_shifted = shifted.run(), of_subnormal = subnormal.run();
+    const std::string errors = of_wall.err + of_shifted.err + of_subnormal.err;
+    CAPTURE(errors);
+    CHECK(of_wall.exit_code == 0);
+    CHECK(of_subnormal.exit_code == 0);
+    CHECK(shifted.end()[1] < -10);
+    CHECK(std::fabs(wall.end()[1] - 715 - shifted.end()[1]) < 1e-10);
+    CHECK(std::fabs(subnormal.end()[1] - std::cos(50)) < 1e-6);
+}
+
 TEST_CASE("the unit of a coordinate changes nothing: each is measured by its own amplitude") {
     const std::string lagrangian = "a'^2/2 - a^2/2*1e-4 + b'^2/2 + 25*cos(b)";
     const Place without(scene_of(lagrangian, "a = { position = 1e6, velocity = 0 }\nb = { position = 1, velocity = 0 }",
