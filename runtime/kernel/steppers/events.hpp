@@ -263,29 +263,58 @@ private:
         }
     }
 
-    // The changes of sign along the samples. A zero at a sample is one if the sign beyond it is another: else g only
-    // touches zero. Where g is not defined in between, nothing has happened.
+    // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number.
+    bool is_rounding(const Sample& sample, int e) {
+        real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
+        for (int i = 0; i < sample_count; ++i)
+            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
+        if (!sample.is_exact || !(fabs(sample.value) <= Limits<real>::root_epsilon * largest)) return false;
+        state_at(sample.theta, row);
+        if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
+        if (status != Status::ok) return false;
+        const real moved = real(1) + real(64) * Limits<real>::epsilon;
+        real change = real(0);
+        for (int k = 0; k <= 2 * n; ++k) {
+            real& number = k == 0 ? row[0] : k <= n ? row[k] : velocity[k - n - 1];
+            const real before = number;
+            number *= moved;
+            Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
+            number = before;
+            if (is_finite(values[e])) change += fabs(values[e] - sample.value);
+        }
+        return fabs(sample.value) <= change;
+    }
+
+    // The changes of sign along the samples. A zero at a sample, or what is rounding there, is one if the sign beyond
+    // it is another: else g only touches zero. Where g is not defined in between, nothing has happened.
     void walk(int e, real* rows, int& found) {
         real& last = step->event_values[e];  // that is not zero
-        real zero = -real(1);
+        int zero = -1, before = -1;          // samples: the first zero since the one before, which has the sign of last
         for (int i = 0; i < sample_count && status == Status::ok; ++i) {
-            const real value = samples[i].value;
-            if (!is_finite(value)) {
+            const Sample& here = samples[i];
+            if (!is_finite(here.value)) {
                 last = real(0);
-                zero = -real(1);
-            } else if (value == real(0)) {
-                if (zero < real(0)) zero = samples[i].theta;
+                zero = before = -1;
+            } else if (here.value == real(0) || is_rounding(here, e)) {
+                if (zero < 0) zero = i;
+                if (i == 0 && step->steps == 1) last = real(0);  // the motion starts there
             } else {
-                if (changes(last, value)) {
-                    const int direction = ((value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
+                if (changes(last, here.value)) {
+                    const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
                     if (K::event_direction[e] * direction >= 0) {
+                        const int from = before >= 0 ? before : 0;
+                        const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
                         bool is_root = true;
-                        const real root = zero >= real(0) ? zero : locate(e, samples[i - 1], samples[i], is_root);
+                        const real root = is_exactly ? samples[zero].theta
+                                          : changes(samples[from].value, here.value)
+                                              ? locate(e, samples[from], here, is_root)
+                                              : samples[from].theta;
                         if (is_root) add(e, root, rows, found);
                     }
                 }
-                last = value;
-                zero = -real(1);
+                last = here.value;
+                zero = -1;
+                before = i;
             }
         }
     }
