@@ -54,8 +54,9 @@ Companion::Companion(const Derivation& derivation, const Kernel& kernel, const T
       groups_(amplitude_groups(derivation.scene)),
       order_(derivation.quadrature.order()),
       rows_a_step_(1 + request.dense),
-      narrow_(derivation.system, request.parameters) {
+      narrow_(derivation.system) {
     request_.parameters = request.parameters;
+    narrow_.set_parameters(request.parameters);
     request_.q = request.q;
     request_.p = request.p;
     request_.time = request.time;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "analysis/accuracy/amplitude.hpp"
 #include "analysis/accuracy/companion.hpp"
@@ -13,8 +14,25 @@ namespace lobatto {
 namespace {
 
 constexpr std::int64_t numbers_at_once = 1 << 20;  // of companions that are computed together
+constexpr std::int64_t between_looks = 8;          // steps of a companion, at least
 
 const double unknown = std::numeric_limits<double>::quiet_NaN();
+
+// In how many parts a companion looks at its way from one comparison to the next: states that are kept after whole
+// periods are all at one place, and tell no amplitude.
+std::int64_t looks_of(std::int64_t every) {
+    for (const std::int64_t parts : {13, 11, 7, 5, 3})
+        if (every % parts != 0 && every / parts >= between_looks) return parts;
+    return 1;
+}
+
+// Steps for `every` of the sweep: about 3/2 of them, without a common divisor, in equal parts.
+std::int64_t steps_taken(std::int64_t every) {
+    const std::int64_t parts = looks_of(every);
+    std::int64_t taken = (companion_steps(every) + parts - 1) / parts * parts;
+    while (std::gcd(every, taken) != 1) taken += parts;
+    return taken;
+}
 
 }  // namespace
 
@@ -23,12 +41,14 @@ EnsembleCompanion::EnsembleCompanion(const Derivation& derivation, const Kernel&
       kernel_(kernel),
       request_(request),
       groups_(amplitude_groups(derivation.scene)),
-      order_(derivation.quadrature.order()) {}
+      order_(derivation.quadrature.order()),
+      narrow_(derivation.system),
+      stepper_(kernel) {}
 
 void EnsembleCompanion::compute(std::int64_t first) {
     const auto n = static_cast<std::int64_t>(groups_.size());
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
-                       rows = request_.steps / every + 1,
+                       rows = (request_.steps / every + 1) * looks_of(every),
                        count = std::min(std::max<std::int64_t>(numbers_at_once / ((4 + 2 * rows) * n), 64),
                                         request_.count - first);
     first_ = first;
@@ -57,11 +77,11 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
     companion.from_velocities = request_.from_velocities && begin == 0;
     companion.time = time_after(request_, begin);
     const bool is_clocked = request_.arrivals.interval != 0;  // then both arrive at the same times
-    const std::int64_t taken = is_clocked ? every : companion_steps(every);
+    const std::int64_t taken = is_clocked ? every : steps_taken(every), looks = is_clocked ? 1 : looks_of(every);
     companion.step = is_clocked ? request_.step / clocked_ratio
                                 : request_.step * static_cast<double>(every) / static_cast<double>(taken);
     companion.steps = steps / every * taken;
-    companion.every = taken;
+    companion.every = taken / looks;
     companion.counts = nullptr;
     companion.progress = nullptr;
     companion.sink = [&](const EnsembleTrajectory& trajectory) {
@@ -70,21 +90,41 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
         for (std::int64_t i = 0; i < trajectory.kept.count; ++i) {
             const double* const row = trajectory.kept.rows + i * trajectory.kept.columns + 1;
             widen_to(known.least, known.most, row, 2 * n);
-            if (i > 0) known.rows.insert(known.rows.end(), row, row + 2 * n);
+            if (i > 0 && i % looks == 0) known.rows.insert(known.rows.end(), row, row + 2 * n);
         }
     };
     if (integrate(kernel_, companion).interrupted) known_.clear();
 }
 
-bool EnsembleCompanion::goes_alone(const EnsembleStart& start) {
-    if (derivation_.system.autonomous) return false;
-    if (request_.every < fewest_driven_steps && request_.every > 0) return true;
+bool EnsembleCompanion::has_pulses(const EnsembleStart& start) {
     if (start.parameters == pulse_parameters_ && !start.parameters.empty()) return has_pulses_;
     pulse_parameters_ = start.parameters;
     const double end = request_.time + static_cast<double>(request_.steps) * request_.step;
     has_pulses_ =
         !find_pulses(derivation_.system, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
     return has_pulses_;
+}
+
+bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
+    if (narrow_.empty() || request_.arrivals.interval != 0) return false;
+    if (stepper_.prepare(start.parameters, request_.step) != LOBATTO_OK) return false;
+    narrow_.set_parameters(start.parameters);
+    const auto n = static_cast<std::ptrdiff_t>(groups_.size());
+    const auto reach = static_cast<double>(request_.every == 0 ? request_.steps : request_.every);
+    for (std::int64_t i = 0; i < trajectory.kept.count; ++i) {
+        const double* const row = trajectory.kept.rows + i * trajectory.kept.columns;
+        NarrowTerms::State state{row[0], {row + 1, row + 1 + n}, {}};
+        if (stepper_.velocity(row[0], state.q, {row + 1 + n, row + 1 + 2 * n}, state.v) != LOBATTO_OK ||
+            narrow_.may_be_met(state, request_.step, reach))
+            return true;
+    }
+    return false;
+}
+
+bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
+    if (meets_narrow_terms(trajectory, start)) return true;
+    if (derivation_.system.autonomous) return false;
+    return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
 }
 
 // As of a run: companions take short steps at pulses, each at its own.
@@ -118,7 +158,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     start.q.resize(groups_.size());
     start.rate.resize(groups_.size());
     request_.start(trajectory.index, start);
-    if (goes_alone(start)) return alone(trajectory, start);
+    if (goes_alone(trajectory, start)) return alone(trajectory, start);
     if (known_.empty() || trajectory.index >= first_ + std::ssize(known_)) compute(trajectory.index);
     const std::int64_t place = trajectory.index - first_;
     if (place >= std::ssize(known_)) return {unknown, false};  // interrupted
@@ -134,7 +174,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
                        skipped = kept.count - comparisons;  // the start, if it is kept
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
-                             : static_cast<double>(companion_steps(every)) / static_cast<double>(every),
+                             : static_cast<double>(steps_taken(every)) / static_cast<double>(every),
                  of_run = 1 / (1 - std::pow(ratio, -order_));
     Error error{0, false};
     double largest = 0;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "analysis/accuracy/narrow_terms.hpp"
 #include "analysis/accuracy/pulses.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "runtime/run/ensemble.hpp"
@@ -36,8 +37,10 @@ private:
     void compute(std::int64_t first);
     // `steps` of the sweep's own from `begin` on; the companions are at `begin` already.
     void take(std::int64_t begin, std::int64_t steps, std::int64_t every);
-    // Whether it meets pulses, or is driven and kept too often for a companion in lanes.
-    bool goes_alone(const EnsembleStart& start);
+    // Whether it may meet pulses or narrow terms, or is driven and kept too often for a companion in lanes.
+    bool goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start);
+    bool meets_narrow_terms(const EnsembleTrajectory& trajectory, const EnsembleStart& start);
+    bool has_pulses(const EnsembleStart& start);
     Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
 
     const Derivation& derivation_;
@@ -47,6 +50,8 @@ private:
     int order_;
     std::vector<double> pulse_parameters_;  // those that were asked for last
     bool has_pulses_ = false;               // with these
+    NarrowTerms narrow_;
+    LoadedStepper<double> stepper_;
     std::int64_t first_ = 0;
     std::vector<Known> known_;  // from trajectory first_ on
 };

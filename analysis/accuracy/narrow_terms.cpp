@@ -25,21 +25,19 @@ constexpr double flat = 20;       // tanh(20) is 1
 
 }  // namespace
 
-NarrowTerms::NarrowTerms(const System& system, const std::vector<double>& parameters) {
+NarrowTerms::NarrowTerms(const System& system) {
     if (system.q.size() > coordinate_limit) return;
-    GiNaC::exmap values;
-    for (std::size_t i = 0; i < parameters.size(); ++i) values[system.parameters[i]] = GiNaC::numeric(parameters[i]);
-    std::vector<GiNaC::symbol> variables{system.t};
-    for (const auto* list : {&system.q, &system.v}) variables.insert(variables.end(), list->begin(), list->end());
+    std::vector<GiNaC::symbol> moving{system.t};
+    for (const auto* list : {&system.q, &system.v}) moving.insert(moving.end(), list->begin(), list->end());
     const auto moves = [&](const ex& part) {
-        return std::any_of(variables.begin(), variables.end(), [&](const auto& symbol) { return part.has(symbol); });
+        return std::any_of(moving.begin(), moving.end(), [&](const auto& symbol) { return part.has(symbol); });
     };
+    std::vector<GiNaC::symbol> variables = moving;
+    variables.insert(variables.end(), system.parameters.begin(), system.parameters.end());
     GiNaC::exset known;
     const auto add = [&](Kind kind, const ex& u) {
-        Tape tape;
-        if (terms_.size() < most_terms && moves(u) && known.insert(u).second &&
-            compile(u.subs(values), variables, tape))
-            terms_.push_back({kind, tape});
+        if (terms_.size() == most_terms || !moves(u) || !known.insert(u).second) return;
+        if (const auto tape = Tape::of(u, variables)) terms_.push_back({kind, *tape});
     };
     static const std::map<std::string, Kind> kinds{{"exp", Kind::peak},  {"tanh", Kind::step}, {"sinh", Kind::step},
                                                    {"cosh", Kind::step}, {"atan", Kind::tail}, {"log", Kind::pole}};
@@ -61,63 +59,6 @@ NarrowTerms::NarrowTerms(const System& system, const std::vector<double>& parame
     for (const ex& force : system.outer_force) look_at(force);
     for (const auto& [place, mass] : system.momentum_v.entries())
         if (place.first == place.second) add(Kind::pole, mass);
-}
-
-bool NarrowTerms::compile(const ex& formula, const std::vector<GiNaC::symbol>& variables, Tape& tape) {
-    static const std::map<std::string, double (*)(double)> functions{
-        {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"exp", std::exp},
-        {"log", std::log},   {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh},
-        {"asin", std::asin}, {"acos", std::acos}, {"atan", std::atan}};
-    Instruction instruction{Operation::number};
-    const bool is_function = GiNaC::is_a<GiNaC::function>(formula), is_power = GiNaC::is_a<GiNaC::power>(formula);
-    if (GiNaC::is_a<GiNaC::symbol>(formula)) {
-        const auto found = std::find(variables.begin(), variables.end(), GiNaC::ex_to<GiNaC::symbol>(formula));
-        if (found == variables.end()) return false;
-        instruction.operation = Operation::variable;
-        instruction.variable = static_cast<std::size_t>(found - variables.begin());
-    } else if (is_function || is_power || GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula)) {
-        for (const ex& operand : formula)
-            if (!compile(operand, variables, tape)) return false;
-        instruction.operands = static_cast<int>(formula.nops());
-        instruction.operation = is_function                        ? Operation::call
-                                : is_power                         ? Operation::power
-                                : GiNaC::is_a<GiNaC::add>(formula) ? Operation::sum
-                                                                   : Operation::product;
-        if (is_function) {
-            const auto found = functions.find(GiNaC::ex_to<GiNaC::function>(formula).get_name());
-            if (found == functions.end()) return false;
-            instruction.function = found->second;
-        }
-    } else {
-        const ex number = formula.evalf();
-        if (!GiNaC::is_a<GiNaC::numeric>(number) || !GiNaC::ex_to<GiNaC::numeric>(number).is_real()) return false;
-        instruction.number = GiNaC::ex_to<GiNaC::numeric>(number).to_double();
-    }
-    tape.push_back(instruction);
-    return true;
-}
-
-double NarrowTerms::value(const Tape& tape, const std::vector<double>& variables) {
-    std::vector<double> stack;
-    stack.reserve(tape.size());
-    for (const Instruction& instruction : tape) {
-        if (instruction.operands == 0) {
-            const bool is_number = instruction.operation == Operation::number;
-            stack.push_back(is_number ? instruction.number : variables[instruction.variable]);
-            continue;
-        }
-        const auto first = stack.end() - instruction.operands;
-        double result = *first;
-        if (instruction.operation == Operation::call) result = instruction.function(*first);
-        if (instruction.operation == Operation::power) result = std::pow(first[0], first[1]);
-        for (auto operand = first + 1; operand != stack.end(); ++operand) {
-            if (instruction.operation == Operation::sum) result += *operand;
-            if (instruction.operation == Operation::product) result *= *operand;
-        }
-        stack.erase(first, stack.end());
-        stack.push_back(result);
-    }
-    return stack.back();
 }
 
 // Where on the way, 0 to 1, exp(u) is largest, or |u| least, if the term changes there within half of the way.
@@ -160,6 +101,7 @@ std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to)
     const std::size_t n = from.q.size();
     const double duration = to.time - from.time;
     std::vector<double> variables(1 + 2 * n);
+    variables.insert(variables.end(), parameters_.begin(), parameters_.end());
     std::optional<Found> narrowest;
     for (const Term& term : terms_) {
         const auto u = [&](double s) {
@@ -170,13 +112,36 @@ std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to)
                 variables[1 + k] = from.q[k] + s * s * (3 - 2 * s) * way + s * r * (r * a - s * b);
                 variables[1 + n + k] = (6 * s * r * way + r * (1 - 3 * s) * a + s * (3 * s - 2) * b) / duration;
             }
-            return value(term.tape, variables);
+            return term.tape(variables);
         };
         const std::optional<Found> found = narrow_place(term.kind, u);
         if (found && (!narrowest || found->width < narrowest->width)) narrowest = found;
     }
     if (!narrowest) return {};
     return Pulse{from.time + narrowest->place * duration, fine * narrowest->width * std::fabs(duration)};
+}
+
+bool NarrowTerms::may_be_met(const State& at, double step, double reach) const {
+    const std::size_t n = at.q.size();
+    std::vector<double> variables{at.time};
+    variables.insert(variables.end(), at.q.begin(), at.q.end());
+    variables.insert(variables.end(), at.v.begin(), at.v.end());
+    variables.insert(variables.end(), parameters_.begin(), parameters_.end());
+    return std::any_of(terms_.begin(), terms_.end(), [&](const Term& term) {
+        const auto u = [&](double steps) {
+            variables[0] = at.time + steps * step;
+            for (std::size_t k = 0; k < n; ++k) variables[1 + k] = at.q[k] + steps * step * at.v[k];
+            return term.tape(variables);
+        };
+        const double before = u(-1), here = u(0), after = u(1);
+        if (!std::isfinite(before + after)) return true;
+        if (term.kind != Kind::pole) return std::fmax(std::fabs(after - here), std::fabs(before - here)) > 1;
+        // |u| is least where this parabola is, or where it vanishes.
+        const double slope = (after - before) / 2, bend = before - 2 * here + after;
+        if (std::fabs(slope) * reach > std::fabs(here) && std::fabs(bend) * reach < std::fabs(slope)) return true;
+        const double place = -slope / bend, least = here + slope * place / 2;
+        return std::fabs(place) <= reach && !(2 * std::fabs(least) > std::fabs(bend) / 4);
+    });
 }
 
 }  // namespace lobatto

@@ -8,15 +8,17 @@
 #include <vector>
 
 #include "analysis/accuracy/pulses.hpp"
+#include "analysis/accuracy/tape.hpp"
 #include "generator/mechanics/system.hpp"
 
 namespace lobatto {
 
 class NarrowTerms {
 public:
-    NarrowTerms(const System& system, const std::vector<double>& parameters);
+    explicit NarrowTerms(const System& system);
 
     bool empty() const { return terms_.empty(); }
+    void set_parameters(const std::vector<double>& parameters) { parameters_ = parameters; }
 
     struct State {
         double time;
@@ -24,18 +26,12 @@ public:
     };
     // The narrowest that is met on the cubic way between two states, if it is narrower than half of that.
     std::optional<Pulse> on_the_way(const State& from, const State& to) const;
+    // Whether steps of this length may be too long for a term, as it looks from a state: on the straight line through
+    // it, `reach` steps to both sides.
+    bool may_be_met(const State& at, double step, double reach) const;
 
 private:
     enum class Kind { peak, step, tail, pole };  // exp; tanh, sinh, cosh; atan; negative and broken powers, logarithms
-    enum class Operation { number, variable, sum, product, power, call };
-    struct Instruction {
-        Operation operation;
-        double number = 0;         // or the exponent, if it is one
-        std::size_t variable = 0;  // t, q, v
-        int operands = 0;
-        double (*function)(double) = nullptr;
-    };
-    using Tape = std::vector<Instruction>;  // operands come before what is done with them
     struct Term {
         Kind kind;
         Tape tape;
@@ -44,11 +40,10 @@ private:
         double place, width;  // of the way
     };
 
-    static bool compile(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables, Tape& tape);
-    static double value(const Tape& tape, const std::vector<double>& variables);
     template <class U>
     static std::optional<Found> narrow_place(Kind kind, const U& u);
 
+    std::vector<double> parameters_;
     std::vector<Term> terms_;
 };
 

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/domains.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/accuracy/step_judge.hpp"
 #include "analysis/accuracy/watch.hpp"
@@ -176,7 +177,8 @@ Prepared prepare(const RunOptions& options) {
 // All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
 class Observers {
 public:
-    static inline const std::vector<std::string> names = {"counts", "watch", "step judge", "energy watch", "companion"};
+    static inline const std::vector<std::string> names = {"counts",       "watch",     "step judge",
+                                                          "energy watch", "companion", "left domain"};
 
     // `measures`: whether a companion runs beside it.
     Observers(const Prepared& run, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
@@ -184,6 +186,8 @@ public:
         : watch(run.scene, run.derivation.structure, stepper, velocity),
           judge(run.scene),
           energy(run.derivation, run.kernel),
+          domains(run.scene, run.derivation.system),
+          parameters(request.parameters),
           counts(1 + run.scene.outputs.events.size(), 0) {
         if (measures) companion.emplace(run.derivation, run.kernel, request);
     }
@@ -193,6 +197,9 @@ public:
         judge.observe(records);
         energy.observe(records);
         if (companion) companion->observe(records);
+        if (left_domain.empty())
+            if (const std::int64_t i = domains.left_at(parameters, records); i >= 0)
+                left_domain.assign(records.rows + i * records.columns, records.rows + (i + 1) * records.columns);
         counts[0] += static_cast<double>(records.count);
     }
     void observe(const EventRecords& records) {
@@ -205,7 +212,8 @@ public:
                 {"watch", watch.save()},
                 {"step judge", judge.save()},
                 {"energy watch", energy.save()},
-                {"companion", companion ? companion->save() : std::vector<double>()}};
+                {"companion", companion ? companion->save() : std::vector<double>()},
+                {"left domain", left_domain}};
     }
     void restore(const std::map<std::string, std::vector<double>>& saved) {
         counts = saved.at("counts");
@@ -213,13 +221,17 @@ public:
         judge.restore(saved.at("step judge"));
         energy.restore(saved.at("energy watch"));
         if (companion) companion->restore(saved.at("companion"));
+        left_domain = saved.at("left domain");
     }
 
     Watch watch;
     StepJudge judge;
     EnergyWatch energy;
     std::optional<Companion> companion;
-    std::vector<double> counts;  // of the states, and of each kind of event
+    Domains domains;
+    std::vector<double> parameters;
+    std::vector<double> left_domain;  // t, q, p: the first state where a formula has no value
+    std::vector<double> counts;       // of the states, and of each kind of event
 };
 
 // The files of a run: its trajectory, its events, and while it goes on its checkpoint.
@@ -323,6 +335,13 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) 
 std::string departure_of(const Prepared& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                          const Observers& observers) {
     if (result.status != LOBATTO_OK || result.interrupted) return "";
+    if (const std::vector<double>& row = observers.left_domain; !row.empty()) {
+        const auto middle = row.begin() + 1 + std::ssize(result.q);
+        return fmt::format(
+            "the run left its Lagrangian by t = {:.6g}, q = {}: {}, and has no value there. Try an earlier end, start "
+            "elsewhere, or write the formula without it.",
+            row[0], list_text({row.begin() + 1, middle}), observers.domains.text(observers.parameters, row.data()));
+    }
     const std::string departure = observers.energy.departure(run.derivation, run.kernel, request);
     if (run.scene.clock) return departure;
     return departure.empty() ? linear_departure(run.derivation, run.scene, run.kernel, request, result) : departure;

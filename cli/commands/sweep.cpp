@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/domains.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/accuracy/ensemble_companion.hpp"
 #include "analysis/accuracy/sweep_watch.hpp"
@@ -44,9 +46,10 @@ const char* const reason[] = {"reached the end",
                               "not supported by the kernel",
                               "energy off: beyond stability, or past a singularity",
                               "not resolved: the error is as large as the motion",
-                              "start off the constraints"};
+                              "start off the constraints",
+                              "a formula has no value there"};
 constexpr double large_error = 0.03;  // of the amplitude: worth a warning whoever asked
-constexpr int departed = 7, unresolved = 8, last_status = 9;
+constexpr int departed = 7, unresolved = 8, undefined = 10;
 
 struct SweepOptions {
     std::string scene;
@@ -133,7 +136,7 @@ std::vector<std::string> comments_of(const Scene& scene, const KernelSource& sou
     }
     if (!parameters.empty()) comments.push_back(fmt::format("parameters: {}", fmt::join(parameters, ", ")));
     for (const Axis& axis : grid.axes()) comments.push_back(fmt::format("vary: {} = {}", axis.name, axis.written));
-    for (int status = 0; status <= last_status; ++status)
+    for (int status = 0; status <= undefined; ++status)
         if (status != LOBATTO_UNSUPPORTED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
     comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
     return comments;
@@ -149,9 +152,11 @@ struct Verdict {
 // Judges the trajectories, in their order: by their energies, and by their companions.
 class Judges {
 public:
-    Judges(const SweepOptions& options, const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
-           const EnsembleRequest& request)
+    Judges(const SweepOptions& options, const Scene& scene, const Derivation& derivation, const KernelSource& source,
+           const Kernel& kernel, const EnsembleRequest& request)
         : watch(derivation, source, kernel, request),
+          request_(request),
+          domains_(scene, derivation.system),
           accepts_lost_(options.beyond_horizon || derivation.scene.run.beyond_horizon) {
         if (!options.unmeasured) companion_.emplace(derivation, kernel, request);
     }
@@ -167,6 +172,7 @@ public:
             verdict.error = error.relative;
             if (error.lost && !accepts_lost_ && verdict.status == LOBATTO_OK) verdict.status = unresolved;
         }
+        if (!is_defined(trajectory)) verdict.status = undefined;
         if (verdict.status == LOBATTO_OK) {
             watch.observe(trajectory);
             if (!(verdict.error <= worst_error) && !std::isnan(verdict.error)) {
@@ -180,11 +186,23 @@ public:
     }
 
     SweepWatch watch;
-    std::array<std::int64_t, 2> refused{};  // departed, unresolved
+    std::array<std::int64_t, 4> refused{};  // by statuses from `departed` on
     double worst_error = -1;                // of those that are resolved
     std::int64_t worst = -1;
 
+    std::int64_t count_refused() const { return std::accumulate(refused.begin(), refused.end(), std::int64_t(0)); }
+
 private:
+    // Whether formulas have values at the start and where states are kept, also those that kernels have lost.
+    bool is_defined(const EnsembleTrajectory& trajectory) const {
+        EnsembleStart start;
+        request_.start(trajectory.index, start);
+        return domains_.hold_at_start(request_.time, start.parameters, start.q, start.rate) &&
+               domains_.left_at(start.parameters, trajectory.kept) < 0;
+    }
+
+    const EnsembleRequest& request_;
+    Domains domains_;
     std::optional<EnsembleCompanion> companion_;
     bool accepts_lost_;
 };
@@ -218,7 +236,7 @@ std::string failures_text(const Scene& scene, const Grid& grid, const EnsembleRe
         failed += result.count_of[status];
         reasons.push_back(fmt::format("{} {}", result.count_of[status], reason[status]));
     }
-    for (const int status : {departed, unresolved}) {
+    for (const int status : {departed, unresolved, undefined}) {
         const std::int64_t count = judges.refused[static_cast<std::size_t>(status - departed)];
         if (count > 0) reasons.push_back(fmt::format("{} {}", count, reason[status]));
         failed += count;
@@ -242,8 +260,7 @@ std::string spread_text(const Spread& spread) {
 
 void print_table(const Derivation& derivation, const Scene& scene, const Grid& grid, const EnsembleRequest& request,
                  const EnsembleResult& result, const Judges& judges, int kernel_lanes) {
-    const std::int64_t failed =
-        result.trajectories - result.count_of[LOBATTO_OK] + judges.refused[0] + judges.refused[1];
+    const std::int64_t failed = result.trajectories - result.count_of[LOBATTO_OK] + judges.count_refused();
     const std::string of_all = result.interrupted ? fmt::format(" of {}", request.count) : "";
     print_row("trajectories", fmt::format("{}{}{}", result.trajectories, of_all,
                                           failed == 0 ? "" : fmt::format(", {} failed", failed)));
@@ -396,7 +413,7 @@ void sweep(const SweepOptions& options) {
     SweepTable table(path, format, comments_of(scene, source, request, grid),
                      columns_of(scene, grid, !options.unmeasured));
     std::vector<Failure> failures;
-    Judges judges(options, derivation, source, kernel, request);
+    Judges judges(options, scene, derivation, source, kernel, request);
     Verdict verdict;
     request.counts = [&](const EnsembleTrajectory& trajectory) {
         verdict = judges.judge(trajectory);
@@ -433,7 +450,7 @@ void sweep(const SweepOptions& options) {
             fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
         print_fixed_times(scene, grid);
     }
-    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || judges.refused[0] + judges.refused[1] > 0;
+    const bool failed = result.count_of[LOBATTO_OK] < result.trajectories || judges.count_refused() > 0;
     if (result.interrupted) {
         tell("lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n", result.trajectories,
              request.count, path);

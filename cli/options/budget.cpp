@@ -21,6 +21,8 @@ void BudgetOption::add_to(Command& command) {
 }
 
 double BudgetOption::seconds() const {
+    if (const std::string complaint = number_complaint(text); !complaint.empty())
+        throw InputError("--budget: " + complaint);
     char* unit = nullptr;
     const double value = std::strtod(text.c_str(), &unit);
     const std::string rest = unit;

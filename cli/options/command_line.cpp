@@ -9,6 +9,12 @@
 
 namespace lobatto {
 
+std::string number_complaint(const std::string& number) {
+    const std::size_t first = number.find_first_not_of("+-");
+    if (first == std::string::npos || number[first] != '.') return "";
+    return fmt::format("a number begins with a digit: write 0{}, not {}", number.substr(first), number.substr(first));
+}
+
 Option& Option::required() {
     option_->required();
     return *this;
@@ -83,11 +89,11 @@ Option Command::option(const std::string& name, std::optional<std::int64_t>& tar
 }
 
 Option Command::option(const std::string& name, double& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    return Option(app_->add_option(name, target, help)).checked_by(number_complaint);
 }
 
 Option Command::option(const std::string& name, std::optional<double>& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    return Option(app_->add_option(name, target, help)).checked_by(number_complaint);
 }
 
 Option Command::choice_of(const std::string& name, std::function<void(int)> store,

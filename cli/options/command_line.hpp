@@ -17,6 +17,9 @@ class Option;
 
 namespace lobatto {
 
+// What is wrong with a number that begins otherwise, as in formulas: "write 0.5, not .5". Empty: nothing.
+std::string number_complaint(const std::string& number);
+
 // What may be asked of an option or a flag after it was declared.
 class Option {
 public:

@@ -47,8 +47,9 @@ struct DomainCondition {
     enum class Kind : std::uint8_t { nonzero, nonnegative, positive, within_one };
     Kind kind = Kind::nonzero;
     GiNaC::ex expression;
-    std::string operation;  // "the square root"
+    std::string operation;  // "a square root"
     Position at;
+    bool of_motion = true;  // else of the step or the end time
 };
 
 struct Names {

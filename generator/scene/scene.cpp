@@ -54,8 +54,10 @@ public:
         if (const Entry* title = root_.find("title")) scene_.title = label_of(source_, *title, longest_title);
         system_.read();
         read_method();
+        const std::size_t of_motion = system_.conditions().size();
         read_run();
         scene_.conditions = system_.conditions();
+        for (std::size_t i = of_motion; i < scene_.conditions.size(); ++i) scene_.conditions[i].of_motion = false;
         read_output();
         system_.refuse_unused();
         return std::move(scene_);

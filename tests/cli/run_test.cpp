@@ -212,6 +212,9 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
     CHECK(refusal({"--set", "omgea=2"}) ==
           "--set:1:1: unknown parameter 'omgea'; declared: m, omega. Did you mean 'omega'?\n  1 | omgea=2\n   "
           " | ^\n");
+    CHECK(refusal({"--tolerance", ".5e-6"}) ==
+          "lobatto: --tolerance: a number begins with a digit: write 0.5e-6, not .5e-6\n"
+          "`lobatto run --help` shows what can be given.\n");
     CHECK(refusal({"--set", "m"}) == "--set:1:1: expected name=value, such as --set m=2\n  1 | m\n    | ^\n");
     for (const std::string value : {"0", "-1e-6", "0.002", "nan", "small"})
         CHECK(contains(refusal({"--tolerance", value}), "--tolerance: the tolerance is " + value +
@@ -652,4 +655,36 @@ TEST_CASE("a value that is set is refused where the formula as written has no va
         CHECK(refused.exit_code == 2);
         CHECK(contains(refused.err, "a square root has no value at the start: it is of m - 2 = -1"));
     }
+}
+
+TEST_CASE("a run that leaves the domain of a formula is told, though the formula cancels") {
+    const test::TemporaryFolder folder;
+    const std::string scene = folder / "scene.toml";
+    for (const char* term : {"exp(log(q - 3))", "sqrt(q - 3)^2", "((q - 3)^0.5)^2", "(q - 3)^1.5/(q - 3)^0.5",
+                             "9*cos(acos((q - 9)/6))", "q*(q - 3)/(q - 3)"}) {
+        test::write_text(scene, std::string("lagrangian = \"q'^2/2 - ") + term +
+                                    "\"\n[coordinates]\nq = { position = 4, velocity = 0 }\n[run]\nstep = 0.1\n"
+                                    "until = 3\n");
+        const test::Finished done = test::run({LOBATTO_PROGRAM, "run", scene, "-o", folder / "out.csv"});
+        CAPTURE(term);
+        CAPTURE(done.err);
+        const bool has_value = std::string(term) == "q*(q - 3)/(q - 3)";  // on both sides of one place
+        CHECK(done.exit_code == (has_value ? 0 : 3));
+        if (std::string(term) == "exp(log(q - 3))")
+            CHECK(contains(done.err,
+                           "the run left its Lagrangian by t = 1.5, q = (2.875): a logarithm, line 1 column 28, "
+                           "is of q - 3 = -0.125, and has no value there"));
+    }
+}
+
+TEST_CASE("energies beyond all numbers are told, and are no crash") {
+    const test::TemporaryFolder folder;
+    test::write_text(
+        folder / "scene.toml",
+        "lagrangian = \"q'^2/2 - exp(-900)*k*exp(q)\"\n[coordinates]\nq = { position = 600, velocity = 1 }\n"
+        "[parameters]\nk = 1e300\n[run]\nstep = 0.1\nuntil = 1\n");
+    const test::Finished done = test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "out.csv"});
+    INFO(done.err);
+    CHECK(done.exit_code == 3);
+    CHECK(contains(done.err, "the run is wrong from step 1 on"));
 }

@@ -560,6 +560,55 @@ TEST_CASE("a sweep looks at motions on their way, and at pulses between its step
           std::vector<double>{0, 3000, 6000, 9000, 10000, 0, 3000, 6000, 9000, 10000});
 }
 
+TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by states after whole periods") {
+    const Place place;
+    // Driven, so that no energy tells what the well does. Before, the error was said to be 1e-9 where it is 0.1.
+    const std::string well = place.file("well.toml");
+    test::write_text(well,
+                     "lagrangian = \"q'^2/2 - q^2/2 + 0.001*q*cos(t) + 0.05*tanh((q - c)/0.00001)\"\ntime = \"t\"\n"
+                     "[coordinates]\nq = { position = 1, velocity = 0 }\n[parameters]\nc = 0.1\n"
+                     "[run]\nstep = 0.1\nuntil = 20\n");
+    place.sweep({well, "--vary", "q=1,0.05"});
+    const std::vector<double> error = column(read_trajectory(place.file()), "error");
+    CHECK(!(error[0] < 0.05));
+    CHECK(error[1] < 1e-7);
+    // 40 steps are one period. Before, the error of q = 0.001 was 0.1, relative to how far rounding moves the states.
+    const std::string still = place.file("still.toml");
+    test::write_text(still,
+                     "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
+                     "[run]\nstep = \"2*pi/40\"\nuntil = \"200*pi\"\n");
+    for (const char* every : {"1000", "400", "40"}) {
+        const TrajectoryTable table = place.table({still, "--vary", "q=0.001,0.01", "--every", every});
+        const std::vector<double> errors = column(table, "error"), status = column(table, "status");
+        for (std::size_t i = 0; i < errors.size(); ++i)
+            if (!std::isnan(errors[i])) CHECK(errors[i] < 1e-9);
+        CHECK(*std::max_element(status.begin(), status.end()) == 0);
+    }
+}
+
+TEST_CASE("a trajectory whose formulas have no value, though they cancel, is no success") {
+    const Place place;
+    const auto status_of = [&](const std::string& position, const std::string& lagrangian, const std::string& vary) {
+        const std::string scene = place.file("scene.toml");
+        test::write_text(scene, "lagrangian = \"" + lagrangian + "\"\n[coordinates]\nq = { position = " + position +
+                                    ", velocity = 0.5 }\n[parameters]\nm = 3\nk = 1\n[run]\nstep = 0.1\nuntil = 3\n");
+        const test::Finished done = place.sweep({scene, "--vary", vary});
+        INFO(done.err);
+        CHECK(done.exit_code == 3);
+        CHECK(contains(done.err, "a formula has no value there"));
+        return column(read_trajectory(place.file()), "status");
+    };
+    const std::string plain = "m*q'^2/2 - k*q^2/2";
+    for (const char* position : {"\"sqrt(m - 2)^2\"", "\"(m - k)/(m - k)\"", "\"0*log(m - k) + 1\"",
+                                 "\"(m - k)*(m - k)^(-1)\"", "\"exp(log(m - k))\""})
+        CHECK(status_of(position, plain, "m=1,3") == std::vector<double>{10, 0});
+    CHECK(status_of("1", "m*q'^2/2 - k*sqrt(m - 2)^2*q^2/2", "m=1,3") == std::vector<double>{10, 0});
+    CHECK(status_of("4", "m*q'^2/2 - k*sqrt(q - 3)^2", "q=2,9") == std::vector<double>{10, 0});
+    CHECK(status_of("1", "m*q'^2/2 - k*cos(acos(q/9))", "q=2,10") == std::vector<double>{0, 10});
+    // The motion leaves the domain on its way.
+    CHECK(status_of("4", "m*q'^2/2 - 3*k*exp(log(q - 3))", "q=3.5,9") == std::vector<double>{10, 0});
+}
+
 TEST_CASE("contradictions on the command line are errors") {
     const Place place;
     const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/tape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+namespace lobatto {
+
+using GiNaC::ex;
+
+std::optional<Tape> Tape::of(const ex& formula, const std::vector<GiNaC::symbol>& variables) {
+    Tape tape;
+    if (!tape.append(formula, variables)) return std::nullopt;
+    return tape;
+}
+
+bool Tape::append(const ex& formula, const std::vector<GiNaC::symbol>& variables) {
+    static const std::map<std::string, double (*)(double)> functions{
+        {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"exp", std::exp},
+        {"log", std::log},   {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh},
+        {"asin", std::asin}, {"acos", std::acos}, {"atan", std::atan}};
+    Instruction instruction{Operation::number};
+    const bool is_function = GiNaC::is_a<GiNaC::function>(formula), is_power = GiNaC::is_a<GiNaC::power>(formula);
+    if (GiNaC::is_a<GiNaC::symbol>(formula)) {
+        const auto found = std::find(variables.begin(), variables.end(), GiNaC::ex_to<GiNaC::symbol>(formula));
+        if (found == variables.end()) return false;
+        instruction.operation = Operation::variable;
+        instruction.variable = static_cast<std::size_t>(found - variables.begin());
+    } else if (is_function || is_power || GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula)) {
+        for (const ex& operand : formula)
+            if (!append(operand, variables)) return false;
+        instruction.operands = static_cast<int>(formula.nops());
+        instruction.operation = is_function                        ? Operation::call
+                                : is_power                         ? Operation::power
+                                : GiNaC::is_a<GiNaC::add>(formula) ? Operation::sum
+                                                                   : Operation::product;
+        if (is_function) {
+            const auto found = functions.find(GiNaC::ex_to<GiNaC::function>(formula).get_name());
+            if (found == functions.end()) return false;
+            instruction.function = found->second;
+        }
+    } else {
+        const ex number = formula.evalf();
+        if (!GiNaC::is_a<GiNaC::numeric>(number) || !GiNaC::ex_to<GiNaC::numeric>(number).is_real()) return false;
+        instruction.number = GiNaC::ex_to<GiNaC::numeric>(number).to_double();
+    }
+    instructions_.push_back(instruction);
+    return true;
+}
+
+Tape::Value Tape::sized(const std::vector<double>& variables) const {
+    std::vector<double> stack;
+    stack.reserve(instructions_.size());
+    double size = 0;
+    for (const Instruction& instruction : instructions_) {
+        if (instruction.operands == 0) {
+            const bool is_number = instruction.operation == Operation::number;
+            stack.push_back(is_number ? instruction.number : variables[instruction.variable]);
+            size = std::fabs(stack.back());
+            continue;
+        }
+        const auto first = stack.end() - instruction.operands;
+        double result = *first;
+        if (instruction.operation == Operation::call) result = instruction.function(*first);
+        if (instruction.operation == Operation::power) result = std::pow(first[0], first[1]);
+        size = std::fabs(result);
+        for (auto operand = first + 1; operand != stack.end(); ++operand) {
+            if (instruction.operation == Operation::sum) {
+                result += *operand;
+                size = std::fmax(size, std::fabs(*operand));
+            }
+            if (instruction.operation == Operation::product) size = std::fabs(result *= *operand);
+        }
+        stack.erase(first, stack.end());
+        stack.push_back(result);
+    }
+    return {stack.back(), size};
+}
+
+}  // namespace lobatto

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A formula in double, as instructions one after another: for what is looked at often and needs few digits.
+#pragma once
+
+#include <ginac/ginac.h>
+
+#include <optional>
+#include <vector>
+
+namespace lobatto {
+
+class Tape {
+public:
+    // Nothing: the formula holds a function or a symbol that is not known.
+    static std::optional<Tape> of(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables);
+
+    struct Value {
+        double value, size;  // size: the largest term, of a sum
+    };
+    Value sized(const std::vector<double>& variables) const;
+    double operator()(const std::vector<double>& variables) const { return sized(variables).value; }
+
+private:
+    enum class Operation { number, variable, sum, product, power, call };
+    struct Instruction {
+        Operation operation;
+        double number = 0;
+        std::size_t variable = 0;
+        int operands = 0;
+        double (*function)(double) = nullptr;
+    };
+    bool append(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables);
+
+    std::vector<Instruction> instructions_;  // operands come before what is done with them
+};
+
+}  // namespace lobatto
