@@ -87,6 +87,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     request.arrivals = arrivals_of(scene, steps);
     request.every = scene.outputs.every;
     request.dense = scene.outputs.dense;
+    request.multipliers = scene.outputs.multipliers;
     const bool from_velocity = scene.start == Start::velocity || !scene.constraints.empty();
     if (scene.constraints.empty()) {
         request.q = doubles(scene, scene.initial_position, "position");

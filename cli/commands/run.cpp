@@ -60,6 +60,11 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
         header.columns.emplace_back(coordinate.name, coordinate.unit);
     if (scene.outputs.momenta)
         for (const Coordinate& coordinate : scene.coordinates) header.columns.emplace_back("p_" + coordinate.name, "");
+    if (scene.outputs.multipliers) {
+        header.multipliers = static_cast<int>(scene.constraints.size());
+        for (const Constraint& constraint : scene.constraints)
+            header.columns.emplace_back("lambda_" + constraint.name, "");
+    }
     header.energy = scene.outputs.energy;
     if (header.energy) header.columns.emplace_back("H", "");
     return header;
@@ -67,7 +72,9 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
 
 // Of the file beside it with the events: their numbers, then the state as in the trajectory.
 TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
-    if (header.energy) header.columns.pop_back();
+    header.columns.resize(header.columns.size() - static_cast<std::size_t>(header.multipliers) -
+                          (header.energy ? 1 : 0));
+    header.multipliers = 0;
     header.energy = false;
     header.columns.insert(header.columns.begin(), {"event", ""});
     for (const Event& event : scene.outputs.events) header.events.push_back(event.text);

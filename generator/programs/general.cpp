@@ -91,6 +91,28 @@ private:
         for (const auto& [place, slope] : d_.system.constraint_q.entries())
             program.outputs.push_back({at("G", e++), convert(slope)});
         p_.programs.push_back(std::move(program));
+        pull();
+    }
+
+    // (D49) The right sides of the equations for accelerations and multipliers.
+    void pull() {
+        const System& system = d_.system;
+        std::vector<ex> motion = system.force, kept;
+        for (std::size_t k = 0; k < n_; ++k) motion[k] -= system.momentum[k].diff(system.t);
+        for (const auto& [place, slope] : system.momentum_q.entries())
+            motion[static_cast<std::size_t>(place.first)] -= slope * system.v[static_cast<std::size_t>(place.second)];
+        std::vector<ex> rates = system.constraint_t;  // dphi/dt along the motion
+        for (const auto& [place, slope] : system.constraint_q.entries())
+            rates[static_cast<std::size_t>(place.first)] += slope * system.v[static_cast<std::size_t>(place.second)];
+        for (const ex& rate : rates) {
+            ex sum = -rate.diff(system.t);
+            for (std::size_t k = 0; k < n_; ++k) sum -= rate.diff(system.q[k]) * system.v[k];
+            kept.push_back(sum);
+        }
+        Program program{"pull", {}};
+        for (std::size_t k = 0; k < n_; ++k) program.outputs.push_back({at("r", k), convert(motion[k])});
+        for (std::size_t c = 0; c < kept.size(); ++c) program.outputs.push_back({at("s", c), convert(kept[c])});
+        p_.programs.push_back(std::move(program));
     }
 
     std::vector<GiNaC::symbol> motion_symbols() const {

@@ -217,7 +217,7 @@ private:
         const Entry* section = root_.find("output");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
-                          "[output]", {"every", "energy", "momenta", "tangent", "dense", "events"});
+                          "[output]", {"every", "energy", "momenta", "multipliers", "tangent", "dense", "events"});
         Outputs& outputs = scene_.outputs;
         const Entry* every = table.find("every");
         if (every != nullptr && scene_.clock) {
@@ -233,6 +233,11 @@ private:
                            "at least 1 and at most 9e15: states whose step is a multiple of it are kept"));
         if (const Entry* energy = table.find("energy")) outputs.energy = boolean_of(source_, *energy);
         if (const Entry* momenta = table.find("momenta")) outputs.momenta = boolean_of(source_, *momenta);
+        if (const Entry* multipliers = table.find("multipliers")) {
+            outputs.multipliers = boolean_of(source_, *multipliers);
+            if (outputs.multipliers && scene_.constraints.empty())
+                fail(multipliers->at, "without constraints there are no multipliers; leave it out");
+        }
         if (const Entry* tangent = table.find("tangent")) outputs.tangent = boolean_of(source_, *tangent);
         if (const Entry* dense = table.find("dense")) {
             outputs.dense =

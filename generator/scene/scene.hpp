@@ -52,12 +52,13 @@ struct Event {
 
 // What a kernel computes beside the motion itself; it has no code for anything else.
 struct Outputs {
-    long every = 1;          // keep each state whose step index is a multiple of this
-    GiNaC::ex interval = 0;  // with a clock: the time between two kept states; 0: those at its steps are kept
-    bool energy = true;      // a column H in the trajectory file, and what the run says of the energy
-    bool momenta = true;     // the columns p_...
-    bool tangent = true;     // the derivative of a step: its symplectic defect, monodromy
-    int dense = 0;           // states between two steps, evenly spaced, from the step's own polynomial
+    long every = 1;            // keep each state whose step index is a multiple of this
+    GiNaC::ex interval = 0;    // with a clock: the time between two kept states; 0: those at its steps are kept
+    bool energy = true;        // a column H in the trajectory file, and what the run says of the energy
+    bool momenta = true;       // the columns p_...
+    bool multipliers = false;  // columns lambda_... of the constraints
+    bool tangent = true;       // the derivative of a step: its symplectic defect, monodromy
+    int dense = 0;             // states between two steps, evenly spaced, from the step's own polynomial
     std::vector<Event> events;
 };
 

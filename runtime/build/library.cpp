@@ -177,10 +177,10 @@ void LoadedStepper<real>::constraint(real time, const std::vector<real>& q, std:
 }
 
 template <class real>
-std::vector<real> LoadedStepper<real>::multipliers() const {
-    std::vector<real> lambda(static_cast<std::size_t>(kernel_->constraints));
-    if (!lambda.empty()) kernel_->multipliers(stepper_, lambda.data());
-    return lambda;
+lobatto_status LoadedStepper<real>::multipliers(real time, const std::vector<real>& q, const std::vector<real>& p,
+                                                std::vector<real>& lambda) const {
+    lambda.resize(static_cast<std::size_t>(kernel_->constraints));
+    return static_cast<lobatto_status>(kernel_->multipliers(stepper_, &time, q.data(), p.data(), lambda.data()));
 }
 
 template <class real>

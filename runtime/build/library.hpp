@@ -77,7 +77,8 @@ public:
     // phi, dphi/dt at fixed q, and dphi/dq, row by row: of kernels with constraints.
     void constraint(real time, const std::vector<real>& q, std::vector<real>& phi, std::vector<real>& phi_t,
                     std::vector<real>& G) const;
-    std::vector<real> multipliers() const;  // at the end of the last step
+    lobatto_status multipliers(real time, const std::vector<real>& q, const std::vector<real>& p,
+                               std::vector<real>& lambda) const;
     void slopes(real time, const std::vector<real>& q, const std::vector<real>& velocity, std::vector<real>& Lv,
                 std::vector<real>& Lq) const;
     lobatto_status residual(real time, const std::vector<real>& q, const std::vector<real>& p,

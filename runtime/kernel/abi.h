@@ -125,7 +125,8 @@ typedef struct lobatto_kernel {
                    void* Lq); /* dL/dq' and dL/dq + forces, n each */
     void (*constraint)(const void* stepper, const void* time, const void* q, void* phi, void* phi_t,
                        void* G); /* phi, dphi/dt at fixed q, and dphi/dq, constraints x n; null without constraints */
-    void (*multipliers)(const void* stepper, void* lambda); /* at the end of the last step; null without constraints */
+    int32_t (*multipliers)(const void* stepper, const void* time, const void* q, const void* p,
+                           void* lambda); /* of a state, one a constraint */
     int32_t (*residual)(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                         void* F); /* the step's equations at X, N */
     int32_t (*jacobian)(const void* stepper, const void* time, const void* q, const void* p, const void* X,

@@ -287,13 +287,12 @@ struct Export {
                 out(G)[K::constraint_row[e] * n + K::constraint_column[e]] = entries[e];
         }
     }
-    static void read_multipliers(const void* stepper, void* lambda) {
-        if constexpr (constraint_count > 0) {
-            for (int c = 0; c < constraint_count; ++c) out(lambda)[c] = of(stepper).last_multiplier[c];
-        }
+    static std::int32_t find_multipliers(const void* stepper, const void* time, const void* q, const void* p,
+                                         void* lambda) {
+        if constexpr (constraint_count > 0) return code(of(stepper).multipliers(*in(time), in(q), in(p), out(lambda)));
+        return LOBATTO_UNSUPPORTED;
     }
     static constexpr auto constraint = constraint_count > 0 ? read_constraint : nullptr;
-    static constexpr auto multipliers = constraint_count > 0 ? read_multipliers : nullptr;
 
     static std::int32_t residual(const void* stepper, const void* time, const void* q, const void* p, const void* X,
                                  void* F) {
@@ -359,7 +358,7 @@ struct Export {
                                              velocity,
                                              slopes,
                                              constraint,
-                                             multipliers,
+                                             find_multipliers,
                                              residual,
                                              jacobian,
                                              tangent,

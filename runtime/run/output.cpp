@@ -53,7 +53,8 @@ std::string text_of(const TrajectoryHeader& header) {
 TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header, const Written& kept)
     : file_(path, "the trajectory", kept.size),
       energy_(header.energy),
-      columns_(header.columns.size() - (header.energy ? 1 : 0)),
+      columns_(header.columns.size() - static_cast<std::size_t>(header.multipliers) - (header.energy ? 1 : 0)),
+      multipliers_(static_cast<std::size_t>(header.multipliers)),
       text_(text_of(header)) {
     if (kept.size == 0) {
         flush();
@@ -82,6 +83,10 @@ void TrajectoryFile::add_to_checksum(std::int64_t size) {
 void TrajectoryFile::write(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
         append(records.rows + i * records.columns, columns_);
+        for (std::size_t c = 0; c < multipliers_; ++c) {
+            text_ += ',';
+            append_number(text_, records.multipliers[static_cast<std::size_t>(i) * multipliers_ + c]);
+        }
         if (energy_) {
             text_ += ',';
             append_number(text_, records.energy[i]);

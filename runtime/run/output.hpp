@@ -20,9 +20,10 @@ struct TrajectoryHeader {
     std::string kernel;  // digest
     std::vector<std::pair<std::string, double>> parameters;
     std::vector<std::pair<std::string, std::string>>
-        columns;         // names and units ("" when unknown): t, q.., p.. when they are kept, and H when it is
-    bool energy = true;  // whether the last column is H
+        columns;          // names and units ("" when unknown): t, q.., p.. when they are kept, lambda.., and H
+    bool energy = true;   // whether the last column is H
     std::vector<std::string> events;  // of a file of events, whose first column counts them from 1: what they are
+    int multipliers = 0;              // columns of them, before H
 };
 
 // The lines before the first row.
@@ -51,7 +52,7 @@ private:
     PartialFile file_;
     Checksum checksum_;  // of all that is in it
     bool energy_ = true;
-    std::size_t columns_ = 0;  // of a row, without H
+    std::size_t columns_ = 0, multipliers_ = 0;  // of a row: of the state, and after it
     std::string text_;
 };
 

@@ -51,7 +51,10 @@ public:
         } else {
             result_.energy_error_final = result_.energy_error_largest = std::nan("");
         }
-        if (request_.sink && count > 0) request_.sink({rows, energies, count, static_cast<int>(columns)});
+        if (!request_.sink || count == 0) return;
+        Records records{rows, energies, count, static_cast<int>(columns)};
+        if (request_.multipliers) records.multipliers = multipliers_of(rows, count);
+        request_.sink(records);
     }
 
     void keep_last() {
@@ -71,11 +74,26 @@ private:
         return stepper_.energy(time, q_, p_, energy) == LOBATTO_OK ? energy : std::nan("");
     }
 
+    // Row by row; not a number where there are none.
+    const double* multipliers_of(const double* rows, std::int64_t count) {
+        multipliers_.clear();
+        std::vector<double> lambda;
+        for (std::int64_t i = 0; i < count; ++i) {
+            const double* const row = rows + i * static_cast<std::int64_t>(1 + 2 * n_);
+            std::copy_n(row + 1, n_, q_.begin());
+            std::copy_n(row + 1 + n_, n_, p_.begin());
+            if (stepper_.multipliers(row[0], q_, p_, lambda) != LOBATTO_OK)
+                std::fill(lambda.begin(), lambda.end(), std::nan(""));
+            multipliers_.insert(multipliers_.end(), lambda.begin(), lambda.end());
+        }
+        return multipliers_.data();
+    }
+
     const LoadedStepper<double>& stepper_;
     const TrajectoryRequest& request_;
     TrajectoryResult& result_;
     std::size_t n_;
-    std::vector<double> q_, p_, energies_;
+    std::vector<double> q_, p_, energies_, multipliers_;
 };
 
 // Hands out checkpoints, at the right times.

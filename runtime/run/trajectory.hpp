@@ -18,7 +18,8 @@ struct Records {
     const double* rows = nullptr;    // count x columns
     const double* energy = nullptr;  // count: H(t, q, p); null when the kernel has no energy
     std::int64_t count = 0;
-    int columns = 0;  // 1 + 2n
+    int columns = 0;                      // 1 + 2n
+    const double* multipliers = nullptr;  // count x constraints, where they were asked for
 };
 
 // Where event functions vanished: rows of event number, t, q[n], p[n], in the order of the motion.
@@ -65,12 +66,13 @@ struct TrajectoryRequest {
     std::vector<double> parameters;  // scene order
     std::vector<double> q, p;        // n each
     double time = 0;
-    double step = 0;         // h; may be negative
-    double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
-    std::int64_t steps = 0;  // >= 0
-    Arrivals arrivals;       // of kernels with a clock
-    std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
-    int dense = 0;           // states between two steps, on the step's polynomial; above 0 needs every = 1
+    double step = 0;           // h; may be negative
+    double tolerance = 0;      // of a step's iteration, relative; 0: to rounding
+    std::int64_t steps = 0;    // >= 0
+    Arrivals arrivals;         // of kernels with a clock
+    std::int64_t every = 1;    // keep every such state; the first and the last state are always kept
+    bool multipliers = false;  // of the constraints, beside each kept state
+    int dense = 0;             // states between two steps, on the step's polynomial; above 0 needs every = 1
     std::function<void(const Records&)> sink;         // called for each block, in order
     std::function<void(const EventRecords&)> events;  // likewise; nothing: events are not sought
     std::function<void(std::int64_t done)> progress;  // called about ten times a second

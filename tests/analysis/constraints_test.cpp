@@ -15,6 +15,7 @@
 #include "generator/pipeline.hpp"
 #include "runtime/measure/manifold.hpp"
 #include "runtime/measure/symmetry.hpp"
+#include "runtime/run/output.hpp"
 #include "runtime/run/trajectory.hpp"
 #include "tests/support.hpp"
 
@@ -250,6 +251,25 @@ TEST_CASE("a free body in a quaternion turns as Euler's equations say") {
     const std::vector<double> exact(s.begin(), s.begin() + 4);
     CHECK(apart(end_of(scene_of(body + method(6, 0.05, 3))), exact) < 1e-12);
     CHECK(order_of(body, 3, 0.1, 3, exact) == doctest::Approx(4).epsilon(0.06));
+}
+
+TEST_CASE("the multiplier of a rod is its tension, with the order of the steps") {
+    // Along (x, y) of length 1, whose slope is 2 (x, y): -m v^2 = 2 lambda - m g y.
+    const auto error = [](int points, double step) {
+        const test::TemporaryFolder folder;
+        const std::string scene = folder / "rod.toml", file = folder / "rod.csv";
+        test::write_text(scene, rod + method(points, step, 2) + "[output]\nmultipliers = true\n");
+        REQUIRE(test::run({LOBATTO_PROGRAM, "run", scene, "--quiet", "-o", file}).exit_code == 0);
+        const TrajectoryTable table = read_trajectory(file);
+        REQUIRE(table.columns[5] == "lambda_rod");
+        const std::vector<double>& row = table.rows.back();
+        // Of the exact motion: the energy gives v^2 at its height.
+        const Ended exact = run(scene_of(rod + method(10, 0.02, 2)));
+        const double m = 2, g = 1.5, y = exact.result.q[1], v2 = 0.25 + 2 * g * (-0.8 - y);
+        return std::fabs(row[5] - -(m * v2 - m * g * y) / 2);
+    };
+    CHECK(error(8, 0.05) < 1e-13);
+    CHECK(std::log2(error(3, 0.1) / error(3, 0.05)) == doctest::Approx(4).epsilon(0.1));
 }
 
 TEST_CASE("steps preserve areas on the constraints, and run backwards; friction is told apart") {

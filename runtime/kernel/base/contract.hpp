@@ -21,7 +21,8 @@
 //   taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
 // Form::general: see steppers/general.hpp. `clocked` says that its Lagrangian is one in the time tau of a clock,
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
-//   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq. `angles`
+//   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
+//   pull(k, q, velocity, r, s) what the multipliers follow from. `angles`
 //   is how many arguments of sine and cosine `stage` holds; where there are any it takes one more argument, AnglesAnew
 //   by default, which gives their sines and cosines (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
@@ -74,6 +75,7 @@ struct Formulas {
     LOBATTO_WITH_TIME(energy)
     LOBATTO_WITH_TIME(clock)
     LOBATTO_WITH_TIME(constraint)
+    LOBATTO_WITH_TIME(pull)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>
     LOBATTO_INLINE static void along_rows(const Given& k, [[maybe_unused]] Time time, Position position, Slope slope) {

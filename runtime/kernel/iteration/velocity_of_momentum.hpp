@@ -47,6 +47,26 @@ public:
         });
     }
 
+    // (D49) The multipliers of a motion with velocity v: M a - G^T lambda = r, G a = s.
+    Status multipliers(const typename K::Coefficients& k, real time, const real* q, const real* v, real* lambda) const {
+        if constexpr (constraints > 0) {
+            return workspace_.with([&](Arrays& a) {
+                real phi[constraints];
+                Formulas<K>::constraint(k, time, q, +phi, +a.phi_t, +a.G);
+                Formulas<K>::legendre(k, time, q, v, a.p, a.mass);
+                Formulas<K>::pull(k, time, q, v, +a.residual, a.residual + n);
+                set_matrix(a);
+                if (!a.matrix.factor()) return Status::singular_mass;
+                solve_for(a, a.x);
+                for (int c = 0; c < constraints; ++c) lambda[c] = -a.x[n + c];
+                return is_finite(not_finite_part(a.x, unknowns)) ? Status::ok : Status::not_finite;
+            });
+        } else {
+            (void)k, (void)time, (void)q, (void)v, (void)lambda;
+            return Status::unsupported;
+        }
+    }
+
 private:
     using Layout = std::conditional_t<K::cyclic == 0, Grouped<K, unknowns, 1, 0>, Whole<n>>;
     static constexpr int mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
@@ -85,18 +105,23 @@ private:
         for (int e = 0; e < K::constraint_entries; ++e) use(e, K::constraint_row[e], K::constraint_column[e]);
     }
 
+    // M and G.
+    static void set_matrix(Arrays& a) {
+        a.matrix.clear();
+        for (int e = 0; e < K::mass_entries; ++e) a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.mass[e];
+        each_slope([&](int e, int c, int i) {
+            a.matrix(i, 0, n + c, 0) += a.G[e];
+            a.matrix(n + c, 0, i, 0) += a.G[e];
+        });
+    }
+
     // Increments are halved while the next one would be longer or is not finite, as with Lagrangians like -sqrt(1 -
     // v^2); lengths: sum |increment residual|.
     static Status solve(const State& at, Arrays& a) {
         if (!evaluate(at, a.x, a)) return Status::not_finite;
         for (int iteration = 0; iteration < 100; ++iteration) {
             if (iteration > 0 && is_near(at, a, real(2) * Limits<real>::epsilon)) return Status::ok;
-            a.matrix.clear();
-            for (int e = 0; e < K::mass_entries; ++e) a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.mass[e];
-            each_slope([&](int e, int c, int i) {
-                a.matrix(i, 0, n + c, 0) += a.G[e];
-                a.matrix(n + c, 0, i, 0) += a.G[e];
-            });
+            set_matrix(a);
             if (!a.matrix.factor()) return Status::singular_mass;
             const real length = solve_for(a, a.increment);
             const bool next_is_rounding = iteration > 0 && is_near(at, a, Limits<real>::root_epsilon);

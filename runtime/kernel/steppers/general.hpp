@@ -153,6 +153,14 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
         return velocity(time, position, momentum, v, mu);
     }
 
+    // Of the constraints, at a state.
+    Status multipliers(real time, const real* position, const real* momentum, real* lambda) const {
+        real v[n];
+        const Status status = velocity(time, position, momentum, v);
+        return status == Status::ok ? velocity_of_momentum.multipliers(coefficients, time, position, v, lambda)
+                                    : status;
+    }
+
     // One step from (q, p) at `time` and d(q1, p1)/d(q, p), 2n x 2n: J dY = -dR for each column.
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         if constexpr (K::has_tangent) {
