@@ -20,8 +20,8 @@ struct TrajectoryHeader {
     std::string kernel;  // digest
     std::vector<std::pair<std::string, double>> parameters;
     std::vector<std::pair<std::string, std::string>>
-        columns;          // names and units ("" when unknown): t, q.., p.. when they are kept, lambda.., and H
-    bool energy = true;   // whether the last column is H
+        columns;         // names and units ("" when unknown): t, q.., p.. when they are kept, lambda.., and H
+    bool energy = true;  // whether the last column is H
     std::vector<std::string> events;  // of a file of events, whose first column counts them from 1: what they are
     int multipliers = 0;              // columns of them, before H
 };
