@@ -345,9 +345,11 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
     if (const std::vector<double>& row = observers.left_domain; !row.empty()) {
         const auto middle = row.begin() + 1 + std::ssize(result.q);
         return fmt::format(
-            "the run left its Lagrangian by t = {:.6g}, q = {}: {}, and has no value there. Try an earlier end, start "
-            "elsewhere, or write the formula without it.",
-            row[0], list_text({row.begin() + 1, middle}), observers.domains.text(observers.parameters, row.data()));
+            "the run left its Lagrangian by t = {:.6g}, q = {}, p = {}: {}, and has no value there. Try an earlier "
+            "end, "
+            "start elsewhere, or write the formula without it.",
+            row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
+            observers.domains.text(observers.parameters, row.data()));
     }
     const std::string departure = observers.energy.departure(run.derivation, run.kernel, request);
     if (run.scene.clock) return departure;
