@@ -13,15 +13,6 @@ namespace lobatto {
 
 namespace {
 
-std::vector<double> doubles(const Scene& scene, const std::vector<GiNaC::ex>& values, const std::string& what) {
-    std::vector<double> numbers;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-        const std::string name = fmt::format("the initial {} of {}", what, scene.coordinates[k].name);
-        numbers.push_back(scene.evaluate(values[k], name).to_double());
-    }
-    return numbers;
-}
-
 // Times at which a run with a clock is compared with its companion, where the scene names none: no part of times that
 // one writes, so that a motion is not always met at the same place.
 constexpr int arrivals_of_run = 61;
@@ -79,8 +70,15 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
 
 TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper) {
     TrajectoryRequest request;
-    for (const Parameter& parameter : scene.parameters)
-        request.parameters.push_back(scene.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
+    const ExactStart start(scene);
+    const auto rounded = [](const std::vector<GiNaC::numeric>& values) {
+        std::vector<double> numbers;
+        for (const GiNaC::numeric& value : values) numbers.push_back(value.to_double());
+        return numbers;
+    };
+    request.parameters = rounded(start.parameters);
+    request.q = rounded(start.q);
+    request.p = rounded(start.rate);
     request.step = scene.evaluate(scene.run.step, "the step").to_double();
     request.steps = steps;
     request.tolerance = scene.method.tolerance;
@@ -88,20 +86,11 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     request.every = scene.outputs.every;
     request.dense = scene.outputs.dense;
     request.multipliers = scene.outputs.multipliers;
-    const bool from_velocity = scene.start == Start::velocity || !scene.constraints.empty();
-    if (scene.constraints.empty()) {
-        request.q = doubles(scene, scene.initial_position, "position");
-        request.p = doubles(scene, scene.initial_rate, from_velocity ? "velocity" : "momentum");
-    } else {
-        const ExactStart start(scene);
-        for (const GiNaC::numeric& position : start.q) request.q.push_back(position.to_double());
-        for (const GiNaC::numeric& velocity : start.rate) request.p.push_back(velocity.to_double());
-    }
 
     TrajectoryResult none;
     none.status = stepper.prepare(request.parameters, request.step);
     if (none.status == LOBATTO_OK) {
-        if (from_velocity) request.p = stepper.momentum(request.time, request.q, request.p);
+        if (start.from_velocity) request.p = stepper.momentum(request.time, request.q, request.p);
         none.status = stepper.start(request.time, request.q, request.p);
     }
     none.q = request.q;

@@ -71,7 +71,7 @@ const std::vector<Declaration>& general() {
          {{in, "q"}, {out, "phi"}, {out, "phi_t"}, {out, "G"}},
          true,
          true},
-        {"pull",
+        {"multiplier_terms",
          "(D49) Of M a - G^T lambda = r, G a = s, which give accelerations a and multipliers lambda: r, n, and s.",
          "void",
          {{in, "q"}, {in, "velocity"}, {out, "r"}, {out, "s"}},

@@ -9,7 +9,7 @@
 
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/mass_equations.hpp"
+#include "generator/mechanics/constrained_start.hpp"
 #include "generator/mechanics/sample.hpp"
 
 namespace lobatto {
@@ -31,9 +31,11 @@ std::string short_text(const ex& expression) {
 class StartCheck {
 public:
     StartCheck(const Scene& scene, const System& system)
-        : scene_(scene), system_(system), start_(as_given(scene)), equations_(system, start_) {
-        convert_constraints();
-    }
+        : scene_(scene),
+          system_(system),
+          start_(as_given(scene)),
+          equations_(system, start_),
+          constrained_(scene, system, start_, equations_) {}
 
     // What formulas ask for as they are written, though they may have lost it since: a/a, sqrt(a)^2.
     void require_domains() {
@@ -64,11 +66,14 @@ public:
     void run() {
         require_values();
         require_domains();
-        if (!system_.constraints.empty()) keep_positions();
+        if (!system_.constraints.empty()) {
+            require_mass();
+            constrained_.keep_positions();
+        }
         const bool seeks = scene_.start == Start::momentum && !system_.separable;
         if (!seeks || !has_mass_near_the_momentum()) require_mass();
         if (seeks) find_velocities();
-        if (!system_.constraints.empty()) keep_velocities();
+        if (!system_.constraints.empty()) constrained_.keep_velocities();
         if (!seeks) return;
         require_values();
         require_mass();
@@ -213,167 +218,6 @@ private:
         throw std::logic_error("formulas have no values together, but each by itself");
     }
 
-    // p + G^T mu and G v + dphi/dt, with symbols for mu; phi.
-    void convert_constraints() {
-        std::vector<ex> momentum = system_.momentum, rates = system_.constraint_t, values;
-        for (const Constraint& constraint : system_.constraints) {
-            mu_.emplace_back("mu_" + constraint.name);
-            start_.set(mu_.back(), cln::cl_R(0));
-            values.push_back(constraint.value);
-        }
-        for (const auto& [place, slope] : system_.constraint_q.entries()) {
-            const std::size_t c = unsigned_index(place.first), k = unsigned_index(place.second);
-            momentum[k] += slope * mu_[c];
-            rates[c] += slope * system_.v[k];
-        }
-        momentum_ = start_.convert(momentum);
-        rates_ = start_.convert(rates);
-        constraints_ = start_.convert(values);
-    }
-
-    // The constraint, or its rate, that is furthest from 0, beyond the rounding of a double.
-    std::optional<std::size_t> furthest(const std::vector<Id>& of) const {
-        const std::vector<Sized> values = start_.evaluate_sized(of);
-        const cln::cl_R rounding = cln::expt(cln::cl_RA(10), -14);
-        std::optional<std::size_t> worst;
-        for (std::size_t c = 0; c < values.size(); ++c)
-            if (cln::abs(values[c].value) > values[c].size * rounding &&
-                (!worst || cln::abs(values[c].value) > cln::abs(values[*worst].value)))
-                worst = c;
-        return worst;
-    }
-    std::string value_text(const std::vector<Id>& of, std::size_t c) const {
-        return decimal(start_.evaluate(of)[c], 6);
-    }
-
-    // "x = 0.6, y = 0.8": of those that have moved.
-    std::string moved_text(const std::vector<GiNaC::symbol>& symbols, const Numbers& before) const {
-        std::string text;
-        int shown = 0;
-        for (std::size_t k = 0; k < symbols.size(); ++k) {
-            const cln::cl_R value = start_.get(symbols[k]);
-            if (cln::abs(value - before[k]) <= cln::abs(value) * cln::expt(cln::cl_RA(10), -30)) continue;
-            if (++shown > 8) return text + ", ...";
-            text += fmt::format("{}{} = {}", shown == 1 ? "" : ", ", symbols[k].get_name(), decimal(value, 17));
-        }
-        return text;
-    }
-    Numbers values_of(const std::vector<GiNaC::symbol>& symbols) const {
-        Numbers values;
-        for (const auto& symbol : symbols) values.push_back(start_.get(symbol));
-        return values;
-    }
-
-    [[noreturn]] void refuse_off(std::size_t c, const std::string& what, const std::string& nearest) const {
-        const Constraint& constraint = system_.constraints[c];
-        scene_.source.fail(
-            constraint.at,
-            fmt::format("the start does not keep the constraint {} ({}): {}; the nearest start that keeps "
-                        "all constraints has {}: write that, or add assemble = true to [run]",
-                        constraint.written, constraint.text, what, nearest));
-    }
-
-    // (D47) Positions that keep the constraints to all digits: those given, or the nearest.
-    void keep_positions() {
-        const std::optional<std::size_t> off = furthest(constraints_);
-        const std::string what =
-            off ? "its left side minus its right side is " + value_text(constraints_, *off) : std::string();
-        const Numbers given = values_of(system_.q);
-        move_positions(given);
-        if (off && !scene_.run.assemble) refuse_off(*off, what, moved_text(system_.q, given));
-    }
-
-    // Newton's iteration M (q - q0) + G^T mu = 0, phi(q) = 0, its steps halved while phi would grow.
-    void move_positions(const Numbers& given) {
-        const cln::cl_R small = cln::expt(cln::cl_RA(10), -30);
-        const auto set = [&](const Numbers& q) {
-            for (std::size_t k = 0; k < q.size(); ++k) start_.set(system_.q[k], q[k]);
-        };
-        const auto square = [&]() -> std::optional<cln::cl_R> {
-            try {
-                cln::cl_R sum = 0;
-                for (const cln::cl_R& phi : start_.evaluate(constraints_)) sum = sum + cln::square(phi);
-                return sum;
-            } catch (const DomainError&) {
-                return std::nullopt;
-            }
-        };
-        Numbers q = given;
-        for (int iteration = 0; iteration < 100; ++iteration) {
-            Numbers away;
-            for (std::size_t k = 0; k < q.size(); ++k) away.push_back(q[k] - given[k]);
-            Numbers right = equations_.mass_times(away);
-            for (const cln::cl_R& phi : start_.evaluate(constraints_)) right.push_back(phi);
-            const Elimination step = equations_.eliminate(right);
-            if (step.singular && iteration == 0) require_mass();
-            if (step.singular) break;
-            const std::optional<cln::cl_R> before = square();
-            cln::cl_RA fraction = 1;
-            for (int halvings = 0; halvings < 60; ++halvings, fraction = fraction / 2) {
-                Numbers trial;
-                for (std::size_t k = 0; k < q.size(); ++k) trial.push_back(q[k] - fraction * step.vector[k]);
-                set(trial);
-                const std::optional<cln::cl_R> now = square();
-                if (now && *now <= *before) break;
-            }
-            const Numbers moved = values_of(system_.q);
-            cln::cl_R change = 0, size = 0;
-            for (std::size_t k = 0; k < q.size(); ++k) {
-                change = cln::max(change, cln::abs(moved[k] - q[k]));
-                size = cln::max(size, cln::abs(moved[k]));
-            }
-            q = moved;
-            const bool stands = change <= size * small;
-            if (stands && !furthest(constraints_)) return;
-            if (stands && iteration > 0) break;
-        }
-        const std::optional<std::size_t> off = furthest(constraints_);
-        if (!off) return;
-        const Constraint& constraint = system_.constraints[*off];
-        scene_.source.fail(
-            constraint.at,
-            fmt::format("no positions near the start keep the constraints: {} ({}) stays off by {}; a loop "
-                        "that cannot close? Mend its lengths, or start nearer",
-                        constraint.written, constraint.text, value_text(constraints_, *off)));
-    }
-
-    // (D47) The same of velocities: M (v - v0) + G^T mu = 0, G v + dphi/dt = 0.
-    void keep_velocities() {
-        const bool by_momentum = scene_.start == Start::momentum;
-        const std::optional<std::size_t> off = by_momentum ? pulled() : furthest(rates_);
-        const std::string what =
-            !off ? ""
-            : by_momentum
-                ? "its momenta are those of no velocity that keeps it"
-                : "its velocities change its left side minus its right side at the rate " + value_text(rates_, *off);
-        const Numbers given = values_of(system_.v);
-        for (int iteration = 0; iteration < 2; ++iteration) {
-            Numbers right(system_.q.size(), cln::cl_R(0));
-            for (const cln::cl_R& rate : start_.evaluate(rates_)) right.push_back(rate);
-            const Elimination step = equations_.eliminate(right);
-            if (step.singular) require_mass();
-            for (std::size_t k = 0; k < system_.v.size(); ++k)
-                start_.set(system_.v[k], start_.get(system_.v[k]) - step.vector[k]);
-        }
-        if (!off || scene_.run.assemble) return;
-        refuse_off(*off, what,
-                   by_momentum ? "the velocities " + moved_text(system_.v, Numbers(given.size(), cln::cl_R(0)))
-                               : moved_text(system_.v, given));
-    }
-
-    // The constraint that pulls most on the momenta that are given.
-    std::optional<std::size_t> pulled() const {
-        std::optional<std::size_t> most;
-        const std::vector<cln::cl_R> momentum = start_.evaluate(momentum_);
-        cln::cl_R size = 0;
-        for (const cln::cl_R& p : momentum) size = cln::max(size, cln::abs(p));
-        for (std::size_t c = 0; c < mu_.size(); ++c)
-            if (cln::abs(start_.get(mu_[c])) > size * cln::expt(cln::cl_RA(10), -14) &&
-                (!most || cln::abs(start_.get(mu_[c])) > cln::abs(start_.get(mu_[*most]))))
-                most = c;
-        return most;
-    }
-
     void require_mass() const {
         const Elimination elimination = equations_.eliminate({});
         if (!elimination.singular) return;
@@ -398,16 +242,17 @@ private:
     };
     std::optional<Residual> residual(const Numbers& velocity, const Numbers& wanted) {
         const std::size_t n = system_.v.size();
-        for (std::size_t k = 0; k < velocity.size(); ++k) start_.set(k < n ? system_.v[k] : mu_[k - n], velocity[k]);
+        for (std::size_t k = 0; k < velocity.size(); ++k)
+            start_.set(k < n ? system_.v[k] : constrained_.mu()[k - n], velocity[k]);
         try {
-            const std::vector<Sized> p = start_.evaluate_sized(momentum_);
+            const std::vector<Sized> p = start_.evaluate_sized(constrained_.momentum());
             Residual result;
             for (std::size_t k = 0; k < p.size(); ++k) {
                 result.vector.push_back(p[k].value - wanted[k]);
                 result.square = result.square + cln::square(result.vector[k]);
                 result.vanishes = result.vanishes && p[k].equals({wanted[k], cln::abs(wanted[k])});
             }
-            for (const Sized& rate : start_.evaluate_sized(rates_)) {
+            for (const Sized& rate : start_.evaluate_sized(constrained_.rates())) {
                 result.vector.push_back(rate.value);
                 result.square = result.square + cln::square(rate.value);
                 result.vanishes = result.vanishes && rate.vanishes();
@@ -492,8 +337,7 @@ private:
     const System& system_;
     Formulas start_;
     MassEquations equations_;
-    std::vector<GiNaC::symbol> mu_;
-    std::vector<Id> momentum_, rates_, constraints_;
+    ConstrainedStart constrained_;
     Numbers first_velocity_;  // empty: rest
 };
 

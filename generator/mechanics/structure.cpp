@@ -166,9 +166,12 @@ private:
                  "asked for: nothing is looked for, all nodes of a step are solved for with full matrices");
             return;
         }
-        find("constant mass matrix", system_.separable,
+        find("constant mass matrix", system_.constant_mass,
              system_.separable ? "the masses are the same everywhere, so the end of a step needs no equations"
-                               : system_.not_separable + ", so the end of a step is solved for with the points inside");
+             : system_.constant_mass
+                 ? "the masses are the same everywhere, so a step corrects multipliers without a matrix of all its "
+                   "points"
+                 : system_.not_separable + ", so the end of a step is solved for with the points inside");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         separable_.diagonal_mass = system_.separable && diagonal;

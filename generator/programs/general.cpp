@@ -91,11 +91,11 @@ private:
         for (const auto& [place, slope] : d_.system.constraint_q.entries())
             program.outputs.push_back({at("G", e++), convert(slope)});
         p_.programs.push_back(std::move(program));
-        pull();
+        multiplier_terms();
     }
 
     // (D49) The right sides of the equations for accelerations and multipliers.
-    void pull() {
+    void multiplier_terms() {
         const System& system = d_.system;
         std::vector<ex> motion = system.force, kept;
         for (std::size_t k = 0; k < n_; ++k) motion[k] -= system.momentum[k].diff(system.t);
@@ -109,7 +109,7 @@ private:
             for (std::size_t k = 0; k < n_; ++k) sum -= rate.diff(system.q[k]) * system.v[k];
             kept.push_back(sum);
         }
-        Program program{"pull", {}};
+        Program program{"multiplier_terms", {}};
         for (std::size_t k = 0; k < n_; ++k) program.outputs.push_back({at("r", k), convert(motion[k])});
         for (std::size_t c = 0; c < kept.size(); ++c) program.outputs.push_back({at("s", c), convert(kept[c])});
         p_.programs.push_back(std::move(program));

@@ -387,7 +387,7 @@ TEST_CASE("what cannot be constrained so is one clear error") {
     CHECK(contains(constrained("\"a[i]\" = \"x = 1\"\n"), "has a count"));
     CHECK(contains(constrained("a = { equation = \"x = 1\", count = 2 }\n"), "a count makes an array"));
     CHECK(contains(constrained("a = 3\n"), "must be an equation in quotes"));
-    CHECK(contains(constrained("x = \"x = 1\"\n"), "x"));
+    CHECK(contains(constrained("x = \"x = 1\"\n"), "both a coordinate and a constraint"));
     CHECK(contains(constrained("a = \"x^2 + y^2 = -1\"\n"), "cannot close"));
     CHECK(contains(refusal(two + method(3, 0.1, 1, "assemble = true\n")), "nothing to assemble"));
     for (const char* const other :

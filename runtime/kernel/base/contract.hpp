@@ -22,7 +22,8 @@
 // Form::general: see steppers/general.hpp. `clocked` says that its Lagrangian is one in the time tau of a clock,
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
-//   pull(k, q, velocity, r, s) what the multipliers follow from. `angles`
+//   multiplier_terms(k, q, velocity, r, s) what multipliers follow from; `constant_mass` that M is constant and forces
+//   hold no velocity. `angles`
 //   is how many arguments of sine and cosine `stage` holds; where there are any it takes one more argument, AnglesAnew
 //   by default, which gives their sines and cosines (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
@@ -75,7 +76,7 @@ struct Formulas {
     LOBATTO_WITH_TIME(energy)
     LOBATTO_WITH_TIME(clock)
     LOBATTO_WITH_TIME(constraint)
-    LOBATTO_WITH_TIME(pull)
+    LOBATTO_WITH_TIME(multiplier_terms)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>
     LOBATTO_INLINE static void along_rows(const Given& k, [[maybe_unused]] Time time, Position position, Slope slope) {

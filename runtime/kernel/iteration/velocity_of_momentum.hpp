@@ -2,7 +2,8 @@
 // The velocity of a momentum: Newton's iteration for p = dL/dv(q, v, t) (D27). With constraints phi(q, t) = 0, G =
 // dphi/dq, it is the velocity that keeps them, with multipliers mu (D46):
 //     dL/dv + G^T mu = p,  G v + dphi/dt = 0.
-// p - G^T mu is then the nearest momentum, in the metric of the mass, whose velocity keeps the constraints.
+// p - G^T mu is then the nearest momentum, in the metric of the mass, whose velocity keeps the constraints. The same
+// matrix, of M and G, gives the multipliers of a motion (D49).
 #ifndef LOBATTO_KERNEL_VELOCITY_OF_MOMENTUM_HPP
 #define LOBATTO_KERNEL_VELOCITY_OF_MOMENTUM_HPP
 
@@ -54,7 +55,7 @@ public:
                 real phi[constraints];
                 Formulas<K>::constraint(k, time, q, +phi, +a.phi_t, +a.G);
                 Formulas<K>::legendre(k, time, q, v, a.p, a.mass);
-                Formulas<K>::pull(k, time, q, v, +a.residual, a.residual + n);
+                Formulas<K>::multiplier_terms(k, time, q, v, +a.residual, a.residual + n);
                 set_matrix(a);
                 if (!a.matrix.factor()) return Status::singular_mass;
                 solve_for(a, a.x);
