@@ -54,7 +54,7 @@ struct ConstrainedFixedPoint {
     real lambda[constraints * s]{};  // multipliers of the last step
     real w[n * s]{};                 // and W at its nodes
     real Y[n * m]{};                 // displacements at its nodes after the first
-    real evaluations{}, increment{}, elapsed{};
+    real evaluations{}, increment{};
     bool has_history{}, usable{};
     Workspace<Arrays> workspace;
 
@@ -212,6 +212,7 @@ private:
         real v[n], multipliers[constraints * s];
         divide_by_mass(static_cast<const real*>(p), +v);
         begin_step(k, time, q, v, multipliers, a);
+        set_measures(q, v, a);
         const real small = maximum(tolerance, Limits<real>::epsilon);
         const Convergence<real, 1, Pace<4, 70, 16>> rule{small};
         real e_before = Limits<real>::largest;
@@ -242,7 +243,6 @@ private:
     // Formulas at the start; W and the multipliers continued from the last step, and positions with them.
     void begin_step(const Coefficients& k, real time, const real* q, const real* v, real* multipliers,
                     Arrays& a) const {
-        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
         real rest[n] = {}, Lv[n];
         Formulas<K>::slopes(k, time, q, static_cast<const real*>(rest), +Lv, a.start_f);
         Formulas<K>::constraint(k, time, q, a.start_phi, a.start_phi_t, a.start_G);
@@ -256,14 +256,31 @@ private:
         for (int c = 0; c < n; ++c) {
             real W[m];
             for (int j = 0; j < m; ++j) W[j] = has_history ? continued(w + c * s, j) : real(0);
-            const real scale = fabs(h * v[c]) + fabs(h * (h * W[0])) + floor * fabs(q[c]);
-            a.inverse_scale[c] = real(1) / maximum(scale, fabs(q[c]) + Limits<real>::smallest);
             for (int part = 0; part < parts; ++part) {
                 V next = fused(drift[part], V(v[c]), V(q[c]));
                 for (int j = 0; j < m; ++j) next = fused(move[j][part], V(W[j]), next);
                 a.Q[part * n + c] = next;
             }
         }
+    }
+
+    // What increments of each coordinate are measured by: its position, its way in the step, and how far the equations
+    // it stands in move it when the coordinates beside it move by as much as they are measured by.
+    void set_measures(const real* q, const real* v, Arrays& a) const {
+        real own[n], joined[n] = {}, size[constraints] = {}, square[constraints] = {};
+        const auto inverse = [&](int c) { return fabs(inverse_mass[c * n + c]); };
+        for (int c = 0; c < n; ++c)
+            own[c] = maximum(fabs(h * v[c]) + h * (h * inverse(c)) * fabs(a.start_f[c]), fabs(q[c]));
+        for (int e = 0; e < slopes; ++e) {
+            const int c = K::constraint_column[e];
+            size[K::constraint_row[e]] += fabs(a.start_G[e]) * own[c];
+            square[K::constraint_row[e]] += inverse(c) * (a.start_G[e] * a.start_G[e]);
+        }
+        for (int e = 0; e < slopes; ++e) {
+            const int c = K::constraint_column[e], row = K::constraint_row[e];
+            joined[c] += inverse(c) * fabs(a.start_G[e]) * (size[row] / maximum(square[row], Limits<real>::smallest));
+        }
+        for (int c = 0; c < n; ++c) a.inverse_scale[c] = real(1) / maximum(own[c] + joined[c], Limits<real>::smallest);
     }
 
     // Formulas at the nodes once more; then the momentum, and the multiplier that keeps the velocity at the end (D46).
