@@ -26,7 +26,6 @@ constexpr int finest_ratio = 8;    // the reference against the smallest step of
 constexpr int most_attempts = 14;  // ladders, each half of the one before, or three or four times it below rounding
 constexpr double roundings = 64;   // of a step, all the same way; measured: 5 on the linear oscillator
 constexpr double least_error = 1e-29;
-constexpr double nearly = 0.1;  // of the way: where half the step leads to the same place
 
 Quadruple size(Quadruple x) {
     return x < 0 ? -x : x;
@@ -149,13 +148,6 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
     if (best.rows.empty() && !best.exact && !best.below_rounding)
         throw ComputationError("the order cannot be measured: the steps fail from this start, however short");
     return best;
-}
-
-bool is_resolved(const Kernel& kernel, const QuadrupleStart& start, double step) {
-    LoadedStepper<Quadruple> stepper(kernel);
-    const std::optional<States> whole = states_with(stepper, start, step, 1),
-                                half = states_with(stepper, start, step, 2);
-    return whole && half && error_of(*whole, *half, start) < nearly;
 }
 
 bool bears_out(const Convergence& convergence, int order, bool linear) {

@@ -35,9 +35,6 @@ struct Convergence {
 // ComputationError when no step of the ladder can be taken.
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step, double least = 0);
 
-// Whether half the step leads to nearly the same places, for eight steps.
-bool is_resolved(const Kernel& kernel, const QuadrupleStart& start, double step);
-
 // Whether the measurement bears out an order: within 0.3 (for high orders a thirtieth below, a fifteenth above), or
 // for a linear system at least (some super-converge); or cannot tell.
 bool bears_out(const Convergence& convergence, int order, bool linear);
