@@ -117,7 +117,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const LoadedS
     const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
     if (scene.outputs.energy) {
         const double H0 = std::fabs(result.energy_start);
-        const bool relative = conserves && H0 > 0;
+        const bool relative = conserves && H0 > result.energy_error_largest;
         print_row(conserves ? "energy error" : "energy change",
                   fmt::format("{:.2g} at most{}", result.energy_error_largest,
                               relative ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
@@ -347,7 +347,7 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
         return fmt::format(
             "the run left its Lagrangian by t = {:.6g}, q = {}, p = {}: {}, and has no value there. Try an earlier "
             "end, "
-            "start elsewhere, or write the formula without it.",
+            "or start elsewhere, or write the formula without it.",
             row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
             observers.domains.text(observers.parameters, row.data()));
     }

@@ -454,14 +454,17 @@ Picture series(const Scene& scene, const States& states) {
     std::vector<Curve> curves;
     const int shown = std::min<int>(states.n, static_cast<int>(std::size(colours)));
     std::string names;
+    std::vector<std::string> units;
     for (int k = 0; k < shown; ++k) {
+        const std::string& unit = scene.coordinates[static_cast<std::size_t>(k)].unit;
+        if (!unit.empty() && std::find(units.begin(), units.end(), unit) == units.end()) units.push_back(unit);
         Curve curve{{}, colour(static_cast<std::size_t>(k)), 1.4};
         for (std::size_t i = 0; i < states.count(); ++i) curve.points.push_back({states.time(i), states.q(i, k)});
         curves.push_back(curve);
         names += (k == 0 ? "" : ", ") + scene.coordinates[static_cast<std::size_t>(k)].written;
     }
-    const Coordinate& first = scene.coordinates.front();
-    return drawn(scene, curves, {"time t", label_of(first, "coordinates")}, names + " over time.");
+    const std::string label = units.empty() ? "coordinates" : fmt::format("coordinates [{}]", fmt::join(units, ", "));
+    return drawn(scene, curves, {"time t", label}, names + " over time.");
 }
 
 }  // namespace
