@@ -257,9 +257,78 @@ LOBATTO_SIGNS(float, 16, Truths16, __builtin_ia32_cvtd2mask512)
 
 }  // namespace registers
 
+// What Pack does with its registers; of numbers that are a class, they say it themselves (base/double_double.hpp).
+template <class real, int lanes>
+struct RegisterOperations {
+    using Values = typename Register<real, lanes>::Values;
+    using Truths = typename Register<real, lanes>::Truths;
+
+    LOBATTO_INLINE static Values spread(const real& x) { return x - Values{}; }  // x - 0 keeps -0
+    LOBATTO_INLINE static real lane(const Values& values, int i) {
+        if constexpr (lanes == 1)
+            return values;
+        else
+            return values[i];
+    }
+    LOBATTO_INLINE static void set(Values& values, int i, const real& x) {
+        if constexpr (lanes == 1)
+            values = x;
+        else
+            values[i] = x;
+    }
+    LOBATTO_INLINE static Values load(const real* from) {
+        Values values;
+        __builtin_memcpy(&values, from, sizeof values);
+        return values;
+    }
+    LOBATTO_INLINE static void store(const Values& values, real* to) { __builtin_memcpy(to, &values, sizeof values); }
+    LOBATTO_INLINE static Values choose(const Truths& where, const Values& a, const Values& b) { return where ? a : b; }
+    LOBATTO_INLINE static Values fused(const Values& a, const Values& b, const Values& c) {
+        if constexpr (lanes == 1)
+            return lobatto::fused(a, b, c);
+        else
+            return registers::fused(a, b, c);
+    }
+    LOBATTO_INLINE static Values square_root(const Values& a) {
+        if constexpr (lanes == 1)
+            return lobatto::sqrt(a);
+        else
+            return registers::square_root(a);
+    }
+    LOBATTO_INLINE static Values magnitude(const Values& a) {
+        if constexpr (lanes == 1) {
+            return lobatto::fabs(a);
+        } else {
+            using Integers = typename Register<real, lanes>::Integers;
+            return (Values)((Integers)a & ~(Integers)spread(real(-0.0)));
+        }
+    }
+    // The first (0) or second (1) half of the lanes.
+    LOBATTO_INLINE static auto half(const Values& values, int which) {
+        return half(values, which, std::make_integer_sequence<int, lanes / 2>());
+    }
+
+private:
+    template <int... i>
+    LOBATTO_INLINE static auto half(const Values& values, int which, std::integer_sequence<int, i...>) {
+        typename Register<real, lanes / 2>::Values result;
+        if constexpr (lanes == 2) {
+            result = values[which];
+        } else {
+#if __has_builtin(__builtin_shufflevector)
+            result = which == 0 ? __builtin_shufflevector(values, values, i...)
+                                : __builtin_shufflevector(values, values, (i + lanes / 2)...);
+#else
+            ((result[i] = values[which * lanes / 2 + i]), ...);
+#endif
+        }
+        return result;
+    }
+};
+
 // width / lanes registers of `lanes` numbers each.
 template <class real, int width>
-struct Shape {
+struct PackShape {
     static_assert(width >= 1 && (width & (width - 1)) == 0, "the width of a pack is a power of two");
     static constexpr int lanes = width < native_lanes<real> ? width : native_lanes<real>;
     static constexpr int count = width / lanes;
@@ -283,9 +352,10 @@ LOBATTO_INLINE Half registers_of(const Whole& whole, int which) {
 
 template <class real, int width>
 struct Pack {
-    static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
+    static constexpr int lanes = PackShape<real, width>::lanes, count = PackShape<real, width>::count;
     using Part = typename Register<real, lanes>::Values;
     using Truths = Mask<real, width>;
+    using Operations = RegisterOperations<real, lanes>;
 
     Part part[count];
 
@@ -296,29 +366,20 @@ struct Pack {
         LOBATTO_EACH(part[i] = other.part[i]);
         return *this;
     }
-    LOBATTO_INLINE Pack(real x) { LOBATTO_EACH(part[i] = x - Part{}); }  // x - 0 keeps -0
+    LOBATTO_INLINE Pack(const real& x) { LOBATTO_EACH(part[i] = Operations::spread(x)); }
+    // From a literal, where numbers are a class.
+    template <class Number, class = std::enable_if_t<std::is_class_v<real> && std::is_arithmetic_v<Number>>>
+    LOBATTO_INLINE Pack(Number x) : Pack(real(x)) {}
 
     LOBATTO_INLINE static Pack load(const real* from) {
         Pack result;
-        LOBATTO_EACH(__builtin_memcpy(&result.part[i], from + i * lanes, sizeof(Part)));
+        LOBATTO_EACH(result.part[i] = Operations::load(from + i * lanes));
         return result;
     }
-    LOBATTO_INLINE void store(real* to) const {
-        LOBATTO_EACH(__builtin_memcpy(to + i * lanes, &part[i], sizeof(Part)));
-    }
+    LOBATTO_INLINE void store(real* to) const { LOBATTO_EACH(Operations::store(part[i], to + i * lanes)); }
 
-    LOBATTO_INLINE real operator[](int lane) const {
-        if constexpr (lanes == 1)
-            return part[lane];
-        else
-            return part[lane / lanes][lane % lanes];
-    }
-    LOBATTO_INLINE void set(int lane, real x) {
-        if constexpr (lanes == 1)
-            part[lane] = x;
-        else
-            part[lane / lanes][lane % lanes] = x;
-    }
+    LOBATTO_INLINE real operator[](int lane) const { return Operations::lane(part[lane / lanes], lane % lanes); }
+    LOBATTO_INLINE void set(int lane, const real& x) { Operations::set(part[lane / lanes], lane % lanes, x); }
 
     LOBATTO_INLINE Pack operator-() const { LOBATTO_PARTS(Pack, -part[i]); }
     LOBATTO_INLINE Pack& operator+=(const Pack& b) { return *this = *this + b; }
@@ -337,11 +398,7 @@ struct Pack {
     LOBATTO_OPERATOR(Pack, Truths, !=);
 
     LOBATTO_INLINE friend Pack fused(const Pack& a, const Pack& b, const Pack& c) {
-        if constexpr (lanes == 1) {
-            LOBATTO_PARTS(Pack, lobatto::fused(a.part[i], b.part[i], c.part[i]));
-        } else {
-            LOBATTO_PARTS(Pack, registers::fused(a.part[i], b.part[i], c.part[i]));
-        }
+        LOBATTO_PARTS(Pack, Operations::fused(a.part[i], b.part[i], c.part[i]));
     }
     LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) { return select(a < b, a, b); }
     LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) { return select(a > b, a, b); }
@@ -369,33 +426,21 @@ struct Pack {
     // The first (0) or second (1) half of the lanes.
     LOBATTO_INLINE Pack<real, (width > 1 ? width / 2 : 1)> half(int which) const {
         using Half = Pack<real, (width > 1 ? width / 2 : 1)>;
-        if constexpr (count > 1)
+        if constexpr (count > 1) {
             return registers_of<Half>(*this, which);
-        else
-            return half_register<Half>(which, std::make_integer_sequence<int, Half::lanes>());
-    }
-
-private:
-    template <class Half, int... i>
-    LOBATTO_INLINE Half half_register(int which, std::integer_sequence<int, i...>) const {
-        Half result;
-        if constexpr (Half::lanes == 1) {
-            result.part[0] = (*this)[which];
+        } else if constexpr (width > 1) {
+            Half result;
+            result.part[0] = Operations::half(part[0], which);
+            return result;
         } else {
-#if __has_builtin(__builtin_shufflevector)
-            result.part[0] = which == 0 ? __builtin_shufflevector(part[0], part[0], i...)
-                                        : __builtin_shufflevector(part[0], part[0], (i + Half::lanes)...);
-#else
-            ((result.part[0][i] = part[0][which * Half::lanes + i]), ...);
-#endif
+            return *this;
         }
-        return result;
     }
 };
 
 template <class real, int width>
 struct Mask {
-    static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
+    static constexpr int lanes = PackShape<real, width>::lanes, count = PackShape<real, width>::count;
     using Part = typename Register<real, lanes>::Truths;
     using Numbers = Pack<real, width>;
 
@@ -452,13 +497,13 @@ struct Mask {
 
     // a where the mask holds, b elsewhere.
     LOBATTO_INLINE friend Numbers select(const Mask& mask, const Numbers& a, const Numbers& b) {
-        LOBATTO_PARTS(Numbers, mask.part[i] ? a.part[i] : b.part[i]);
+        LOBATTO_PARTS(Numbers, Numbers::Operations::choose(mask.part[i], a.part[i], b.part[i]));
     }
 };
 
 template <class real, int width>
 struct Bits {
-    static constexpr int lanes = Shape<real, width>::lanes, count = Shape<real, width>::count;
+    static constexpr int lanes = PackShape<real, width>::lanes, count = PackShape<real, width>::count;
     using Part = typename Register<real, lanes>::Integers;
     using Naturals = typename Register<real, lanes>::Naturals;
     using Integer = typename Register<real, 1>::Integers;
@@ -502,21 +547,13 @@ template <class real, int width>
 LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
     using Numbers = Pack<real, width>;
     constexpr int count = Numbers::count;
-    if constexpr (Numbers::lanes == 1) {
-        LOBATTO_PARTS(Numbers, lobatto::sqrt(a.part[i]));
-    } else {
-        LOBATTO_PARTS(Numbers, registers::square_root(a.part[i]));
-    }
+    LOBATTO_PARTS(Numbers, Numbers::Operations::square_root(a.part[i]));
 }
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
     using Numbers = Pack<real, width>;
     constexpr int count = Numbers::count;
-    if constexpr (Numbers::lanes == 1) {
-        LOBATTO_PARTS(Numbers, lobatto::fabs(a.part[i]));
-    } else {
-        return from_bits(bits(a) & ~bits(Numbers(real(-0.0))));
-    }
+    LOBATTO_PARTS(Numbers, Numbers::Operations::magnitude(a.part[i]));
 }
 
 // a b + c of plain numbers, of Packs, or of both: for emitted formulas, whose kernel may bear any name.
