@@ -52,7 +52,7 @@ void check_method(const Scene& scene, const System& system, bool general) {
 }  // namespace
 
 Derivation derive(const Scene& scene, bool general) {
-    const Limits limits(scene.path);
+    const DerivationLimits limits(scene.path);
     Derivation derivation;
     derivation.scene = in_clock_time(scene);
     derivation.system = build_system(derivation.scene);
@@ -78,7 +78,7 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
 
 KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
     const Scene& scene = derivation.scene;
-    const Limits limits(scene.path);
+    const DerivationLimits limits(scene.path);
     try {
         return emit_kernel(derivation, optimised_programs(derivation), options);
     } catch (const DomainError& error) {
@@ -104,7 +104,7 @@ PlainSource emit_plain(Scene scene, Precision precision) {
                         plain_limit, scene.coordinates.size()));
     scene.outputs.energy = true;
     Derivation derivation = derive(scene);
-    const Limits limits(scene.path);
+    const DerivationLimits limits(scene.path);
     // No shortcuts: they are worth their lines only where speed is asked for.
     if (derivation.structure.form() == Form::general)
         derivation = derive(scene, true);

@@ -160,7 +160,7 @@ std::optional<EnergyReport> energy_report(const StabilityReport& report, const s
     EnergyReport result;
     result.order = report.member.method.order();
     const auto modified = [&] {
-        const Limits limits(scene.path, "deriving the modified energy");
+        const DerivationLimits limits(scene.path, "deriving the modified energy");
         return modified_energy(system, report.member.method);
     }();
     if (!modified) {

@@ -44,7 +44,7 @@ double resident_megabytes() {
 
 }  // namespace
 
-Limits::Limits(const std::string& scene, const std::string& task)
+DerivationLimits::DerivationLimits(const std::string& scene, const std::string& task)
     : scene_(printable(scene)),
       task_(task),
       seconds_(positive("LOBATTO_DERIVATION_SECONDS", most_seconds)),
@@ -52,7 +52,7 @@ Limits::Limits(const std::string& scene, const std::string& task)
                           static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * page_megabytes() / 2)),
       watcher_([this] { watch(); }) {}
 
-Limits::~Limits() {
+DerivationLimits::~DerivationLimits() {
     {
         const std::lock_guard lock(mutex_);
         has_ended_ = true;
@@ -61,7 +61,7 @@ Limits::~Limits() {
     watcher_.join();
 }
 
-void Limits::watch() {
+void DerivationLimits::watch() {
     const auto start = std::chrono::steady_clock::now();
     std::unique_lock lock(mutex_);
     while (!ended_.wait_for(lock, std::chrono::milliseconds(50), [this] { return has_ended_; })) {

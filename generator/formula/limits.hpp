@@ -14,13 +14,13 @@ namespace lobatto {
 // (600 without it) have passed since its construction, or the program holds more than $LOBATTO_DERIVATION_MEGABYTES
 // (half of the machine's memory). Nothing may be half written meanwhile. InputError when a variable is no number above
 // 0.
-class Limits {
+class DerivationLimits {
 public:
     // For the message: the scene's file, and what is being done.
-    explicit Limits(const std::string& scene, const std::string& task = "deriving the integrator");
-    ~Limits();
-    Limits(const Limits&) = delete;
-    Limits& operator=(const Limits&) = delete;
+    explicit DerivationLimits(const std::string& scene, const std::string& task = "deriving the integrator");
+    ~DerivationLimits();
+    DerivationLimits(const DerivationLimits&) = delete;
+    DerivationLimits& operator=(const DerivationLimits&) = delete;
 
 private:
     void watch();

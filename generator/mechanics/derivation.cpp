@@ -7,7 +7,7 @@ namespace lobatto {
 
 const Discretisation& Derivation::discretisation() const {
     if (discretisation_) return *discretisation_;
-    const Limits limits(scene.path);
+    const DerivationLimits limits(scene.path);
     discretisation_ = std::make_shared<const Discretisation>(discretise(system, quadrature));
     return *discretisation_;
 }
