@@ -6,6 +6,7 @@
 #include "base/angles.hpp"
 #include "base/arc.hpp"
 #include "base/contract.hpp"
+#include "base/double_double_functions.hpp"
 #include "base/exponential.hpp"
 #include "base/numbers.hpp"
 #include "base/pack.hpp"
