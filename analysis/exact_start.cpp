@@ -3,6 +3,7 @@
 
 #include "generator/mechanics/start.hpp"
 #include "runtime/error.hpp"
+#include "runtime/kernel/base/double_double.hpp"
 
 namespace lobatto {
 
@@ -45,6 +46,7 @@ StartIn<real> start_in(const ExactStart& start, const Kernel& kernel, real step)
 template StartIn<float> start_in(const ExactStart&, const Kernel&, float);
 template StartIn<double> start_in(const ExactStart&, const Kernel&, double);
 template StartIn<long double> start_in(const ExactStart&, const Kernel&, long double);
+template StartIn<DoubleDouble> start_in(const ExactStart&, const Kernel&, DoubleDouble);
 template StartIn<__float128> start_in(const ExactStart&, const Kernel&, __float128);
 
 }  // namespace lobatto

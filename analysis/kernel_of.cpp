@@ -50,7 +50,7 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
     translation.short_loops = source.form == Form::general;
-    if (translation.quadruple) translation.text = "#define LOBATTO_USE_FLOAT128\n";
+    translation.text = before_support(precision);
     if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
     append_part(translation.text, std::string(kernel_abi_h_text));

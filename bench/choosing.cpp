@@ -243,7 +243,7 @@ What float saves at an error of 1e-3, the least error each type reaches within h
 float is for ensembles, where twice as many trajectories fit into a register, and errors of 1e-4 will do; one trajectory gains little or nothing. long double costs some 10 to 50
 times (no vector registers) and gives three more digits; __float128 is for references.
 
-`lobatto tune` chooses in double precision, since that is what `lobatto run` computes in: below some 1e-14 it says what is the least, and that `lobatto tradeoff` and `lobatto emit --precision` have more digits.
+`lobatto tune` chooses in double precision, since that is what `lobatto run` computes in: below some 1e-14 it says what is the least, and that `lobatto tradeoff` has more digits, as has `numbers` under `[method]`.
 
 ## The error of a run
 

@@ -91,10 +91,9 @@ PlainSource emit_plain(Scene scene, Precision precision) {
     refuse_clock(scene, "the plain text");
     refuse_constraints(scene, "the plain text");
     const auto refuse = [&](const std::string& why) { throw InputError(scene.path + ": " + why); };
-    if (precision == Precision::quadruple)
-        refuse(
-            "the plain text has the functions of the standard library, which knows no quadruple precision; choose "
-            "--precision long-double");
+    if (precision == Precision::quadruple || precision == Precision::double_double)
+        refuse("the plain text has the functions of the standard library, which knows no numbers in " +
+               precision_name(precision) + "; choose --numbers \"long double\"");
     if (scene.method.arithmetic == StepArithmetic::clean)
         refuse("the plain text has no clean arithmetic; add --arithmetic plain");
     if (scene.coordinates.size() > static_cast<std::size_t>(plain_limit))

@@ -15,34 +15,6 @@ constexpr std::int64_t often = 36;  // times that are compared
 
 }  // namespace
 
-std::string precision_name(Precision precision) {
-    switch (precision) {
-        case Precision::single:
-            return "float";
-        case Precision::double_:
-            return "double";
-        case Precision::extended:
-            return "long double";
-        case Precision::quadruple:
-            return "__float128";
-    }
-    return "";
-}
-
-double rounding_of(Precision precision) {
-    switch (precision) {
-        case Precision::single:
-            return std::ldexp(1.0, -23);
-        case Precision::double_:
-            return std::ldexp(1.0, -52);
-        case Precision::extended:
-            return std::ldexp(1.0, -63);
-        case Precision::quadruple:
-            return std::ldexp(1.0, -112);
-    }
-    return 0;
-}
-
 std::vector<Member> family_in(Precision precision, bool is_separable) {
     std::vector<Member> members;
     for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {

@@ -9,6 +9,7 @@
 
 #include "generator/graph/notation.hpp"
 #include "generator/scene/scene.hpp"
+#include "runtime/kernel/base/double_double.hpp"
 
 namespace lobatto {
 
@@ -28,9 +29,6 @@ struct Member {
     friend bool operator<(const Member& a, const Member& b) { return a.key() < b.key(); }
 };
 
-std::string precision_name(Precision precision);  // "float", "double", "long double", "__float128"
-double rounding_of(Precision precision);          // its epsilon
-
 // call(real()) with the number type of the precision.
 template <class Call>
 auto with_type_of(Precision precision, const Call& call) {
@@ -39,6 +37,8 @@ auto with_type_of(Precision precision, const Call& call) {
             return call(float());
         case Precision::extended:
             return call(static_cast<long double>(0));
+        case Precision::double_double:
+            return call(DoubleDouble());
         case Precision::quadruple:
             return call(__float128());
         default:

@@ -69,7 +69,7 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
             "were "
             "tried in double precision{}. Ask for a larger error or an earlier end; `lobatto tradeoff` measures long "
             "double "
-            "and __float128 too, which `lobatto emit --precision` writes",
+            "and quadruple too, which `numbers` under [method] chooses",
             request.error, reference.until, least, found.members,
             found.complete ? "" : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
     }

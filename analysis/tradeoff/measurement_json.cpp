@@ -5,6 +5,8 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "runtime/run/output.hpp"
@@ -25,7 +27,6 @@ constexpr std::array<Column, 11> columns = {{{"error_end", &Measurement::error_e
                                              {"iterations", &Measurement::iterations},
                                              {"gradients", &Measurement::gradients},
                                              {"compile_seconds", &Measurement::compile_seconds}}};
-constexpr std::array precisions = {Precision::single, Precision::double_, Precision::extended, Precision::quadruple};
 
 const char* arithmetic_name(const Member& member) {
     return member.arithmetic == StepArithmetic::clean ? "clean" : "plain";
@@ -57,14 +58,14 @@ Measurement measurement_of(const nlohmann::json& json) {
     Candidate& candidate = measurement.candidate;
     candidate.member.family = family_of(json.at("family"));
     candidate.member.points = json.at("points");
-    for (const Precision precision : precisions)
-        if (json.at("precision") == precision_name(precision)) candidate.member.precision = precision;
+    const std::optional<Precision> precision = precision_of(json.at("precision"));
+    if (!precision) throw std::invalid_argument("numbers there are not");
+    candidate.member.precision = *precision;
     if (json.at("arithmetic") == "clean") candidate.member.arithmetic = StepArithmetic::clean;
     candidate.steps = json.at("steps");
     candidate.tolerance = json.at("tolerance");
     measurement.complete = json.at("complete");
     for (const auto& [name, member] : columns)
-
         measurement.*member = json.at(name).is_null() ? std::nan("") : json.at(name).get<double>();
     return measurement;
 }

@@ -16,7 +16,6 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "generator/method/splitting.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
@@ -32,7 +31,6 @@ struct EmitCommand {
     std::string folder;
     MethodOption method;
     bool general = false;
-    Precision precision = Precision::double_;
     bool standalone = false;
     bool no_support = false;
     bool plain = false;
@@ -81,30 +79,18 @@ void print_report(const std::vector<PassReport>& report) {
     fmt::print(std::cout, "(over all functions of the kernel; values compared at 60 digits)\n");
 }
 
-void print_use(const KernelSource& source, const EmitCommand& options) {
-    const bool quadruple = options.precision == Precision::quadruple;
+void print_use(const KernelSource& source, const EmitCommand& options, Precision numbers) {
+    const bool quadruple = numbers == Precision::quadruple;
+    const char* const exact = numbers == Precision::double_double ? " -ffp-contract=off" : "";
     const std::string include = options.standalone ? "" : options.no_support ? " -I runtime/kernel" : "";
     fmt::print(std::cout,
                "\nUse it:\n"
-               "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2{2} -I {3} program.cpp{4}\n"
+               "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2{5}{2} -I {3} program.cpp{4}\n"
                "  lobatto::Stepper<lobatto::kernels::{0}> stepper;\n"
                "  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .q, "
                ".momentum(p)\n",
                source.name, quadruple ? "gnu++" : "c++", include, shell_word(options.folder),
-               quadruple ? " -lquadmath" : "");
-}
-
-// The decimals of a splitting method must be enough for the number type.
-void check_digits(const Scene& scene, Precision precision) {
-    if (scene.method.family != Family::splitting) return;
-    const int known = splitting_of(scene.method.points).digits, wanted = precision == Precision::extended    ? 19
-                                                                         : precision == Precision::quadruple ? 32
-                                                                                                             : 0;
-    if (known < wanted)
-        throw InputError(fmt::format(
-            "{}: the coefficients of {} are known to {} digits, too few for this number type; choose double, "
-            "or Lobatto (--points 8)",
-            scene.path, scene.method.name(), known));
+               quadruple ? " -lquadmath" : "", exact);
 }
 
 // The folder, made where it is not there, and the file in it, which must not be the scene.
@@ -134,12 +120,11 @@ void write_plain(const PlainSource& source, const EmitCommand& options) {
 void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
-    check_digits(scene, options.precision);
     if (options.plain) {
-        write_plain(emit_plain(scene, options.precision), options);
+        write_plain(emit_plain(scene, scene.method.numbers), options);
         return;
     }
-    EmitOptions emit_options{options.precision, {}};
+    EmitOptions emit_options{scene.method.numbers, {}};
     if (options.standalone)
         emit_options.support_text = [](const std::vector<std::string>& parts) { return support_text(parts); };
     const KernelSource source = emit(derive(scene, options.general), emit_options);
@@ -162,7 +147,7 @@ void emit_scene(const EmitCommand& options) {
     if (!options.standalone && !options.no_support)
         fmt::print(std::cout, " and {}", (fs::path(options.folder) / "kernel.hpp").string());
     fmt::print(std::cout, "\n");
-    print_use(source, options);
+    print_use(source, options, scene.method.numbers);
 }
 
 }  // namespace
@@ -177,14 +162,6 @@ void add_emit(CommandLine& program) {
     options->method.add_to(command);
     const Option general =
         command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
-    command
-        .choice("--precision", options->precision,
-                {{"float", Precision::single},
-                 {"double", Precision::double_},
-                 {"long-double", Precision::extended},
-                 {"quadruple", Precision::quadruple}},
-                "float, double (default), long-double or quadruple")
-        .shown_as("TYPE");
     const Option standalone =
         command.flag("--standalone", options->standalone, "one file that carries kernel.hpp inside");
     const Option no_support =

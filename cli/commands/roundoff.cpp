@@ -97,6 +97,7 @@ void roundoff(const RoundoffCommand& options) {
     refuse_clock(scene, "lobatto roundoff");
     refuse_constraints(scene, "lobatto roundoff");
     options.method.apply(scene);
+    MethodOption::require_double(scene, "roundoff");
     if (scene.method.family == Family::splitting)
         throw InputError(scene.path +
                          ": `lobatto roundoff` compares plain arithmetic with clean, which splitting methods "

@@ -169,6 +169,7 @@ Prepared prepare(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    MethodOption::require_double(scene, "run");
     Derivation derivation = derive(scene, options.general);
     if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const KernelSource source = emit(derivation);

@@ -89,6 +89,7 @@ void show_scene(const StabilityCommand& options) {
     refuse_clock(scene, "lobatto stability");
     refuse_constraints(scene, "lobatto stability");
     options.method.apply(scene);
+    MethodOption::require_double(scene, "stability");
     if (scene.method.family == Family::splitting)
         throw InputError(
             fmt::format("{}: what is exact here is of Lobatto and Gauss; choose one (--points 4), or ask for "

@@ -386,6 +386,7 @@ EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, cons
 void sweep(const SweepOptions& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    MethodOption::require_double(scene, "sweep");
     const Scene as_written = scene;  // one kernel serves all values
     scene.outputs.dense = 0;
     apply(options.overrides, scene);

@@ -320,6 +320,7 @@ void verify(const VerifyOptions& options) {
     Scene scene = read_scene(options.scene);
     refuse_clock(scene, "lobatto verify");
     options.method.apply(scene);
+    MethodOption::require_double(scene, "verify");
     const bool with_tangent = scene.coordinates.size() <= tangent_limit;
     scene.outputs.energy = true;
     scene.outputs.tangent = with_tangent;

@@ -35,11 +35,15 @@ void MethodOption::add_to(Command& command) {
         });
     command.option("--arithmetic", arithmetic, "plain, or clean: rounding errors grow like a random walk only (slower)")
         .one_of(std::vector<std::string>{"plain", "clean"});
+    std::vector<std::string> names;
+    for (const Precision precision : all_precisions) names.push_back(precision_name(precision));
+    command.option("--numbers", numbers, "what the steps are computed in, from float to quadruple").one_of(names);
 }
 
 void MethodOption::apply(Scene& scene) const {
     Method& method = scene.method;
     if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
+    if (numbers) method.numbers = *precision_of(*numbers);
     if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
     if (tolerance) {
         if (method.arithmetic == StepArithmetic::clean)
@@ -52,6 +56,14 @@ void MethodOption::apply(Scene& scene) const {
     }
     // The scene's has no meaning with --arithmetic clean or --splitting.
     if (method.arithmetic == StepArithmetic::clean || method.family == Family::splitting) method.tolerance = 0;
+    if (const std::string why = reason_against_numbers(method); !why.empty()) throw InputError(scene.path + ": " + why);
+}
+
+void MethodOption::require_double(const Scene& scene, const std::string& command) {
+    if (scene.method.numbers != Precision::double_)
+        throw InputError(scene.path + ": `lobatto " + command + "` computes in double, but numbers are \"" +
+                         precision_name(scene.method.numbers) +
+                         "\"; give --numbers double, or leave `numbers` out under [method]");
 }
 
 std::optional<Method> MethodOption::member() const {

@@ -84,7 +84,7 @@ public:
                        const std::vector<std::string>& support) const {
         std::string text = preamble(name, report);
         text += "#pragma once\n\n";
-        if (options_.precision == Precision::quadruple) text += "#define LOBATTO_USE_FLOAT128\n";
+        text += before_support(options_.precision);
         text += options_.support_text ? options_.support_text(support) : "#include \"kernel.hpp\"\n";
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
@@ -285,7 +285,9 @@ private:
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");
-        if (is_map() && n_ == 1) text += "        lobatto::round_to_unit_determinant(k.Phi_minus_I);\n";
+        // NOTE: sums of double-double are not exact, which the choice of entries stands on.
+        if (is_map() && n_ == 1 && options_.precision != Precision::double_double)
+            text += "        lobatto::round_to_unit_determinant(k.Phi_minus_I);\n";
         if (is_map() && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
         else
@@ -437,10 +439,22 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
 
 }  // namespace
 
+std::string before_support(Precision precision) {
+    if (precision == Precision::quadruple) return "#define LOBATTO_USE_FLOAT128\n";
+    if (precision == Precision::double_double)
+        return "#if defined(__GNUC__) && !defined(__clang__)\n"
+               "#pragma GCC optimize(\"no-tree-slp-vectorize\")  // with which g++ 12 loses the low parts of sums\n"
+               "#endif\n";
+    return "";
+}
+
 KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options) {
     KernelSource source;
     source.form = derivation.structure.form();
     source.support = support_of(derivation, optimised.programs.graph);
+    if (options.precision == Precision::double_double)
+        for (const char* part : {"base/double_double_functions.hpp", "iteration/refinement.hpp"})
+            source.support.emplace_back(part);
     source.name =
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
     source.report = optimised.report;

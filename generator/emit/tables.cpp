@@ -170,6 +170,8 @@ const char* type_name(Precision precision) {
             return "double";
         case Precision::extended:
             return "long double";
+        case Precision::double_double:
+            return "DoubleDouble";
         default:
             return "__float128";
     }

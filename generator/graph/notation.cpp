@@ -2,6 +2,8 @@
 // The graph as written formulas: for people, for LaTeX and for C++.
 #include "generator/graph/notation.hpp"
 
+#include <fmt/format.h>
+
 #include <cln/cln.h>
 
 #include <algorithm>
@@ -139,36 +141,37 @@ private:
         return {below + "^" + (simple ? exponent : "(" + exponent + ")"), power};
     }
 
-    struct Range {
-        long largest, digits;  // binary: numbers are below 2^largest
-    };
-    Range range() const {
-        return precision_ == Precision::single     ? Range{128, 24}
-               : precision_ == Precision::double_  ? Range{1024, 53}
-               : precision_ == Precision::extended ? Range{16384, 64}
-                                                   : Range{16384, 113};
-    }
     static long exponent_of(const cln::cl_R& value) {
         return cln::zerop(value) ? 0
                                  : cln::cl_I_to_long(cln::float_exponent(cln::cl_float(value, cln::float_format(20))));
     }
-    bool is_too_small(const cln::cl_R& value) const { return exponent_of(value) < 4 - range().largest; }
+    bool is_too_small(const cln::cl_R& value) const { return exponent_of(value) < smallest_exponent_of(precision_); }
+
+    static double nearest_double(const cln::cl_R& value) {
+        return exponent_of(value) < smallest_exponent_of(Precision::double_)
+                   ? std::strtod(decimal(value, 40).c_str(), nullptr)
+                   : cln::double_approx(value);
+    }
+    static std::string double_literal(double value) {
+        std::array<char, 40> buffer{};
+        const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+        std::string text(buffer.data(), end);
+        return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+    }
 
     // The number nearest to a value; what rounds to zero is zero.
     std::string literal(const cln::cl_R& value) const {
-        const auto [largest, kept] = range();
-        const long exponent = exponent_of(value);
-        if (exponent < 3 - largest - kept) return literal(cln::cl_float(0, cln::float_format(20)));
+        const long largest = largest_exponent_of(precision_), exponent = exponent_of(value);
+        if (exponent < 3 - largest - bits_of(precision_)) return literal(cln::cl_float(0, cln::float_format(20)));
         if (exponent > largest)
             throw DomainError("the formulas derived from it contain the number " + decimal(value, 3) +
                               ", beyond the range of the kernel's number type; choose other units");
-        if (precision_ == Precision::double_) {
-            std::array<char, 40> buffer{};
-            const double nearest =
-                is_too_small(value) ? std::strtod(decimal(value, 40).c_str(), nullptr) : cln::double_approx(value);
-            const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), nearest).ptr;
-            std::string text(buffer.data(), end);
-            return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+        if (precision_ == Precision::double_) return double_literal(nearest_double(value));
+        if (precision_ == Precision::double_double) {
+            const double high = nearest_double(value);
+            const double low = nearest_double(value - cln::rational(cln::cl_float(high)));
+            return low == 0 ? double_literal(high)
+                            : fmt::format("DoubleDouble({}, {})", double_literal(high), double_literal(low));
         }
         const int digits = precision_ == Precision::single ? 9 : precision_ == Precision::extended ? 21 : 36;
         const char* suffix = precision_ == Precision::single ? "f" : precision_ == Precision::extended ? "L" : "Q";
@@ -189,7 +192,7 @@ private:
     // itself, such as exp(-900) beside exp(q), keeps its digits.
     std::vector<std::string> literals(cln::cl_R value) const {
         constexpr std::size_t most = 4;
-        const long part = range().largest - range().digits;
+        const long part = largest_exponent_of(precision_) - bits_of(precision_);
         std::vector<std::string> result;
         for (; is_too_small(value) && result.size() + 1 < most;
              value = cln::scale_float(cln::cl_float(value, cln::float_format(60)), part))

@@ -6,17 +6,18 @@
 #include <string>
 
 #include "generator/graph/graph.hpp"
+#include "generator/graph/precision.hpp"
 
 namespace lobatto {
 
 enum class Notation { text, latex, cpp, plain };  // cpp: with the functions of lobatto::; plain: with those of std::
-enum class Precision { single, double_, extended, quadruple };  // float, double, long double, __float128
 
 // How a node that has a name of its own reads (an input, a temporary); empty: print its operation.
 using Naming = std::function<std::string(Id)>;
 
-// The formula of a node. C++ literals are shortest round-trip for double, and 9, 21, 36 digits with suffix f, L, Q
-// otherwise. Where it `fuses`, C++ adds products by lobatto::fused_sum(a, b, c) = a b + c of base/pack.hpp.
+// The formula of a node. C++ literals are shortest round-trip for double, DoubleDouble(high, low) for double-double,
+// and 9, 21, 36 digits with suffix f, L, Q otherwise. Where it `fuses`, C++ adds products by lobatto::fused_sum(a, b,
+// c) = a b + c of base/pack.hpp.
 std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming = {},
                     Precision precision = Precision::double_, bool fuses = false);
 

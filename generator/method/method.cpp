@@ -48,4 +48,17 @@ std::string Method::name() const {
     }
 }
 
+std::string reason_against_numbers(const Method& method) {
+    if (method.numbers == Precision::double_double && method.arithmetic == StepArithmetic::clean)
+        return "clean arithmetic is for numbers of one machine word; leave it out, since double-double has digits to "
+               "spare";
+    const bool is_wider = method.numbers != Precision::single && method.numbers != Precision::double_;
+    if (method.family != Family::splitting || !is_wider) return "";
+    const int known = splitting_of(method.points).digits;
+    if (known >= decimals_of(method.numbers) - 1) return "";  // the last digit is that of rounding
+    return fmt::format(
+        "the coefficients of {} are known to {} digits, too few for numbers in {}; choose double, or Lobatto",
+        method.name(), known, precision_name(method.numbers));
+}
+
 }  // namespace lobatto

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "generator/graph/precision.hpp"
+
 namespace lobatto {
 
 enum class Family { lobatto, gauss, splitting };
@@ -22,9 +24,13 @@ struct Method {
     int points = 4;
     double tolerance = 0;  // of the last increment, relative to the displacement in a step; 0: to rounding
     StepArithmetic arithmetic = StepArithmetic::plain;
+    Precision numbers = Precision::double_;
 
     int order() const;
     std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage", "splitting, 11 stages"
 };
+
+// Why a method cannot be computed in its numbers; empty: it can. The coefficients of some are known to few digits.
+std::string reason_against_numbers(const Method& method);
 
 }  // namespace lobatto

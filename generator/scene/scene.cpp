@@ -84,11 +84,20 @@ private:
         return stages;
     }
 
+    void read_numbers(const Entry& entry) {
+        const Value& value = entry.value;
+        const auto numbers =
+            value.kind == Value::Kind::text ? precision_of(value.text.value) : std::optional<Precision>();
+        if (!numbers) fail(value.at, "unknown numbers; there are " + precision_list());
+        scene_.method.numbers = *numbers;
+        if (const std::string why = reason_against_numbers(scene_.method); !why.empty()) fail(value.at, why);
+    }
+
     void read_method() {
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
-                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic", "clock"});
+                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic", "numbers", "clock"});
         const Entry *family = table.find("family"), *points = table.find("points"), *stages = table.find("stages");
         if (family != nullptr) {
             const Value& value = family->value;
@@ -141,6 +150,7 @@ private:
                     "clean arithmetic iterates until nothing changes, so a tolerance has no meaning; leave one of both "
                     "out");
         }
+        if (const Entry* numbers = table.find("numbers")) read_numbers(*numbers);
     }
 
     void read_clock(const Entry& entry) {

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "runtime/error.hpp"
+#include "runtime/kernel/base/double_double.hpp"
 
 namespace lobatto {
 namespace {
@@ -39,6 +40,8 @@ const char* name_of(lobatto_real kind) {
             return "long double";
         case LOBATTO_FLOAT128:
             return "__float128";
+        case LOBATTO_DOUBLE_DOUBLE:
+            return "double-double";
     }
     return "an unknown number type";
 }
@@ -226,5 +229,6 @@ template class LoadedStepper<float>;
 template class LoadedStepper<double>;
 template class LoadedStepper<long double>;
 template class LoadedStepper<__float128>;
+template class LoadedStepper<DoubleDouble>;
 
 }  // namespace lobatto

@@ -12,6 +12,8 @@
 
 namespace lobatto {
 
+struct DoubleDouble;  // runtime/kernel/base/double_double.hpp
+
 template <class real>
 constexpr lobatto_real real_kind();
 template <>
@@ -29,6 +31,10 @@ constexpr lobatto_real real_kind<long double>() {
 template <>
 constexpr lobatto_real real_kind<__float128>() {
     return LOBATTO_FLOAT128;
+}
+template <>
+constexpr lobatto_real real_kind<DoubleDouble>() {
+    return LOBATTO_DOUBLE_DOUBLE;
 }
 
 // A loaded kernel; copies share the library, which is unloaded with the last of them. Thread-safe: the table is

@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 6u
+#define LOBATTO_ABI_VERSION 7u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -40,7 +40,8 @@ typedef enum lobatto_real {
     LOBATTO_FLOAT = 0,
     LOBATTO_DOUBLE = 1,
     LOBATTO_LONG_DOUBLE = 2,
-    LOBATTO_FLOAT128 = 3
+    LOBATTO_FLOAT128 = 3,
+    LOBATTO_DOUBLE_DOUBLE = 4 /* high, low: two doubles */
 } lobatto_real;
 
 typedef enum lobatto_form {
@@ -84,6 +85,8 @@ typedef struct lobatto_kernel {
     const char* method;   /* "Lobatto, 4 points" */
     int32_t real_kind;    /* lobatto_real */
     int32_t real_bytes;
+    int32_t parts;          /* of a number, as the sum of so many doubles, the first of which is its rounded value */
+    double epsilon;         /* of the number type: twice the largest relative error of rounding, or a bit more */
     int32_t form;           /* lobatto_form */
     int32_t coordinates;    /* n */
     int32_t parameters;     /* run-time parameters, in the order of the scene */
@@ -113,6 +116,10 @@ typedef struct lobatto_kernel {
     void (*two_fold_state)(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest);
     /* Position and velocity at t + theta h inside the last step, on its polynomial. */
     int32_t (*dense)(const void* stepper, const void* theta, void* q, void* velocity);
+
+    /* Numbers as sums of doubles, `parts` each, and back. */
+    void (*to_parts)(const void* numbers, int64_t count, double* parts);
+    void (*from_parts)(const double* parts, int64_t count, void* numbers);
 
     /* Pieces, for tests and diagnostics. All after `prepare`; none changes the state. */
     int32_t (*energy)(const void* stepper, const void* time, const void* q, const void* p,

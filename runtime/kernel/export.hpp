@@ -266,6 +266,27 @@ struct Export {
         return LOBATTO_UNSUPPORTED;
     }
 
+    static constexpr std::int32_t parts = static_cast<double>(Limits<real>::epsilon) > 0x1p-53    ? 1
+                                          : static_cast<double>(Limits<real>::epsilon) > 0x1p-106 ? 2
+                                                                                                  : 3;
+    static void to_parts(const void* numbers, std::int64_t count, double* to) {
+        for (std::int64_t i = 0; i < count; ++i) {
+            real rest = in(numbers)[i];
+            const bool finite = is_finite(rest);
+            for (std::int32_t j = 0; j < parts; ++j) {
+                to[i * parts + j] = finite || j == 0 ? static_cast<double>(rest) : 0.0;
+                rest -= real(to[i * parts + j]);
+            }
+        }
+    }
+    static void from_parts(const double* from, std::int64_t count, void* numbers) {
+        for (std::int64_t i = 0; i < count; ++i) {
+            real sum = real(from[i * parts + parts - 1]);
+            for (std::int32_t j = parts - 2; j >= 0; --j) sum = real(from[i * parts + j]) + sum;
+            out(numbers)[i] = sum;
+        }
+    }
+
     static std::int32_t energy(const void* stepper, const void* time, const void* q, const void* p, void* energy) {
         return code(of(stepper).energy(*in(time), in(q), in(p), out(energy)));
     }
@@ -311,7 +332,8 @@ struct Export {
     }
 
     static constexpr lobatto_real kind() {
-        return sizeof(real) == 4                      ? LOBATTO_FLOAT
+        return std::is_class_v<real>                  ? LOBATTO_DOUBLE_DOUBLE
+               : sizeof(real) == 4                    ? LOBATTO_FLOAT
                : sizeof(real) == 8                    ? LOBATTO_DOUBLE
                : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE
                                                       : LOBATTO_FLOAT128;
@@ -330,6 +352,8 @@ struct Export {
                                              K::method,
                                              kind(),
                                              sizeof(real),
+                                             parts,
+                                             static_cast<double>(Limits<real>::epsilon),
                                              static_cast<std::int32_t>(K::form),
                                              n,
                                              K::parameter_count,
@@ -353,6 +377,8 @@ struct Export {
                                              state,
                                              two_fold_state,
                                              dense,
+                                             to_parts,
+                                             from_parts,
                                              energy,
                                              momentum,
                                              velocity,

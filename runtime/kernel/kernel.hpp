@@ -23,6 +23,7 @@
 #include "iteration/galerkin_newton.hpp"
 #include "iteration/neighbours.hpp"
 #include "iteration/newton.hpp"
+#include "iteration/refinement.hpp"
 #include "iteration/stage_coefficients.hpp"
 #include "iteration/stage_equations.hpp"
 #include "iteration/stage_map.hpp"

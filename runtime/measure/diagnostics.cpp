@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/error.hpp"
+#include "runtime/kernel/base/double_double.hpp"
 #include "runtime/measure/linear_algebra.hpp"
 
 namespace lobatto {
@@ -56,6 +57,8 @@ template float symplectic_defect(const LoadedStepper<float>&, const std::vector<
 template double symplectic_defect(const LoadedStepper<double>&, const std::vector<double>&, const std::vector<double>&);
 template long double symplectic_defect(const LoadedStepper<long double>&, const std::vector<long double>&,
                                        const std::vector<long double>&);
+template DoubleDouble symplectic_defect(const LoadedStepper<DoubleDouble>&, const std::vector<DoubleDouble>&,
+                                        const std::vector<DoubleDouble>&);
 template __float128 symplectic_defect(const LoadedStepper<__float128>&, const std::vector<__float128>&,
                                       const std::vector<__float128>&);
 

@@ -323,7 +323,7 @@ TEST_CASE(
     CAPTURE(first.err);
     REQUIRE(first.exit_code == 0);
     CHECK(contains(first.out, "ns/unit"));
-    CHECK(contains(first.out, "explicit extrapolation in __float128 differs from it by"));
+    CHECK(contains(first.out, "explicit extrapolation in quadruple differs from it by"));
     const auto json = nlohmann::json::parse(test::read_file(out + "/tradeoff.json"));
     REQUIRE(json.at("front").size() > 2);
     CHECK(json.at("chaotic") == false);

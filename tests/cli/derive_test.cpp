@@ -237,6 +237,6 @@ TEST_CASE("emit and derive refuse what they cannot do with exit code 2") {
     CHECK(lobatto_program({"derive", scene, "--points", "13"}).exit_code == 2);
     CHECK(lobatto_program({"derive", "no/such/scene.toml"}).exit_code == 2);
     CHECK(lobatto_program({"emit", scene}).exit_code == 2);
-    CHECK(lobatto_program({"emit", scene, "-o", "x", "--precision", "half"}).exit_code == 2);
+    CHECK(lobatto_program({"emit", scene, "-o", "x", "--numbers", "half"}).exit_code == 2);
     CHECK(lobatto_program({"emit", scene, "-o", "x", "--standalone", "--no-support"}).exit_code == 2);
 }

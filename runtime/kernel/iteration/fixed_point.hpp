@@ -19,6 +19,13 @@
 
 namespace lobatto {
 
+// What takes a step before this iteration is tried: of kernels in DoubleDouble, iteration/refinement.hpp.
+template <class K, class real = typename K::real>
+struct RefinementOf {
+    static constexpr bool exists = false;
+    struct type {};
+};
+
 template <class K>
 struct FixedPoint : StageMap<K, typename K::real> {
     using real = typename K::real;
@@ -40,9 +47,11 @@ struct FixedPoint : StageMap<K, typename K::real> {
     real increment;         // the last one of the last step, relative
     real twentieth_norm{};  // h^2 |A| / 20
     Workspace<Arrays> workspace;
+    typename RefinementOf<K>::type refinement{};
 
     void prepare(const typename K::Coefficients& k, real step) {
         Tables::prepare(k, step);
+        if constexpr (RefinementOf<K>::exists) refinement.prepare(k, step);
         real norm = real(0);
         for (int i = 0; i <= m; ++i) {
             real sum = real(0);
@@ -54,10 +63,17 @@ struct FixedPoint : StageMap<K, typename K::real> {
 
     // One step, h from `time`; false: it was not solved, and nothing has changed.
     bool step(const typename K::Coefficients& k, real time, real* q, real* u) {
-        return workspace.with([&](Arrays& a) { return solve(k, time, q, u, a) && finish(k, time, q, u, a); });
+        return workspace.with([&](Arrays& a) {
+            if constexpr (RefinementOf<K>::exists)
+                if (refinement.solve(k, *this, time, q, u, a)) return finish(k, time, q, u, a);
+            return solve(k, time, q, u, a) && finish(k, time, q, u, a);
+        });
     }
 
 private:
+    template <class>
+    friend struct Refinement;
+
     // base + sum_j column_j r_j of one part.
     template <int terms>
     LOBATTO_INLINE static V sum_of(const V& base, const V (*column)[parts], int p, const real* r) {

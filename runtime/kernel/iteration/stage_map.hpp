@@ -53,8 +53,8 @@ inline void lay_flat(const V* values, int stride, T* flat) {
 // The nodes of one trajectory lie in registers of 32 bytes at most: a step waits for its longest chain of operations,
 // and in wider ones divisions, roots and sums over the lanes answer later (docs/measurements/fixed_point_iteration.md).
 template <class real>
-constexpr int node_lanes = native_lanes<real>* static_cast<int>(sizeof(real)) > 32 ? 32 / static_cast<int>(sizeof(real))
-                                                                                   : native_lanes<real>;
+constexpr int node_lanes =
+    register_bytes > 32 && native_lanes<real> > 1 ? native_lanes<real> * 32 / register_bytes : native_lanes<real>;
 
 struct Unit {};
 

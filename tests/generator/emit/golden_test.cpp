@@ -87,12 +87,12 @@ TEST_CASE("standalone kernels of every precision compile with nothing else, run,
     };
     for (const std::string& scene : scenes) {
         std::vector<double> ends;
-        for (const Case& precision : {Case{"float", "c++17"}, Case{"double", "c++17"}, Case{"long-double", "c++17"},
-                                      Case{"quadruple", "gnu++17"}}) {
+        for (const Case& precision : {Case{"float", "c++17"}, Case{"double", "c++17"}, Case{"long double", "c++17"},
+                                      Case{"double-double", "c++17"}, Case{"quadruple", "gnu++17"}}) {
             INFO(scene << " " << precision.name);
             const test::TemporaryFolder folder;
             const test::Finished emitted =
-                emit_scene(scene, folder.string(), {"--standalone", "--precision", precision.name});
+                emit_scene(scene, folder.string(), {"--standalone", "--numbers", precision.name});
             INFO(emitted.err);
             REQUIRE(emitted.exit_code == 0);
             test::write_text(

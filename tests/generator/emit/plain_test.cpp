@@ -145,5 +145,5 @@ TEST_CASE("scenes that have no plain text are told why") {
     CHECK(message(clean).find("no clean arithmetic") != std::string::npos);
     CHECK(message(scene_file("wave_chain", "")).find("at most 64 coordinates, but the scene has 256") !=
           std::string::npos);
-    CHECK(message(scene_file("pendulum", ""), Precision::quadruple).find("long-double") != std::string::npos);
+    CHECK(message(scene_file("pendulum", ""), Precision::quadruple).find("long double") != std::string::npos);
 }
