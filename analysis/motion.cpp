@@ -8,6 +8,7 @@
 
 #include "analysis/exact_start.hpp"
 #include "runtime/error.hpp"
+#include "runtime/run/parts.hpp"
 
 namespace lobatto {
 
@@ -66,6 +67,27 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
     const double nearest = std::round(ratio);
     const bool reaches_end = std::fabs(ratio - nearest) <= 1e-9;
     return {static_cast<std::int64_t>(reaches_end ? nearest : std::floor(ratio)), reaches_end};
+}
+
+void add_digits(TrajectoryRequest& request, const Scene& scene, const Kernel& kernel) {
+    if (kernel->real_kind == LOBATTO_DOUBLE) return;
+    NumberStepper stepper(kernel);
+    const auto whole = [&](const std::vector<GiNaC::numeric>& values) {
+        std::vector<double> numbers;
+        for (GiNaC::numeric value : values)
+            for (std::size_t part = 0; part < stepper.parts(); ++part) {
+                numbers.push_back(value.to_double());
+                value -= GiNaC::numeric(numbers.back());
+            }
+        return numbers;
+    };
+    const ExactStart start(scene);
+    request.whole_parameters = whole(start.parameters);
+    request.whole_step = whole({scene.evaluate(scene.run.step, "the step")});
+    request.whole_q = whole(start.q);
+    request.whole_p = whole(start.rate);
+    if (start.from_velocity && stepper.prepare(request.whole_parameters, request.whole_step) == LOBATTO_OK)
+        request.whole_p = stepper.momentum(as_parts({request.time}, stepper.parts()), request.whole_q, request.whole_p);
 }
 
 TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper) {

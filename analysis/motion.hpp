@@ -23,4 +23,7 @@ Arrivals arrivals_of(const Scene& scene, std::int64_t count);
 // written.
 TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepper<double>& stepper);
 
+// The parameters, the step and the start with all digits of this kernel's numbers, where they are not double.
+void add_digits(TrajectoryRequest& request, const Scene& scene, const Kernel& kernel);
+
 }  // namespace lobatto

@@ -9,6 +9,8 @@
 #include <limits>
 #include <numeric>
 
+#include "runtime/run/parts.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -51,12 +53,19 @@ std::int64_t companion_steps(std::int64_t steps) {
 
 Companion::Companion(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request)
     : kernel_(kernel),
+      parts_(static_cast<std::size_t>(kernel->parts)),
       groups_(amplitude_groups(derivation.scene)),
       order_(derivation.quadrature.order()),
       rows_a_step_(1 + request.dense),
       narrow_(derivation.system) {
-    request_.parameters = request.parameters;
     narrow_.set_parameters(request.parameters);
+    const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {
+        return whole.empty() ? as_parts(doubles, parts_) : whole;
+    };
+    request_.whole_parameters = all_of(request.whole_parameters, request.parameters);
+    request_.whole_step = all_of(request.whole_step, {request.step});
+    request_.whole_q = all_of(request.whole_q, request.q);
+    request_.whole_p = all_of(request.whole_p, request.p);
     request_.q = request.q;
     request_.p = request.p;
     request_.time = request.time;
@@ -92,7 +101,10 @@ void Companion::observe(const Records& records) {
         const std::int64_t number = seen_++;
         if (number % rows_a_step_ != 0) continue;
         const std::int64_t steps = std::min(number / rows_a_step_ * request_.every, request_.steps);
-        if (steps > 0 && (steps % stride_ == 0 || steps == request_.steps)) run_.push_back({steps, {row, row + count}});
+        if (steps == 0 || (steps % stride_ != 0 && steps != request_.steps)) continue;
+        const double* const whole =
+            records.whole != nullptr ? records.whole + (i * records.columns + 1) * records.parts : row;
+        run_.push_back({steps, {whole, whole + count * parts_}});
     }
 }
 
@@ -116,26 +128,25 @@ void Companion::start() {
 }
 
 struct Companion::Place {
-    LoadedStepper<double> stepper;
-    double time, step;  // step: 0 before the first
+    NumberStepper stepper;
+    std::vector<double> time, step;  // step: zero before the first
     std::vector<double> q, p;
     Arrivals arrivals;
     lobatto_status status = LOBATTO_OK;
 
     struct State {
-        double time;
-        std::vector<double> q, p;
+        std::vector<double> time, q, p;
     };
     State state() const { return {time, q, p}; }
     void go_back(const State& to) {
         time = to.time;
         q = to.q;
         p = to.p;
-        step = 0;
+        step.assign(step.size(), 0.0);
     }
 
     // Steps of another size begin at this place.
-    void set_step(double size, const std::vector<double>& parameters) {
+    void set_step(const std::vector<double>& size, const std::vector<double>& parameters) {
         if (size == step || status != LOBATTO_OK) return;
         status = stepper.prepare(parameters, size);
         if (status == LOBATTO_OK) status = stepper.start(time, q, p);
@@ -147,7 +158,8 @@ struct Companion::Place {
         call.tolerance = tolerance;
         call.interval = arrivals.interval;
         call.end = arrivals.end;
-        if (status == LOBATTO_OK) status = stepper.advance(call);
+        std::vector<double> none, nothing;
+        if (status == LOBATTO_OK) status = stepper.advance(call, none, nothing);
         stepper.state(time, q, p);
         return call.steps_done;
     }
@@ -182,14 +194,16 @@ void Companion::take_finely(Place& place, double from, double step) {
 // One step; shorter ones in its place, if the motion met something narrow in it.
 void Companion::take_one(Place& place, double from, double step) {
     const Place::State before = place.state();
-    place.set_step(step, request_.parameters);
+    place.set_step(as_parts({step}, parts_), request_.whole_parameters);
     place.advance(1, request_.tolerance);
     if (narrow_.empty() || place.status != LOBATTO_OK || looked_ >= most_looked) return;
     ++looked_;
-    NarrowTerms::State begin{from, before.q, {}}, end{from + step, place.q, {}};
-    if (place.stepper.velocity(from, before.q, before.p, begin.v) != LOBATTO_OK ||
-        place.stepper.velocity(from + step, place.q, place.p, end.v) != LOBATTO_OK)
+    NarrowTerms::State begin{from, rounded(before.q, parts_), {}}, end{from + step, rounded(place.q, parts_), {}};
+    if (place.stepper.velocity(before.time, before.q, before.p, begin.v) != LOBATTO_OK ||
+        place.stepper.velocity(place.time, place.q, place.p, end.v) != LOBATTO_OK)
         return;
+    begin.v = rounded(begin.v, parts_);
+    end.v = rounded(end.v, parts_);
     const std::optional<Pulse> met = narrow_.on_the_way(begin, end);
     if (!met || !can_halve(from, step)) return;
     pulses_.insert(std::upper_bound(pulses_.begin(), pulses_.end(), *met,
@@ -201,6 +215,8 @@ void Companion::take_one(Place& place, double from, double step) {
 
 void Companion::take(Place& place, const Segment& part) {
     const double from = time_after(request_, part.begin), size = request_.step / ratio_of(part);
+    const std::vector<double> whole_size =
+        is_clocked() ? as_parts({size}, parts_) : times_fraction(request_.whole_step, part.steps, part.taken);
     const std::int64_t piece = std::max<std::int64_t>(1, request_.steps / amplitude_looks);
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
@@ -214,17 +230,19 @@ void Companion::take(Place& place, const Segment& part) {
             take_finely(place, here, size);
             ++done;
         } else {
-            place.set_step(size, request_.parameters);
+            place.set_step(whole_size, request_.whole_parameters);
             done += place.advance(count, request_.tolerance);
         }
-        const std::vector<double> row = joined(place.q, place.p);
+        const std::vector<double> row = rounded(joined(place.q, place.p), parts_);
         const std::lock_guard lock(mutex_);
         widen_to(companion_least_, companion_most_, row.data(), row.size());
     }
 }
 
 void Companion::compute() {
-    Place place{LoadedStepper<double>(kernel_), request_.time, 0, request_.q, request_.p, request_.arrivals};
+    Place place{NumberStepper(kernel_), as_parts({request_.time}, parts_),
+                as_parts({0}, parts_),  request_.whole_q,
+                request_.whole_p,       request_.arrivals};
     std::size_t done = 0;
     {
         const std::lock_guard lock(mutex_);
@@ -233,14 +251,21 @@ void Companion::compute() {
             const auto middle = companion_.back().row.begin() + std::ssize(place.q);
             place.q.assign(companion_.back().row.begin(), middle);
             place.p.assign(middle, companion_.back().row.end());
-            place.time = time_after(request_, companion_.back().steps);
+            place.time = is_clocked() ? as_parts({time_after(request_, companion_.back().steps)}, parts_)
+                                      : times_fraction(request_.whole_step, companion_.back().steps, 1);
+            if (!is_clocked()) place.time[0] += request_.time;
         }
     }
     if (done == 0) {
         std::vector<double> moved = place.q;
-        for (double& x : moved)
-            if (x != 0) x = beside(x);
-        if (place.stepper.prepare(request_.parameters, request_.step) == LOBATTO_OK &&
+        for (std::size_t k = 0; k < moved.size(); k += parts_) {
+            if (moved[k] == 0) continue;
+            if (kernel_->real_kind == LOBATTO_DOUBLE)
+                moved[k] = beside(moved[k]);
+            else
+                moved[k + parts_ - 1] += 4 * kernel_->epsilon * moved[k];
+        }
+        if (place.stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
             place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
             place.q = moved;  // else the start is at the edge of where the Lagrangian is real
     }
@@ -249,7 +274,7 @@ void Companion::compute() {
         if (cancelled_) return;
         const std::lock_guard lock(mutex_);
         if (place.status != LOBATTO_OK) {
-            stopped_ = place.time;
+            stopped_ = place.time[0];
             break;
         }
         companion_.push_back({part.begin + part.steps, joined(place.q, place.p)});
@@ -290,7 +315,7 @@ void Companion::restore(const std::vector<double>& saved) {
     }
     for (const auto& [points, count] : {std::pair{&run_, counts[1]}, std::pair{&companion_, counts[2]}})
         for (std::int64_t i = 0; i < std::llround(count); ++i) {
-            const std::vector<double> point = take(1 + 2 * std::ssize(groups_));
+            const std::vector<double> point = take(1 + 2 * std::ssize(groups_) * static_cast<std::ptrdiff_t>(parts_));
             if (!point.empty()) points->push_back({std::llround(point[0]), {point.begin() + 1, point.end()}});
         }
 }
@@ -319,11 +344,12 @@ std::vector<double> Companion::amplitudes() const {
         if (!row->empty()) widen_to(least, most, row->data(), row->size());
     std::vector<double> shared = amplitudes_of(least, most, groups_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
-    LoadedStepper<double> stepper(kernel_);
-    std::vector<double> q, p, T;
+    NumberStepper stepper(kernel_);
+    std::vector<double> T;
     if (kernel_->has_tangent != 0 && n <= most_coupled &&
-        stepper.prepare(request_.parameters, request_.step) == LOBATTO_OK &&
-        stepper.tangent(request_.time, request_.q, request_.p, q, p, T) == LOBATTO_OK) {
+        stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
+        stepper.tangent(as_parts({request_.time}, parts_), request_.whole_q, request_.whole_p, T) == LOBATTO_OK) {
+        T = rounded(T, parts_);
         const std::vector<double> found = shared;
         for (std::size_t i = 0; i < 2 * n; ++i)
             for (std::size_t j = 0; j < 2 * n; ++j)
@@ -351,20 +377,21 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         double apart = 0;
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;
-            const double difference = std::fabs(run_[j].row[i] - companion_[j].row[i]);
-            apart = std::fmax(apart, difference / amplitude[i]);
-            if (i >= n || !(of_run * difference / amplitude[i] > error.end)) continue;
-            error.end = of_run * difference / amplitude[i];
+            const double distance =
+                std::fabs(difference(run_[j].row.data() + i * parts_, companion_[j].row.data() + i * parts_, parts_));
+            apart = std::fmax(apart, distance / amplitude[i]);
+            if (i >= n || !(of_run * distance / amplitude[i] > error.end)) continue;
+            error.end = of_run * distance / amplitude[i];
             error.coordinate = i;
-            error.absolute = of_run * difference;
+            error.absolute = of_run * distance;
         }
         if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
         error.largest = std::fmax(error.largest, error.end);
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
-        if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, run_[j].row);
+        if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, rounded(run_[j].row, parts_));
     }
     if (!error.lost_after && stopped_)
-        lose(error, *stopped_, count > 0 ? run_[count - 1].row : joined(request_.q, request_.p));
+        lose(error, *stopped_, count > 0 ? rounded(run_[count - 1].row, parts_) : joined(request_.q, request_.p));
     error.complete = count == run_.size();
     // Exponential growth: from the first error that is there to the first that is as large as it can be.
     const auto first = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > 0; });
@@ -382,7 +409,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
     if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
         const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
-        lose(error, time_after(request_, point.steps), point.row);
+        lose(error, time_after(request_, point.steps), rounded(point.row, parts_));
     }
     // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
     // difference is what is known.

@@ -75,7 +75,7 @@ public:
 private:
     struct Point {
         std::int64_t steps;       // of the run
-        std::vector<double> row;  // q, p
+        std::vector<double> row;  // q, p, as parts
     };
     struct Segment {
         std::int64_t begin = 0, steps = 0;  // of the run
@@ -97,6 +97,7 @@ private:
     MeasuredError compare(const TrajectoryResult& result) const;
 
     Kernel kernel_;
+    std::size_t parts_;  // of its numbers
     TrajectoryRequest request_;
     std::vector<int> groups_;
     int order_, rows_a_step_;

@@ -13,9 +13,11 @@
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/accuracy/step_judge.hpp"
 #include "analysis/accuracy/watch.hpp"
+#include "analysis/exact_start.hpp"
 #include "analysis/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "analysis/stability/linear_departure.hpp"
+#include "analysis/tradeoff/candidate.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
@@ -29,6 +31,7 @@
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"
+#include "runtime/run/decimal.hpp"
 #include "runtime/run/output.hpp"
 
 namespace lobatto {
@@ -50,11 +53,19 @@ struct RunOptions {
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
     TrajectoryHeader header;
     header.scene = scene.title.empty() ? scene.name : scene.title;
-    header.method = fmt::format("{}, h = {}{}", scene.method.name(), exact_text(request.step),
-                                scene.clock ? ", clock = " + scene.clock->text : "");
+    const bool whole = !request.whole_q.empty();
+    const int parts = whole ? static_cast<int>(request.whole_step.size()) : 1;
+    header.method = fmt::format(
+        "{}, h = {}{}{}", scene.method.name(), decimal_text(whole ? request.whole_step.data() : &request.step, parts),
+        scene.clock ? ", clock = " + scene.clock->text : "",
+        scene.method.numbers == Precision::double_ ? "" : ", in " + precision_name(scene.method.numbers));
     header.kernel = source.digest;
     for (std::size_t i = 0; i < scene.parameters.size(); ++i)
-        header.parameters.emplace_back(scene.parameters[i].name, request.parameters[i]);
+        header.parameters.emplace_back(
+            scene.parameters[i].name,
+            decimal_text(
+                whole ? request.whole_parameters.data() + i * static_cast<std::size_t>(parts) : &request.parameters[i],
+                parts));
     header.columns = {{"t", ""}};
     for (const Coordinate& coordinate : scene.coordinates)
         header.columns.emplace_back(coordinate.name, coordinate.unit);
@@ -93,16 +104,23 @@ std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult
                        static_cast<double>(result.iterations) / static_cast<double>(steps), result.iterations_most);
 }
 
-std::string defect_text(const LoadedStepper<double>& stepper, const TrajectoryRequest& request) {
+std::string defect_text(const Kernel& kernel, Precision numbers, const Scene& scene) {
     try {
-        return fmt::format("{:.2g}", symplectic_defect(stepper, request.q, request.p));
+        return with_type_of(numbers, [&](auto type) {
+            using real = decltype(type);
+            const ExactStart exact(scene);
+            const auto h = number_of<real>(scene.evaluate(scene.run.step, "the step"));
+            const StartIn<real> start = start_in<real>(exact, kernel, h);
+            LoadedStepper<real> stepper(kernel);
+            stepper.prepare(start.parameters, h);
+            return fmt::format("{:.2g}", static_cast<double>(symplectic_defect(stepper, start.q, start.p)));
+        });
     } catch (const ComputationError&) {
         return "not measured: the first step has no derivative in this precision";
     }
 }
 
-// The stepper is prepared.
-void print_table(const Derivation& derivation, const Scene& scene, const LoadedStepper<double>& stepper,
+void print_table(const Derivation& derivation, const Scene& scene, const Kernel& run_kernel,
                  const TrajectoryRequest& request, const TrajectoryResult& result, const Watch& watch) {
     const bool clocked = scene.clock.has_value();
     const std::string of_all =
@@ -111,7 +129,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const LoadedS
     print_row("steps", fmt::format("{}{}, h = {:.6g}{}, to t = {:.6g}", steps, of_all, request.step,
                                    clocked ? " in the time of the clock " + scene.clock->text : "", result.time));
     if (steps == 0) return;
-    const lobatto_kernel& kernel = stepper.kernel().table();
+    const lobatto_kernel& kernel = run_kernel.table();
     print_row("time per step", duration(result.seconds / static_cast<double>(steps)));
     print_row("iterations", iterations_text(kernel, result, steps));
     const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
@@ -128,7 +146,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const LoadedS
         !derivation.system.has_forces())  // of the first step, its equations solved to rounding
         print_row("symplectic defect",
                   request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
-                                        : defect_text(stepper, request));
+                                        : defect_text(run_kernel, scene.method.numbers, scene));
     if (const auto error = watch.position_error()) {
         const std::string& unit = scene.coordinates.front().unit;
         print_row("position error",
@@ -160,7 +178,8 @@ struct Prepared {
     Derivation derivation;
     KernelSource source;
     Compiled compiled;
-    Kernel kernel;
+    Kernel kernel;  // in the scene's numbers
+    Kernel plain;   // the same in double, for what looks at states in doubles
     Steps steps;
     double derivation_seconds;
 };
@@ -169,17 +188,22 @@ Prepared prepare(const RunOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
-    MethodOption::require_double(scene, "run");
+    if (scene.clock && scene.method.numbers != Precision::double_)
+        scene.source.fail(scene.clock->at, "with a clock `lobatto run` computes in double, but numbers are \"" +
+                                               precision_name(scene.method.numbers) +
+                                               "\"; remove the clock, or give --numbers double");
     Derivation derivation = derive(scene, options.general);
     if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
-    const KernelSource source = emit(derivation);
+    const Precision numbers = scene.method.numbers;
+    const KernelSource source = emit(derivation, {numbers, {}});
     const double derivation_seconds = seconds_since(start);
     apply(options.overrides, scene);  // after the derivation: one kernel serves all values
     if (!options.overrides.set.empty()) check_domains(scene, derivation.system);
     const Steps steps = steps_of(scene, options.overrides);
     Compiled compiled;
-    const Kernel kernel = kernel_of(source, Precision::double_, &compiled);
-    return {scene, derivation, source, compiled, kernel, steps, derivation_seconds};
+    const Kernel kernel = kernel_of(source, numbers, &compiled);
+    const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(emit(derivation), Precision::double_);
+    return {scene, derivation, source, compiled, kernel, plain, steps, derivation_seconds};
 }
 
 // All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
@@ -193,7 +217,7 @@ public:
               const std::vector<double>& velocity, bool measures)
         : watch(run.scene, run.derivation.structure, stepper, velocity),
           judge(run.scene),
-          energy(run.derivation, run.kernel),
+          energy(run.derivation, run.plain),
           domains(run.scene, run.derivation.system),
           parameters(request.parameters),
           counts(1 + run.scene.outputs.events.size(), 0) {
@@ -352,9 +376,9 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
             row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
             observers.domains.text(observers.parameters, row.data()));
     }
-    const std::string departure = observers.energy.departure(run.derivation, run.kernel, request);
+    const std::string departure = observers.energy.departure(run.derivation, run.plain, request);
     if (run.scene.clock) return departure;
-    return departure.empty() ? linear_departure(run.derivation, run.scene, run.kernel, request, result) : departure;
+    return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
 }
 
 // Ends the command with the error that the run deserves, if any.
@@ -386,8 +410,9 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, 
 void run(const RunOptions& options) {
     const Prepared run = prepare(options);
     const Scene& scene = run.scene;
-    LoadedStepper<double> stepper(run.kernel);
+    LoadedStepper<double> stepper(run.plain);
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
+    add_digits(request, scene, run.kernel);
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
     const bool has_events = !scene.outputs.events.empty();
     keep_scene(scene.path, path);
@@ -431,11 +456,11 @@ void run(const RunOptions& options) {
     if (error && departure.empty()) warnings = warnings_of(*error, scene.run.error);
     if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock)
         for (const std::string& warning :
-             StepJudge::warnings(observers.judge.judge(run.derivation, run.kernel, request, result)))
+             StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
             warnings.push_back(warning);
     for (const std::string& warning : warnings) tell("lobatto: warning: {}.\n", warning);
     if (!options.quiet) {
-        print_table(run.derivation, scene, stepper, request, result, observers.watch);
+        print_table(run.derivation, scene, run.kernel, request, result, observers.watch);
         if (error) print_row("measured error", text_of(*error, scene));
         print_events(scene.outputs.events, observers.counts, files.events_path());
         const double states = observers.counts[0];
@@ -443,7 +468,7 @@ void run(const RunOptions& options) {
         if (!run.steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
-    fail_where_it_failed(scene, request, result, departure, files, run.kernel);
+    fail_where_it_failed(scene, request, result, departure, files, run.plain);
 }
 
 }  // namespace

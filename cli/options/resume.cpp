@@ -22,10 +22,12 @@ std::string list(const std::vector<double>& values) {
 }  // namespace
 
 std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader& header, const std::string& object) {
+    const bool whole = !request.whole_q.empty();
     return fmt::format(
         "# lobatto {}\n{}positions: {}\nmomenta: {}\nsteps: {}\nevery: {}\ndense: {}\ntolerance: {}\ncompiled kernel: "
         "{}\n",
-        LOBATTO_VERSION, text_of(header), list(request.q), list(request.p), request.steps, request.every, request.dense,
+        LOBATTO_VERSION, text_of(header), list(whole ? request.whole_q : request.q),
+        list(whole ? request.whole_p : request.p), request.steps, request.every, request.dense,
         exact_text(request.tolerance), std::filesystem::path(object).stem().string());
 }
 

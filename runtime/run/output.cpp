@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "runtime/error.hpp"
+#include "runtime/run/decimal.hpp"
 
 namespace lobatto {
 
@@ -31,7 +32,7 @@ std::string text_of(const TrajectoryHeader& header) {
                     header.events.empty() ? "trajectory" : "events", header.scene, header.method, header.kernel);
     const char* separator = "# parameters: ";
     for (const auto& [name, value] : header.parameters) {
-        text += fmt::format("{}{} = {}", separator, name, exact_text(value));
+        text += fmt::format("{}{} = {}", separator, name, value);
         separator = ", ";
     }
     if (!header.parameters.empty()) text += '\n';
@@ -82,14 +83,17 @@ void TrajectoryFile::add_to_checksum(std::int64_t size) {
 
 void TrajectoryFile::write(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
-        append(records.rows + i * records.columns, columns_);
-        for (std::size_t c = 0; c < multipliers_; ++c) {
+        const double *const rows = records.whole != nullptr ? records.whole : records.rows,
+                            *const energy = records.whole != nullptr ? records.whole_energy : records.energy;
+        append(rows + i * records.columns * records.parts, columns_, records.parts);
+        if (multipliers_ > 0) {
             text_ += ',';
-            append_number(text_, records.multipliers[static_cast<std::size_t>(i) * multipliers_ + c]);
+            append(records.multipliers + static_cast<std::size_t>(i * records.parts) * multipliers_, multipliers_,
+                   records.parts);
         }
         if (energy_) {
             text_ += ',';
-            append_number(text_, records.energy[i]);
+            append(energy + i * records.parts, 1, records.parts);
         }
         text_ += '\n';
     }
@@ -98,19 +102,23 @@ void TrajectoryFile::write(const Records& records) {
 
 void TrajectoryFile::write(const EventRecords& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
-        const double* row = records.rows + i * records.columns;
+        const double* const row =
+            (records.whole != nullptr ? records.whole : records.rows) + i * records.columns * records.parts;
         append_number(text_, row[0] + 1);
         text_ += ',';
-        append(row + 1, columns_ - 1);
+        append(row + records.parts, columns_ - 1, records.parts);
         text_ += '\n';
     }
     flush();
 }
 
-void TrajectoryFile::append(const double* row, std::size_t count) {
+void TrajectoryFile::append(const double* row, std::size_t count, int parts) {
     for (std::size_t column = 0; column < count; ++column) {
         if (column > 0) text_ += ',';
-        append_number(text_, row[column]);
+        if (parts == 1)
+            append_number(text_, row[column]);
+        else
+            text_ += decimal_text(row + column * static_cast<std::size_t>(parts), parts);
     }
 }
 

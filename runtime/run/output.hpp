@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Trajectories as CSV files that round-trip: every number is the shortest text that reads back to the same bits.
+// Trajectories as CSV files that round-trip: every number is a text that reads back to the same bits, the shortest for
+// double (runtime/run/decimal.hpp).
 #pragma once
 
 #include <cstdint>
@@ -15,10 +16,10 @@ namespace lobatto {
 
 // What the comment lines at the head of a file say. No dates, paths or machines: same scene, same bytes.
 struct TrajectoryHeader {
-    std::string scene;   // its title
-    std::string method;  // "Lobatto, 4 points, h = 0.05"
-    std::string kernel;  // digest
-    std::vector<std::pair<std::string, double>> parameters;
+    std::string scene;                                            // its title
+    std::string method;                                           // "Lobatto, 4 points, h = 0.05"
+    std::string kernel;                                           // digest
+    std::vector<std::pair<std::string, std::string>> parameters;  // names and exact values
     std::vector<std::pair<std::string, std::string>>
         columns;         // names and units ("" when unknown): t, q.., p.. when they are kept, lambda.., and H
     bool energy = true;  // whether the last column is H
@@ -46,7 +47,7 @@ public:
 
 private:
     void add_to_checksum(std::int64_t size);
-    void append(const double* row, std::size_t count);
+    void append(const double* row, std::size_t count, int parts);
     void flush();
 
     PartialFile file_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The host's side of a run: how many steps to ask the kernel for at a time, and what to say when it stops.
 #include "runtime/run/trajectory.hpp"
+#include "runtime/run/parts.hpp"
 #include "runtime/run/timing.hpp"
 
 #include <fmt/format.h>
@@ -28,72 +29,79 @@ constexpr double checkpoint_part = 1.0 / 50;  // of the time would go into them
 // Watches the kept states go by: their energies, and the sink.
 class Keeper {
 public:
-    Keeper(const LoadedStepper<double>& stepper, const TrajectoryRequest& request, TrajectoryResult& result)
-        : stepper_(stepper), request_(request), result_(result), n_(request.q.size()), q_(n_), p_(n_) {
-        result_.energy_start = energy(request.time, request.q.data(), request.p.data());
+    using Parts = NumberStepper::Parts;
+
+    // `start`: t, q, p.
+    Keeper(const NumberStepper& stepper, const TrajectoryRequest& request, const Parts& start, TrajectoryResult& result)
+        : stepper_(stepper), request_(request), result_(result), n_(request.q.size()), parts_(stepper.parts()) {
+        energy_start_.resize(parts_);
+        energy(start.data(), start.data() + parts_, start.data() + (1 + n_) * parts_, energy_start_.data());
+        result_.energy_start = energy_start_[0];
     }
 
     // `between`: that many of every between + 1 rows lie between two steps.
-    void keep(const double* rows, std::int64_t count, int between) {
+    void keep(const Parts& whole, std::int64_t count, int between) {
         const std::size_t columns = 1 + 2 * n_;
-        const double* energies = nullptr;
-        if (has_energy()) {
-            energies_.resize(static_cast<std::size_t>(count));
-            for (std::size_t i = 0; i < energies_.size(); ++i) {
-                const double* const row = rows + i * columns;
-                energies_[i] = energy(row[0], row + 1, row + 1 + n_);
-                if ((i + 1) % static_cast<std::size_t>(between + 1) != 0) continue;
-                result_.energy_error_final = energies_[i] - result_.energy_start;
-                const double error = std::fabs(result_.energy_error_final);
-                if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
-            }
-            energies = energies_.data();
-        } else {
-            result_.energy_error_final = result_.energy_error_largest = std::nan("");
+        energies_.resize(static_cast<std::size_t>(count) * parts_);
+        for (std::size_t i = 0; i < static_cast<std::size_t>(count) && has_energy(); ++i) {
+            const double* const row = whole.data() + i * columns * parts_;
+            double* const H = energies_.data() + i * parts_;
+            energy(row, row + parts_, row + (1 + n_) * parts_, H);
+            if ((i + 1) % static_cast<std::size_t>(between + 1) != 0) continue;
+            result_.energy_error_final = difference(H, energy_start_.data(), parts_);
+            const double error = std::fabs(result_.energy_error_final);
+            if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
         }
+        if (!has_energy()) result_.energy_error_final = result_.energy_error_largest = std::nan("");
         if (!request_.sink || count == 0) return;
-        Records records{rows, energies, count, static_cast<int>(columns)};
-        if (request_.multipliers) records.multipliers = multipliers_of(rows, count);
+        Records records{whole.data(), has_energy() ? energies_.data() : nullptr, count, static_cast<int>(columns)};
+        if (parts_ > 1) {
+            rows_ = rounded(whole, parts_);
+            rounded_energies_ = rounded(energies_, parts_);
+            records.whole = records.rows;
+            records.whole_energy = records.energy;
+            records.parts = static_cast<int>(parts_);
+            records.rows = rows_.data();
+            if (has_energy()) records.energy = rounded_energies_.data();
+        }
+        if (request_.multipliers) records.multipliers = multipliers_of(whole, count);
         request_.sink(records);
     }
 
     void keep_last() {
-        std::vector<double> row{result_.time};
-        row.insert(row.end(), result_.q.begin(), result_.q.end());
-        row.insert(row.end(), result_.p.begin(), result_.p.end());
-        keep(row.data(), 1, 0);
+        Parts row, q, p;
+        stepper_.state(row, q, p);
+        row.insert(row.end(), q.begin(), q.end());
+        row.insert(row.end(), p.begin(), p.end());
+        keep(row, 1, 0);
     }
 
 private:
     bool has_energy() const { return stepper_.kernel()->has_energy != 0; }
 
-    double energy(double time, const double* q, const double* p) {
-        double energy = 0;
-        std::copy_n(q, n_, q_.begin());
-        std::copy_n(p, n_, p_.begin());
-        return stepper_.energy(time, q_, p_, energy) == LOBATTO_OK ? energy : std::nan("");
+    void energy(const double* time, const double* q, const double* p, double* energy) {
+        if (stepper_.energy(time, q, p, energy) != LOBATTO_OK) std::fill_n(energy, parts_, std::nan(""));
     }
 
     // Row by row; not a number where there are none.
-    const double* multipliers_of(const double* rows, std::int64_t count) {
+    const double* multipliers_of(const Parts& whole, std::int64_t count) {
         multipliers_.clear();
-        std::vector<double> lambda;
+        const auto part = static_cast<std::ptrdiff_t>(n_ * parts_), one = static_cast<std::ptrdiff_t>(parts_);
         for (std::int64_t i = 0; i < count; ++i) {
-            const double* const row = rows + i * static_cast<std::int64_t>(1 + 2 * n_);
-            std::copy_n(row + 1, n_, q_.begin());
-            std::copy_n(row + 1 + n_, n_, p_.begin());
-            if (stepper_.multipliers(row[0], q_, p_, lambda) != LOBATTO_OK)
+            const auto time = whole.begin() + i * (one + 2 * part), q = time + one, p = q + part;
+            Parts lambda;
+            if (stepper_.multipliers({time, q}, {q, p}, {p, p + part}, lambda) != LOBATTO_OK)
                 std::fill(lambda.begin(), lambda.end(), std::nan(""));
             multipliers_.insert(multipliers_.end(), lambda.begin(), lambda.end());
         }
         return multipliers_.data();
     }
 
-    const LoadedStepper<double>& stepper_;
+    const NumberStepper& stepper_;
     const TrajectoryRequest& request_;
     TrajectoryResult& result_;
-    std::size_t n_;
-    std::vector<double> q_, p_, energies_, multipliers_;
+    std::size_t n_, parts_;
+    Parts energy_start_, energies_, rows_, rounded_energies_, multipliers_;
 };
 
 // Hands out checkpoints, at the right times.
@@ -101,14 +109,14 @@ class Checkpoints {
 public:
     explicit Checkpoints(const TrajectoryRequest& request) : request_(request) {}
 
-    void look(const LoadedStepper<double>& stepper, const TrajectoryResult& result) {
+    void look(const NumberStepper& stepper, const TrajectoryResult& result) {
         if (!request_.checkpoint || seconds_since(last_) < pause_) return;
         const Clock::time_point start = Clock::now();
         request_.checkpoint({result, stepper.memory()});
         last_ = Clock::now();
         pause_ = std::max(checkpoint_seconds, seconds_since(start) / checkpoint_part);
     }
-    void at_once(const LoadedStepper<double>& stepper, const TrajectoryResult& result) {
+    void at_once(const NumberStepper& stepper, const TrajectoryResult& result) {
         pause_ = 0;
         look(stepper, result);
     }
@@ -118,6 +126,29 @@ private:
     Clock::time_point last_ = Clock::now();
     double pause_ = checkpoint_seconds;
 };
+
+// A call of `advance` but for its steps.
+lobatto_advance call_for(const TrajectoryRequest& request, std::int64_t rows, std::int64_t event_rows) {
+    lobatto_advance call{};
+    call.tolerance = request.tolerance;
+    call.record_every = request.every;
+    call.capacity = rows;
+    call.dense = request.dense;
+    call.interval = request.arrivals.interval;
+    call.end = request.arrivals.end;
+    call.chain_records = request.arrivals.keeps_chain ? 1 : 0;
+    call.event_capacity = event_rows;
+    return call;
+}
+
+void add(TrajectoryResult& result, const lobatto_advance& call) {
+    result.steps_done += call.steps_done;
+    result.chain_steps += call.chain_steps;
+    result.iterations += call.iterations;
+    result.iterations_most = std::max(result.iterations_most, call.iterations_most);
+    result.increment_largest = std::max(result.increment_largest, call.increment_largest);
+    result.increment_failed = call.increment_failed;
+}
 
 constexpr int most_halvings = 14;    // of a step that could not be taken
 constexpr double same_place = 0.01;  // of the way
@@ -136,15 +167,24 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     result.time = request.time;
     result.q = request.q;
     result.p = request.p;
-    LoadedStepper<double> stepper(kernel);
-    result.status = stepper.prepare(request.parameters, request.step);
-    if (result.status == LOBATTO_OK) result.status = stepper.start(request.time, request.q, request.p);
+    NumberStepper stepper(kernel);
+    const std::size_t parts = stepper.parts();
+    const auto whole = [parts](const std::vector<double>& given, const std::vector<double>& x) {
+        return given.empty() ? as_parts(x, parts) : given;
+    };
+    result.status =
+        stepper.prepare(whole(request.whole_parameters, request.parameters), whole(request.whole_step, {request.step}));
+    NumberStepper::Parts first = as_parts({request.time}, parts), q = whole(request.whole_q, request.q),
+                         p = whole(request.whole_p, request.p);
+    if (result.status == LOBATTO_OK) result.status = stepper.start(first, q, p);
     if (result.status != LOBATTO_OK) return result;
     result.started = true;
 
-    Keeper keeper(stepper, request, result);
+    first.insert(first.end(), q.begin(), q.end());
+    first.insert(first.end(), p.begin(), p.end());
+    Keeper keeper(stepper, request, first, result);
     if (request.from == nullptr) {
-        keeper.keep_last();
+        keeper.keep(first, 1, 0);
     } else {
         result = request.from->result;
         result.started = true;
@@ -159,10 +199,9 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
                                                        std::max<std::int64_t>(rows_at_once / rows_of_step, 1)) *
                               rows_of_step;
     const std::size_t columns = 1 + 2 * request.q.size();
-    std::vector<double> records(static_cast<std::size_t>(rows) * columns), events;
+    NumberStepper::Parts records, events, time;
     const bool seeks_events = request.events && kernel->events > 0;
     const std::int64_t event_rows = seeks_events ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
-    events.resize(static_cast<std::size_t>(event_rows) * (1 + columns));
     std::int64_t block = 256;
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
@@ -172,35 +211,26 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             break;
         }
 
-        lobatto_advance call{};
-        call.tolerance = request.tolerance;
+        lobatto_advance call = call_for(request, rows, event_rows);
         call.steps = std::min(block, request.steps - result.steps_done);
-        call.record_every = request.every;
-        call.records = records.data();
-        call.capacity = rows;
-        call.dense = request.dense;
-        call.interval = request.arrivals.interval;
-        call.end = request.arrivals.end;
-        call.chain_records = request.arrivals.keeps_chain ? 1 : 0;
-        call.events = seeks_events ? events.data() : nullptr;
-        call.event_capacity = event_rows;
         const Clock::time_point start = Clock::now();
         const double processor_start = processor_seconds();
-        result.status = stepper.advance(call);
+        result.status = stepper.advance(call, records, events);
         result.seconds += processor_seconds() - processor_start;
         const double seconds = seconds_since(start);
 
-        result.steps_done += call.steps_done;
-        result.chain_steps += call.chain_steps;
-        result.iterations += call.iterations;
-        result.iterations_most = std::max(result.iterations_most, call.iterations_most);
-        result.increment_largest = std::max(result.increment_largest, call.increment_largest);
-        result.increment_failed = call.increment_failed;
-        stepper.state(result.time, result.q, result.p);
+        add(result, call);
+        stepper.state(time, q, p);
+        result.time = time[0];
+        result.q = rounded(q, parts);
+        result.p = rounded(p, parts);
         result.events += call.events_written;
-        if (call.events_written > 0)
-            request.events({events.data(), call.events_written, static_cast<int>(1 + columns)});
-        keeper.keep(records.data(), call.records_written, request.dense);
+        if (call.events_written > 0) {
+            const std::vector<double> found = rounded(events, parts);
+            request.events({found.data(), call.events_written, static_cast<int>(1 + columns), events.data(),
+                            static_cast<int>(parts)});
+        }
+        keeper.keep(records, call.records_written, request.dense);
 
         // The clock ticks coarsely against a short block: grow at most eightfold at a time.
         const double pace = block_seconds / std::max(seconds, block_seconds / 8);
@@ -309,8 +339,8 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
                 advice = "a clock that is positive wherever the motion goes";
                 break;
             }
-            why =
-                fmt::format("t + h equals t in double precision: h = {:.6g} is below the rounding of t", request.step);
+            why = fmt::format("t + h equals t in the numbers of the run: h = {:.6g} is below the rounding of t",
+                              request.step);
             advice = "a larger step, or a start time nearer to zero";
             break;
     }

@@ -8,25 +8,31 @@
 #include <string>
 #include <vector>
 
-#include "runtime/build/library.hpp"
+#include "runtime/build/number_stepper.hpp"
 #include "runtime/kernel/abi.h"
 
 namespace lobatto {
 
-// Kept states: rows of t, q[n], p[n], row-major as the kernel writes them, and the energy of each.
+// Kept states: rows of t, q[n], p[n], row-major as the kernel writes them, and the energy of each. Of kernels in other
+// numbers than double these are rounded; `whole` and `whole_energy` have all digits, as sums of `parts` doubles.
 struct Records {
     const double* rows = nullptr;    // count x columns
     const double* energy = nullptr;  // count: H(t, q, p); null when the kernel has no energy
     std::int64_t count = 0;
     int columns = 0;                      // 1 + 2n
-    const double* multipliers = nullptr;  // count x constraints, where they were asked for
+    const double* multipliers = nullptr;  // count x constraints x parts, where they were asked for
+    const double* whole = nullptr;        // count x columns x parts; null: `rows` has all digits
+    const double* whole_energy = nullptr;
+    int parts = 1;
 };
 
 // Where event functions vanished: rows of event number, t, q[n], p[n], in the order of the motion.
 struct EventRecords {
     const double* rows = nullptr;  // count x columns
     std::int64_t count = 0;
-    int columns = 0;  // 2 + 2n
+    int columns = 0;                // 2 + 2n
+    const double* whole = nullptr;  // as of Records
+    int parts = 1;
 };
 
 struct TrajectoryResult {
@@ -72,7 +78,10 @@ struct TrajectoryRequest {
     Arrivals arrivals;         // of kernels with a clock
     std::int64_t every = 1;    // keep every such state; the first and the last state are always kept
     bool multipliers = false;  // of the constraints, beside each kept state
-    int dense = 0;             // states between two steps, on the step's polynomial; above 0 needs every = 1
+    // Parameters, step and start with all digits of the kernel's numbers, as sums of `parts` doubles (NumberStepper);
+    // empty: the doubles above are exact.
+    std::vector<double> whole_parameters, whole_step, whole_q, whole_p;
+    int dense = 0;  // states between two steps, on the step's polynomial; above 0 needs every = 1
     std::function<void(const Records&)> sink;         // called for each block, in order
     std::function<void(const EventRecords&)> events;  // likewise; nothing: events are not sought
     std::function<void(std::int64_t done)> progress;  // called about ten times a second

@@ -52,6 +52,11 @@ const Subject subjects[] = {
      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\npoints = 6\n"
      "[run]\nstep = 0.1\nuntil = 100000\n[output]\nevery = 37\nevents = [\"q = 0 rising\"]\n",
      {"--arithmetic", "clean"}},
+    {"double-double",
+     "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\npoints = 6\n"
+     "numbers = \"double-double\"\n[run]\nstep = 0.1\nuntil = 20000\n[output]\nevery = 37\n"
+     "events = [\"q = 0 rising\"]\n",
+     {}},
     {"splitting",
      "lagrangian = \"\"\"sum(i = 1 .. 40, (1 + i/8)*x[i]'^2/2) - sum(i = 2 .. 40, (x[i] - x[i-1])^2/2 + (x[i] - "
      "x[i-1])^4/8)\"\"\"\n[coordinates]\nx = { count = 40, position = \"sin(i)\", velocity = 0 }\n[run]\nstep = 0.2\n"

@@ -43,7 +43,7 @@ TrajectoryHeader pendulum_header() {
     return {"A pendulum",
             "Lobatto, 4 points, h = 0.1",
             "0123456789abcdef",
-            {{"m", 1}, {"omega", 6.283185307179586}},
+            {{"m", "1"}, {"omega", "6.283185307179586"}},
             {{"t", ""}, {"q", "rad"}, {"p_q", ""}, {"H", ""}},
             true,
             {}};

@@ -269,9 +269,10 @@ TEST_CASE("each way to stop has its own explanation") {
               "This h meets a resonance of the forces there. Try a "
               "smaller step, such as h = 0.25, or a slightly different one.");
     result.status = LOBATTO_TIME_STANDS_STILL;
-    CHECK(explain_stop(result, request) == where +
-                                               "t + h equals t in double precision: h = 0.5 is below the rounding of "
-                                               "t. Try a larger step, or a start time nearer to zero.");
+    CHECK(explain_stop(result, request) ==
+          where +
+              "t + h equals t in the numbers of the run: h = 0.5 is below the rounding of "
+              "t. Try a larger step, or a start time nearer to zero.");
     result.status = LOBATTO_SINGULAR_MASS;
     result.steps_done = 0;
     result.time = 0;
