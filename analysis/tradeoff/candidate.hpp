@@ -20,7 +20,7 @@ struct Member {
     Precision precision = Precision::double_;
     StepArithmetic arithmetic = StepArithmetic::plain;
 
-    Method method(double tolerance = 0) const { return {family, points, tolerance, arithmetic}; }
+    Method method(double tolerance = 0) const { return {family, points, tolerance, arithmetic, precision}; }
     int order() const { return method().order(); }
     // Whether its steps are iterated to a tolerance; of linear systems nothing is, whatever the member.
     bool iterates() const { return family != Family::splitting && arithmetic == StepArithmetic::plain; }

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "analysis/stability/limit.hpp"
 #include "runtime/error.hpp"
@@ -17,14 +19,54 @@ constexpr double safety = 0.8;           // of the promise: what the search aims
 constexpr double reference_part = 0.01;  // of the promise: how well the reference should be known
 constexpr double least_part = 0.1;       // and how well it must be
 
+// The rungs of the ladder of numbers that are worth a step up: the others cost more and hold less.
+constexpr Precision rungs[] = {Precision::double_, Precision::double_double, Precision::quadruple};
+
+// Whether numbers hold an error at all.
+bool holds(Precision numbers, double error) {
+    return error >= 4 * rounding_of(numbers);
+}
+Precision first_rung(double error) {
+    return *std::find_if(std::begin(rungs), std::end(rungs),
+                         [error](Precision numbers) { return holds(numbers, error); });
+}
+
+// What was found in one kind of numbers, and its error on all steps.
+struct Found {
+    Search search;
+    double error = 0;
+    bool keeps(double wanted) const { return search.best && error <= wanted; }
+};
+
+// Between the samples of the reference the error may be larger: then a smaller one is aimed at.
+Found find_in(Experiment& experiment, const ChoiceRequest& request, Precision numbers) {
+    const double wanted = request.error - experiment.reference().disagreement.back();
+    double goal = safety * request.error;
+    Found found;
+    for (int attempt = 0; attempt < attempts; ++attempt) {
+        found.search = search(experiment, goal, numbers);
+        if (!found.search.best) break;
+        request.say("checking all steps");
+        const Candidate& candidate = found.search.best->candidate;
+        found.error =
+            experiment.measurer().error_on_steps(experiment.kernel_builder().kernel(candidate.member), candidate);
+        if (found.error <= wanted) break;
+        goal *= 0.8 * request.error / found.error;
+        if (experiment.left() < 0) {
+            found.search.complete = false;
+            break;
+        }
+    }
+    return found;
+}
+
 }  // namespace
 
 Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& request) {
-    double goal = safety * request.error;
     ExperimentRequest wish;
     wish.seconds = request.seconds;
     wish.wanted = reference_part * request.error;
-    wish.first = first_guess(goal, 4);
+    wish.first = first_guess(safety * request.error, 4, first_rung(request.error));
     wish.interrupted = request.interrupted;
     wish.say = request.say;
     Experiment experiment(std::move(derivation), scene, wish);
@@ -43,48 +85,42 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
                 (known > 0 ? fmt::format(". They agree to t = {:.4g}: try --until {:.4g}", known, known)
                            : std::string())));
     }
-    // Between the samples of the reference the error may be larger: then a smaller one is aimed at.
-    Search found;
-    double error = 0;
-    for (int attempt = 0; attempt < attempts; ++attempt) {
-        found = search(experiment, goal);
-        if (!found.best) break;
-        request.say("checking all steps");
-        error = experiment.measurer().error_on_steps(experiment.kernel_builder().kernel(found.best->candidate.member),
-                                                     found.best->candidate);
-        if (error <= request.error * (1 - uncertainty / request.error)) break;
-        goal *= 0.8 * request.error / error;
-        if (experiment.left() < 0) {
-            found.complete = false;
-            break;
-        }
+    // Where rounding stands in the way, in numbers with more digits.
+    Found best;
+    double least = infinity;
+    int members = 0;
+    for (const Precision numbers : rungs) {
+        if (!holds(numbers, request.error) || (members > 0 && experiment.left() < 0)) continue;
+        best = find_in(experiment, request, numbers);
+        members += best.search.members;
+        least = std::fmin(least, std::fmax(best.search.least_error, best.search.best ? best.error : 0));
+        if (best.keeps(request.error)) break;
     }
-    if (!found.best || !(error <= request.error)) {
-        const double least = std::fmax(found.least_error, found.best ? error : 0);
+    if (!best.keeps(request.error)) {
         if (!std::isfinite(least))
             throw ComputationError(fmt::format(
                 "nothing could be measured within {:.3g} s; give more time with --budget", request.seconds));
         throw ComputationError(fmt::format(
             "an error of {:.2g} to t = {:.6g} is not reached: {:.2g} is the least of the {} members of the family that "
-            "were "
-            "tried in double precision{}. Ask for a larger error or an earlier end; `lobatto tradeoff` measures long "
-            "double "
-            "and quadruple too, which `numbers` under [method] chooses",
-            request.error, reference.until, least, found.members,
-            found.complete ? "" : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
+            "were tried{}. Ask for a larger error or an earlier end",
+            request.error, reference.until, least, members,
+            experiment.left() > 0 && best.search.complete
+                ? ""
+                : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
     }
+    const Candidate& candidate = best.search.best->candidate;
     Choice choice;
-    choice.measurement = experiment.measurer().measure(experiment.kernel_builder().kernel(found.best->candidate.member),
-                                                       found.best->candidate, true);
-    choice.measurement.seconds = std::fmin(choice.measurement.seconds, found.best->seconds);
-    choice.measurement.error = std::fmax(choice.measurement.error, error);
+    choice.measurement =
+        experiment.measurer().measure(experiment.kernel_builder().kernel(candidate.member), candidate, true);
+    choice.measurement.seconds = std::fmin(choice.measurement.seconds, best.search.best->seconds);
+    choice.measurement.error = std::fmax(choice.measurement.error, best.error);
     choice.until = reference.until;
     choice.reference = reference.first;
     choice.uncertainty = uncertainty;
     choice.frequency = reference.frequency;
-    choice.stability_limit = stability_limit(quadrature_of(found.best->candidate.member.method()));
-    choice.members = found.members;
-    choice.complete = found.complete;
+    choice.stability_limit = stability_limit(quadrature_of(candidate.member.method()));
+    choice.members = members;
+    choice.complete = best.search.complete;
     choice.seconds = experiment.elapsed();
     return choice;
 }

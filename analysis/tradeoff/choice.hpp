@@ -9,7 +9,7 @@
 
 namespace lobatto {
 
-constexpr double least_error = 1e-15, largest_error = 0.1;  // that can be asked for
+constexpr double least_error = 1e-28, largest_error = 0.1;  // that can be asked for
 
 struct Choice {
     Measurement measurement;  // its error is the prediction

@@ -41,6 +41,7 @@ std::vector<Member> tour(bool is_separable) {
     add(Family::gauss, Precision::double_, {3, 1});
     add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::extended, {12});
+    add(Family::lobatto, Precision::double_double, {12});
     if (is_separable) {
         add(Family::splitting, Precision::double_, {11, 17});
         for (const int count : {8, 12})
@@ -51,6 +52,7 @@ std::vector<Member> tour(bool is_separable) {
     if (is_separable) add(Family::splitting, Precision::double_, {6, 14, 35});
     add(Family::lobatto, Precision::single, {4, 8});
     add(Family::lobatto, Precision::extended, {9});
+    add(Family::lobatto, Precision::double_double, {10});
     return members;
 }
 

@@ -272,7 +272,7 @@ double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candid
     const StartIn<Exact> start = start_in<Exact>(start_, exact_, until);
     LoadedStepper<Exact> stepper(exact_);
     stepper.prepare(start.parameters, until);
-    const double tolerance = std::is_same_v<Exact, __float128> ? 1e-20 : 3e-17;
+    const double tolerance = std::is_same_v<Exact, __float128> ? 100 * reference_.tolerance : reference_.tolerance;
     Extrapolation<Exact> way(stepper, std::vector<Exact>(reference_.scale.begin(), reference_.scale.end()),
                              static_cast<Exact>(tolerance));
     way.start(0, start.q, start.p);

@@ -20,8 +20,17 @@ std::vector<std::string> method_lines(const Choice& choice) {
     std::vector<std::string> lines = {fmt::format("family = \"{}\"", word_of(candidate.member.family)),
                                       fmt::format("{} = {}", lobatto ? "points" : "stages", candidate.member.points)};
     if (candidate.member.arithmetic == StepArithmetic::clean) lines.push_back("arithmetic = \"clean\"");
+    if (candidate.member.precision != Precision::double_)
+        lines.push_back("numbers = \"" + precision_name(candidate.member.precision) + '"');
     if (candidate.tolerance > 0) lines.push_back("tolerance = " + exact_text(candidate.tolerance));
     return lines;
+}
+
+// In numbers with more digits than a double has, the step is a fraction: so many of them are the end.
+std::string step_text(const Choice& choice) {
+    const Candidate& candidate = choice.measurement.candidate;
+    if (candidate.member.precision == Precision::double_) return exact_text(choice.step());
+    return fmt::format("\"{}/{}\"", exact_text(choice.until), candidate.steps);
 }
 
 // The lines of a TOML file, each with the table it stands in; lines inside a text of several lines belong to it.
@@ -59,7 +68,7 @@ std::vector<Line> lines_of(const std::string& text) {
 std::string method_text(const Choice& choice) {
     std::string text = "[method]\n";
     for (const std::string& line : method_lines(choice)) text += line + '\n';
-    return text + fmt::format("\n[run]\nstep = {}\nuntil = {}\n", exact_text(choice.step()), exact_text(choice.until));
+    return text + fmt::format("\n[run]\nstep = {}\nuntil = {}\n", step_text(choice), exact_text(choice.until));
 }
 
 std::string stability_text(const Choice& choice) {
@@ -92,7 +101,7 @@ std::string with_choice(const std::string& text, const Choice& choice, double er
                 result += '\n';
                 has_method = true;
             }
-            result += line.text + '\n' + "step = " + exact_text(choice.step()) + '\n';
+            result += line.text + '\n' + "step = " + step_text(choice) + '\n';
             result += "error = " + exact_text(error) + '\n';
             if (until) result += "until = " + exact_text(choice.until) + '\n';
             continue;
@@ -111,6 +120,7 @@ void write_method(const Choice& choice, const Scene& scene, double error, bool u
     const Scene back = read_scene(Source(scene.path, text));
     if (back.method.family != candidate.member.family || back.method.points != candidate.member.points ||
         back.method.tolerance != candidate.tolerance || back.method.arithmetic != candidate.member.arithmetic ||
+        back.method.numbers != candidate.member.precision ||
         back.evaluate(back.run.step, "the step").to_double() != choice.step())
         throw InputError(
             fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "

@@ -34,6 +34,11 @@ constexpr double near = 0.1;    // of the amplitude: steps so far off are too lo
 constexpr double looser = 100;  // tolerance of the second extrapolation, of the first's
 constexpr int frequency_looks = 24;
 
+// Below what is wanted by more than the macro steps add up to; in quadruple precision down to its rounding.
+double tolerance_for(Precision precision, double wanted) {
+    return precision == Precision::quadruple ? std::clamp(1e-4 * wanted, 1e-32, 1e-22) : 3e-17;
+}
+
 template <class real>
 class Computation {
 public:
@@ -50,7 +55,8 @@ public:
 
     Reference compute() {
         observe();
-        const double tolerance = reference_.precision == Precision::quadruple ? 1e-22 : 3e-17;
+        const double tolerance = tolerance_for(reference_.precision, request_.wanted);
+        reference_.tolerance = tolerance;
         const auto began = Clock::now();
         const auto states = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
         if (!states) throw ComputationError("the reference fails: its steps become too short");

@@ -24,6 +24,7 @@ struct Reference {
     std::vector<double> scale;         // 2n: half the way between smallest and largest value, the largest among the
                                        // coordinates of the same unit, momenta likewise; 1 where nothing moves
     std::vector<double> disagreement;  // samples + 1: of the two ways up to there, relative to `scale`
+    double tolerance = 0;              // of a macro step of the extrapolation
     double energy_scale = 0;           // the largest |p v|/2
     double frequency = 0;              // the largest met (largest_frequency)
     double seconds = 0;                // that it took

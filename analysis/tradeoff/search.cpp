@@ -20,8 +20,9 @@ constexpr double too_long = 0.3;  // of the budget: a crossing that took so much
 constexpr double close = 1.08;    // two numbers of steps between which nothing is looked for
 
 // Of an iteration that ends so many digits beyond the goal.
-double fitting_tolerance(double goal, double digits) {
-    return std::pow(10.0, std::clamp(std::floor(std::log10(goal)) - digits, -14.0, -3.0));
+double fitting_tolerance(double goal, double digits, Precision numbers) {
+    const double least = std::floor(std::log10(rounding_of(numbers))) + 2;
+    return std::pow(10.0, std::clamp(std::floor(std::log10(goal)) - digits, least, -3.0));
 }
 
 bool has_tolerance(Experiment& experiment, const Member& member) {
@@ -93,8 +94,8 @@ Attempt cross(Experiment& experiment, const Member& member, double goal) {
         result.measurement = experiment.time_again(*good, 1);
         result.seconds = result.measurement->seconds;
         if (has_tolerance(experiment, member)) {
-            const Measurement looser =
-                experiment.measure({member, good->candidate.steps, fitting_tolerance(goal, 2)}, false);
+            const Measurement looser = experiment.measure(
+                {member, good->candidate.steps, fitting_tolerance(goal, 2, member.precision)}, false);
             if (looser.complete && looser.error < 2 * goal)
                 result.seconds = std::min(result.seconds, experiment.time_again(looser, 1).seconds);
         }
@@ -129,8 +130,8 @@ Measurement polish(Experiment& experiment, const Measurement& crossing, double g
     if (starts.size() > 2) starts = {starts.front(), starts.back()};
     std::vector<double> tolerances = {0};
     for (const double digits : {0.0, 1.0, 2.0, 3.0, 4.0})
-        if (has_tolerance(experiment, member) && tolerances.back() != fitting_tolerance(goal, digits))
-            tolerances.push_back(fitting_tolerance(goal, digits));
+        if (has_tolerance(experiment, member) && tolerances.back() != fitting_tolerance(goal, digits, member.precision))
+            tolerances.push_back(fitting_tolerance(goal, digits, member.precision));
     for (const double tolerance : tolerances)
         for (const std::int64_t start : starts) {
             std::int64_t steps = start;
@@ -164,13 +165,13 @@ std::vector<Member> cleaner(const std::map<Member, Attempt>& tried) {
 
 }  // namespace
 
-std::vector<Member> first_guess(double goal, std::size_t count) {
+std::vector<Member> first_guess(double goal, std::size_t count, Precision numbers) {
     // Higher orders for smaller errors: about half the digits, and some more.
     const int points = std::clamp(static_cast<int>(std::lround(4.5 - 0.45 * std::log10(goal))), 4, 11);
-    const std::vector<Member> guesses = {{Family::lobatto, points},
-                                         {Family::gauss, std::clamp(points - 2, 1, 10)},
-                                         {Family::lobatto, std::clamp(points + 2, 2, 12)},
-                                         {Family::lobatto, std::clamp(points - 2, 2, 12)}};
+    const std::vector<Member> guesses = {{Family::lobatto, points, numbers},
+                                         {Family::gauss, std::clamp(points - 2, 1, 10), numbers},
+                                         {Family::lobatto, std::clamp(points + 2, 2, 12), numbers},
+                                         {Family::lobatto, std::clamp(points - 2, 2, 12), numbers}};
     return {guesses.begin(), guesses.begin() + static_cast<std::ptrdiff_t>(std::min(count, guesses.size()))};
 }
 
@@ -184,7 +185,8 @@ std::vector<int> full_registers(Family family, bool is_separable) {
 }
 
 // Members next to the best of each family that were not tried; the nearest to the best first.
-std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double best_cost, bool is_separable) {
+std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double best_cost, bool is_separable,
+                               Precision numbers) {
     std::vector<std::pair<double, Member>> wishes;
     for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {
         if (family == Family::splitting && !is_separable) continue;
@@ -201,7 +203,8 @@ std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double be
         const auto size_at = [&](int place) { return sizes[static_cast<std::size_t>(place)]; };
         if (!top) {  // none reaches the goal: orders between
             for (const int place : {last, last / 2, last - 2})
-                if (tried.count({family, size_at(place)}) == 0) wishes.push_back({1e3, {family, size_at(place)}});
+                if (const Member next{family, size_at(place), numbers}; tried.count(next) == 0)
+                    wishes.push_back({1e3, next});
             continue;
         }
         const int here = static_cast<int>(std::find(sizes.begin(), sizes.end(), top->points) - sizes.begin());
@@ -229,20 +232,22 @@ std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double be
     }
     std::stable_sort(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<Member> members;
-    for (const auto& [wish, member] : wishes) members.push_back(member);
+    for (const auto& [wish, member] : wishes)
+        if (reason_against_numbers(member.method()).empty()) members.push_back(member);
     return members;
 }
 
 }  // namespace
 
-Search search(Experiment& experiment, double goal) {
+Search search(Experiment& experiment, double goal, Precision numbers) {
     KernelBuilder& kernel_builder = experiment.kernel_builder();
     const bool is_separable = experiment.derivation().system.separable;
     Search result;
     result.least_error = infinity;
     std::map<Member, Attempt> tried;
-    std::vector<Member> queue = first_guess(goal, 4);
-    if (is_separable) queue.push_back({Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35});
+    std::vector<Member> queue = first_guess(goal, 4, numbers);
+    const Member splitting{Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35, numbers};
+    if (is_separable && reason_against_numbers(splitting.method()).empty()) queue.push_back(splitting);
     const double reserve = 0.2 * experiment.request().seconds;  // for polishing
     bool tried_clean = false;                                   // only where rounding stands in the way
     for (const Member& member : queue) kernel_builder.order(member);
@@ -271,14 +276,15 @@ Search search(Experiment& experiment, double goal) {
         }
         const bool has_time = experiment.left() > reserve || best_cost() == infinity;
         if (has_time && experiment.left() > -reserve && queue.size() < 2) {
-            for (const Member& member : neighbours(tried, best_cost(), is_separable)) {
+            for (const Member& member : neighbours(tried, best_cost(), is_separable, numbers)) {
                 if (std::find(queue.begin(), queue.end(), member) != queue.end()) continue;
                 kernel_builder.order(member);
                 queue.push_back(member);
                 if (queue.size() >= std::max(2u, kernel_builder.threads())) break;
             }
         }
-        if (queue.empty() && !tried_clean && is_separable && best_cost() == infinity && experiment.left() > 0) {
+        if (queue.empty() && !tried_clean && is_separable && numbers == Precision::double_ && best_cost() == infinity &&
+            experiment.left() > 0) {
             tried_clean = true;
             queue = cleaner(tried);
             for (const Member& member : queue) kernel_builder.order(member);

@@ -22,7 +22,7 @@ Attempt cross(Experiment& experiment, const Member& member, double goal);
 // iterations that stop earlier; with steps that are shorter but need fewer fixed-point iterations.
 Measurement polish(Experiment& experiment, const Measurement& crossing, double goal);
 
-// The fastest of the whole family for an error at most `goal`, as far as the time goes.
+// The fastest of the whole family in these numbers for an error at most `goal`, as far as the time goes.
 struct Search {
     std::optional<Measurement> best;  // nothing: no member that was tried reaches the goal
     double least_error = 0;           // of all that was tried
@@ -30,8 +30,8 @@ struct Search {
     bool complete = false;            // no member that was not tried can be expected to win
     std::vector<Measurement> by_member;
 };
-Search search(Experiment& experiment, double goal);
+Search search(Experiment& experiment, double goal, Precision numbers);
 // The kernels to begin with.
-std::vector<Member> first_guess(double goal, std::size_t count);
+std::vector<Member> first_guess(double goal, std::size_t count, Precision numbers);
 
 }  // namespace lobatto

@@ -36,10 +36,10 @@ double error_of(const TuneOptions& options) {
     if (rest == options.error.c_str() || *rest != '\0')
         throw InputError(fmt::format("--error: '{}' is not a number; write 1e-8", options.error));
     if (!(error >= least_error && error <= largest_error))
-        throw InputError(fmt::format(
-            "--error: {} cannot be promised; it is relative to the amplitude of the motion, at most {}, and double "
-            "precision holds nothing below {:.0e}",
-            options.error, largest_error, least_error));
+        throw InputError(
+            fmt::format("--error: {} cannot be promised; it is relative to the amplitude of the motion, at most {} and "
+                        "at least {:.0e}",
+                        options.error, largest_error, least_error));
     return error;
 }
 

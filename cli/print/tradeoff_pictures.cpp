@@ -29,6 +29,27 @@ std::string figure_name(const Experiment& experiment) {
     return experiment.conserves() ? "largest energy error, relative" : "1 / time until which the motion is followed";
 }
 
+// Where rounding ends what more steps bring: the least error in each kind of numbers, as a line across the picture.
+std::string floors_of(const Experiment& experiment) {
+    std::map<Precision, const Measurement*> least;
+    for (const auto& [key, m] : experiment.store().all()) {
+        const double figure = experiment.figure(m);
+        const Measurement*& best = least[m.candidate.member.precision];
+        if (m.complete && figure > 0 && (best == nullptr || figure < experiment.figure(*best))) best = &m;
+    }
+    std::string text;
+    for (const auto& [precision, m] : least) {
+        if (m == nullptr) continue;
+        const double figure = experiment.figure(*m), steps = static_cast<double>(m->candidate.steps);
+        if (figure > 1e4 * rounding_of(precision) * std::sqrt(steps)) continue;
+        text += fmt::format(
+            "set arrow from {0:.3e},graph 0 to {0:.3e},graph 1 nohead dt 3 lc rgb \"#888888\"\n"
+            "set label \"{1}\" at {0:.3e},graph 0.98 rotate by 90 right offset -0.6,0 tc rgb \"#555555\"\n",
+            figure, precision_name(precision));
+    }
+    return text;
+}
+
 void draw_work_precision(const Experiment& experiment, const std::string& folder) {
     std::map<Member, std::vector<const Measurement*>> members;
     for (const auto& [key, m] : experiment.store().all())
@@ -82,8 +103,9 @@ void draw_work_precision(const Experiment& experiment, const std::string& folder
     draw(folder, "work_precision",
          fmt::format("{}set logscale xy\nset xrange [*:*] reverse\nset format \"10^{{%T}}\"\n"
                      "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
-                     "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds per unit of time\"\n{}\n",
-                     data, gnuplot_text(experiment.scene().title), figure_name(experiment), curves),
+                     "set title {} noenhanced\nset xlabel \"{}\"\nset ylabel \"nanoseconds per unit of time\"\n{}{}\n",
+                     data, gnuplot_text(experiment.scene().title), figure_name(experiment), floors_of(experiment),
+                     curves),
          960, 560);
 }
 

@@ -60,13 +60,13 @@ std::string front_table(const Experiment& experiment) {
     const bool chaotic = experiment.is_chaotic();
     std::string text = chaotic ? fmt::format("  {:>9}  {:>9}  {:>9}", "energy", "momenta", "followed")
                                : fmt::format("  {:>9}  {:>9}", "error", "energy");
-    text += fmt::format("  {:>9}  {:<10}  {:>10}  {:<11}  {:>8}  {:>9}\n", "ns/unit", "method", "step", "precision",
+    text += fmt::format("  {:>9}  {:<10}  {:>10}  {:<13}  {:>8}  {:>9}\n", "ns/unit", "method", "step", "precision",
                         "iterate", "gradients");
     for (const Measurement& m : front_rows_of(experiment)) {
         text += chaotic ? fmt::format("  {:>9}  {:>9}  {:>9.4g}", optional(m.energy_error), optional(m.momentum_error),
                                       m.reaches)
                         : fmt::format("  {:>9.1e}  {:>9}", m.error, optional(m.energy_error));
-        text += fmt::format("  {:>9}  {:<10}  {:>10.4g}  {:<11}  {:>8}  {:>9.3g}\n", time_a_unit(m.seconds, until),
+        text += fmt::format("  {:>9}  {:<10}  {:>10.4g}  {:<13}  {:>8}  {:>9.3g}\n", time_a_unit(m.seconds, until),
                             m.candidate.name(), until / static_cast<double>(m.candidate.steps),
                             precision_name(m.candidate.member.precision), tolerance_text(m.candidate.tolerance),
                             m.gradients / until);

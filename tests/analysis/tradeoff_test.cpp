@@ -280,7 +280,7 @@ TEST_CASE("what cannot be promised or measured is refused with the reason") {
         CHECK(finished.exit_code == code);
         CHECK(contains(finished.err, reason));
     };
-    refused({"tune", pendulum, "--error", "1e-20"}, 2, "double precision holds nothing below 1e-15");
+    refused({"tune", pendulum, "--error", "1e-30"}, 2, "at most 0.1 and at least 1e-28");
     refused({"tune", pendulum, "--error", "small"}, 2, "'small' is not a number");
     refused({"tune", pendulum, "--error", "1e-6", "--until", "0"}, 2, "there is nothing to measure");
     refused({"tradeoff", pendulum, "--until", "0", "-o", place.folder / "out"}, 2, "there is nothing to measure");
