@@ -346,7 +346,7 @@ std::string loss_of(const RunOptions& options, const Scene& scene, const Traject
         *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, chaos);
 }
 
-constexpr double large_error = 0.03;  // of the amplitude: worth a warning whoever asked
+constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
 constexpr double missed = 2;          // times the error wanted
 
 std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) {
@@ -416,7 +416,7 @@ void run(const RunOptions& options) {
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
     const bool has_events = !scene.outputs.events.empty();
     keep_scene(scene.path, path);
-    if (options.output.empty()) keep_foreign(path);
+    keep_foreign(path);
     if (has_events) {
         keep_scene(scene.path, event_path(options, scene));
         keep_foreign(event_path(options, scene));

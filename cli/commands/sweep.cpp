@@ -48,7 +48,7 @@ const char* const reason[] = {"reached the end",
                               "not resolved: the error is as large as the motion",
                               "start off the constraints",
                               "a formula has no value there"};
-constexpr double large_error = 0.03;  // of the amplitude: worth a warning whoever asked
+constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
 constexpr int departed = 7, unresolved = 8, undefined = 10;
 
 struct SweepOptions {
@@ -410,7 +410,7 @@ void sweep(const SweepOptions& options) {
     const std::string path = output_path(
         options.output, result_name(scene.path) + (format == SweepTable::Format::npy ? ".sweep.npy" : ".sweep.csv"));
     keep_scene(scene.path, path);
-    if (options.output.empty()) keep_foreign(path);
+    keep_foreign(path);
     SweepTable table(path, format, comments_of(scene, source, request, grid),
                      columns_of(scene, grid, !options.unmeasured));
     std::vector<Failure> failures;

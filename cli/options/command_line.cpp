@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <iostream>
+#include <limits>
 #include <map>
+#include <system_error>
 
 namespace lobatto {
 
@@ -14,6 +17,21 @@ std::string number_complaint(const std::string& number) {
     if (first == std::string::npos || number[first] != '.') return "";
     return fmt::format("a number begins with a digit: write 0{}, not {}", number.substr(first), number.substr(first));
 }
+
+namespace {
+
+// What is wrong with a whole number for an Integer: 1e16, 2.5, or one with too many digits.
+template <class Integer>
+std::string whole_number_complaint(const std::string& number) {
+    Integer value{};
+    const char* const end = number.data() + number.size();
+    const auto [stopped, error] = std::from_chars(number.data() + number.starts_with('+'), end, value);
+    if (error == std::errc{} && stopped == end) return "";
+    return fmt::format("a whole number in digits is wanted, at most {}, not {}", std::numeric_limits<Integer>::max(),
+                       number);
+}
+
+}  // namespace
 
 Option& Option::required() {
     option_->required();
@@ -73,19 +91,19 @@ Option Command::option(const std::string& name, std::optional<std::string>& targ
 }
 
 Option Command::option(const std::string& name, int& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    return Option(app_->add_option(name, target, help)).checked_by(whole_number_complaint<int>);
 }
 
 Option Command::option(const std::string& name, std::int64_t& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    return Option(app_->add_option(name, target, help)).checked_by(whole_number_complaint<std::int64_t>);
 }
 
 Option Command::option(const std::string& name, std::optional<int>& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    return Option(app_->add_option(name, target, help)).checked_by(whole_number_complaint<int>);
 }
 
 Option Command::option(const std::string& name, std::optional<std::int64_t>& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    return Option(app_->add_option(name, target, help)).checked_by(whole_number_complaint<std::int64_t>);
 }
 
 Option Command::option(const std::string& name, double& target, const std::string& help) {

@@ -54,7 +54,7 @@ void keep_scene(const std::string& scene, const std::string& path) {
 }
 
 void keep_foreign(const std::string& path) {
-    constexpr std::size_t looked_at = 4096;  // bytes: all that Lobatto writes names it in its first lines
+    constexpr std::size_t looked_at = 4096;  // bytes: all text that Lobatto writes names it in its first lines
     std::error_code none;
     if (!std::filesystem::is_regular_file(path, none)) return;
     std::string begin(looked_at, '\0');
@@ -62,7 +62,7 @@ void keep_foreign(const std::string& path) {
     file.read(begin.data(), static_cast<std::streamsize>(looked_at));
     begin.resize(static_cast<std::size_t>(file.gcount()));
     std::transform(begin.begin(), begin.end(), begin.begin(), [](unsigned char c) { return std::tolower(c); });
-    if (!begin.empty() && begin.find("lobatto") == std::string::npos)
+    if (!begin.empty() && begin.find("lobatto") == std::string::npos && !begin.starts_with("\x93numpy"))
         throw InputError(fmt::format(
             "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));
 }

@@ -18,7 +18,7 @@ std::string result_name(const std::string& scene);
 // InputError when `path`, where a result is to go, is the scene itself.
 void keep_scene(const std::string& scene, const std::string& path);
 
-// InputError where a file that is not ours stands under a name that a command chooses itself.
+// InputError where a file that is not ours stands in the place of a result.
 void keep_foreign(const std::string& path);
 
 }  // namespace lobatto

@@ -194,6 +194,9 @@ private:
         if (function == "log") require(DomainCondition::Kind::positive, argument, "a logarithm", formula);
         if (function == "asin" || function == "acos")
             require(DomainCondition::Kind::within_one, argument, "an " + function, formula);
+        if (function == "tan" && !argument.value)
+            require(DomainCondition::Kind::nonzero, operand_of(GiNaC::cos(argument.expression)),
+                    "a tangent, which has a pole where its cosine is 0,", formula);
     }
 
     Operand folded(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic, Fold::Combine combine) {

@@ -46,7 +46,8 @@ public:
             if (moves) continue;  // velocities are not known yet
             std::string found;
             try {
-                const cln::cl_R value = start_({condition.expression}).front();
+                const Sized of = start_.evaluate_sized(start_.convert({condition.expression})).front();
+                const cln::cl_R value = of.vanishes() ? cln::cl_R(0) : of.value;
                 using Kind = DomainCondition::Kind;
                 const bool holds = condition.kind == Kind::nonzero       ? !cln::zerop(value)
                                    : condition.kind == Kind::nonnegative ? !cln::minusp(value)

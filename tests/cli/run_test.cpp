@@ -233,6 +233,10 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
           pendulum + ": 2e+31 steps are too many to count; make the step larger or the end time smaller\n");
     CHECK(refusal({"--every", "0"}) ==
           "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
+    for (const std::string number : {"1e16", "2.5", "many", "99999999999999999999"})
+        CHECK(contains(refusal({"--every", number}),
+                       "--every: a whole number in digits is wanted, at most 9223372036854775807, not " + number));
+    CHECK(contains(refusal({"--points", "3.0"}), "--points: a whole number in digits is wanted, at most 2147483647"));
     CHECK(contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
     CHECK(contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
     CHECK(contains(refusal({"--splitting", "12"}), "lobatto: --splitting: 12 not in {6,11,14,17,35}"));
@@ -311,9 +315,9 @@ TEST_CASE("an interrupted run keeps what was computed, says so and returns 130")
 
 TEST_CASE("kill -9 leaves readable rows beside the file of before") {
     const Place place;
-    test::write_text(place.file(), "of before\n");
+    test::write_text(place.file(), "# lobatto, of before\n");
     CHECK(signal_long_run(place, SIGKILL).exit_code == 128 + SIGKILL);
-    CHECK(test::read_file(place.file()) == "of before\n");
+    CHECK(test::read_file(place.file()) == "# lobatto, of before\n");
     const TrajectoryTable table = read_trajectory(place.file() + ".partial");
     REQUIRE(table.rows.size() > 100);
     for (const std::vector<double>& row : table.rows) REQUIRE(row.size() == 4);
@@ -551,6 +555,7 @@ TEST_CASE("files that Lobatto did not write are never touched") {
         CHECK(test::read_file(scene) == text);
         std::filesystem::remove(scene);
     }
+    refused("w.csv", "time,position\n0,1\n", 2);
     // Nor under the names that a command chooses itself: of events, of support headers.
     const std::string scene = place.file("events.toml");
     test::write_text(scene,
@@ -688,4 +693,17 @@ TEST_CASE("energies beyond all numbers are told, and are no crash") {
     INFO(done.err);
     CHECK(done.exit_code == 3);
     CHECK(contains(done.err, "the run is wrong from step 1 on"));
+}
+
+TEST_CASE("an error above a hundredth of the amplitude is warned of, also with --quiet") {
+    const Place place;
+    const std::string scene = place.file("kepler.toml");
+    test::write_text(scene,
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 0.1, "
+                     "velocity = 0 }\ny = { position = 0, velocity = \"sqrt(19)\" }\n[method]\npoints = 5\n[run]\n"
+                     "step = 0.02\nuntil = 60\n");
+    const test::Finished done = place.run({scene, "-o", place.file("kepler.csv"), "--quiet"});
+    CHECK(done.out == "");
+    CHECK(contains(done.err, "lobatto: warning: "));
+    CHECK(contains(done.err, "of the amplitude"));
 }

@@ -110,7 +110,12 @@ TEST_CASE("what has no value where it stands is an error, also where the rest of
     CHECK(begins_at("((m-3)^0.5)^2").find("a broken power has no value") != std::string::npos);
     CHECK(begins_at("sin(asin(m+k))").find("an asin has no value") != std::string::npos);
     CHECK(begins_at("(m-k)^(-2)*(m-k)^2").find("has no value") != std::string::npos);
-    CHECK(begins_at("sqrt(m)^2 + log(k) + m/k") == "accepted");
+    CHECK(
+        begins_at("tan(pi*m/2)/tan(pi*m/2)").find("a tangent, which has a pole where its cosine is 0, has no value") !=
+        std::string::npos);
+    CHECK(begins_at("sin(pi*m)/sin(pi*m)").find("a division has no value at the start: it is of sin(pi*m) = 0") !=
+          std::string::npos);
+    CHECK(begins_at("sqrt(m)^2 + log(k) + m/k + tan(m)/tan(m)") == "accepted");
     for (const char* lagrangian : {"m*x'^2/2 - k*(sqrt(x-3))^2", "m*x'^2/2 - k*exp(log(x-3))",
                                    "m*x'^2/2 - k*cos(acos(x*3))", "m*x'^2/2 - k*x*(x-1)/(x-1)"})
         CHECK_MESSAGE(refusal(lagrangian, one, mk).find("has no value at the start") != std::string::npos, lagrangian);
