@@ -170,14 +170,9 @@ private:
         return graph_.is_constant(id) ? "" : external_(id);
     }
     std::string print(Id id) const {
-        std::string text = formula(
-            graph_, id, style_.notation, [this](Id other) { return name_of(other); }, style_.precision, style_.fuses);
-        // A template may be asked to compute in double (iteration/refinement.hpp).
-        const std::string literal = "DoubleDouble(", in_template = "lobatto::literal<number>(";
-        for (std::size_t at = text.find(literal); style_.any_number && at != std::string::npos;
-             at = text.find(literal, at + in_template.size()))
-            text.replace(at, literal.size(), in_template);
-        return text;
+        return formula(
+            graph_, id, style_.notation, [this](Id other) { return name_of(other); }, style_.precision, style_.fuses,
+            style_.any_number);
     }
     std::string text_of(Id id) const {
         const std::string name = name_of(id);

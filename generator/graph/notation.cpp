@@ -68,8 +68,14 @@ std::string_view function_name(Op op) {
 
 class Printer {
 public:
-    Printer(const Graph& graph, Notation notation, const Naming& naming, Precision precision, bool fuses)
-        : graph_(graph), notation_(notation), naming_(naming), precision_(precision), fuses_(fuses) {}
+    Printer(const Graph& graph, Notation notation, const Naming& naming, Precision precision, bool fuses,
+            bool in_template)
+        : graph_(graph),
+          notation_(notation),
+          naming_(naming),
+          precision_(precision),
+          fuses_(fuses),
+          in_template_(in_template) {}
 
     Printed print(Id id, bool at_root = false) const {
         if (naming_ && !at_root) {
@@ -171,7 +177,8 @@ private:
             const double high = nearest_double(value);
             const double low = nearest_double(value - cln::rational(cln::cl_float(high)));
             return low == 0 ? double_literal(high)
-                            : fmt::format("DoubleDouble({}, {})", double_literal(high), double_literal(low));
+                            : fmt::format("{}({}, {})", in_template_ ? "lobatto::literal<number>" : "DoubleDouble",
+                                          double_literal(high), double_literal(low));
         }
         const int digits = precision_ == Precision::single ? 9 : precision_ == Precision::extended ? 21 : 36;
         const char* suffix = precision_ == Precision::single ? "f" : precision_ == Precision::extended ? "L" : "Q";
@@ -315,7 +322,7 @@ private:
     Notation notation_;
     const Naming& naming_;
     Precision precision_;
-    bool fuses_;
+    bool fuses_, in_template_;
 };
 
 void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::ex>& symbols) {
@@ -325,9 +332,9 @@ void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::ex>& symbo
 
 }  // namespace
 
-std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming, Precision precision,
-                    bool fuses) {
-    return Printer(graph, notation, naming, precision, fuses).print(id, true).text;
+std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming, Precision precision, bool fuses,
+                    bool in_template) {
+    return Printer(graph, notation, naming, precision, fuses, in_template).print(id, true).text;
 }
 
 std::string decimal(const cln::cl_R& value, int digits) {

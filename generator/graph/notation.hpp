@@ -17,9 +17,10 @@ using Naming = std::function<std::string(Id)>;
 
 // The formula of a node. C++ literals are shortest round-trip for double, DoubleDouble(high, low) for double-double,
 // and 9, 21, 36 digits with suffix f, L, Q otherwise. Where it `fuses`, C++ adds products by lobatto::fused_sum(a, b,
-// c) = a b + c of base/pack.hpp.
+// c) = a b + c of base/pack.hpp. In a template, which may be asked to compute in double, literals of double-double are
+// lobatto::literal<number>(high, low).
 std::string formula(const Graph& graph, Id id, Notation notation, const Naming& naming = {},
-                    Precision precision = Precision::double_, bool fuses = false);
+                    Precision precision = Precision::double_, bool fuses = false, bool in_template = false);
 
 // A number in scientific or plain decimal notation, rounded once to the given count of significant digits.
 std::string decimal(const cln::cl_R& value, int digits);

@@ -50,13 +50,17 @@ void NumberStepper::state(Parts& time, Parts& q, Parts& p) const {
     p = parts_of(momentum, n_);
 }
 
+lobatto_status NumberStepper::evaluate(StateFunction function, const double* time, const double* q, const double* p,
+                                       Bytes& value) const {
+    const Bytes t = numbers(time, 1), position = numbers(q, n_), momentum = numbers(p, n_);
+    return static_cast<lobatto_status>(function(stepper_, t.data(), position.data(), momentum.data(), value.data()));
+}
+
 lobatto_status NumberStepper::energy(const double* time, const double* q, const double* p, double* energy) const {
     if (kernel_->real_kind == LOBATTO_DOUBLE)
         return static_cast<lobatto_status>(kernel_->energy(stepper_, time, q, p, energy));
-    const Bytes t = numbers(time, 1), position = numbers(q, n_), momentum = numbers(p, n_);
     Bytes value = room(1);
-    const auto status = static_cast<lobatto_status>(
-        kernel_->energy(stepper_, t.data(), position.data(), momentum.data(), value.data()));
+    const lobatto_status status = evaluate(kernel_->energy, time, q, p, value);
     kernel_->to_parts(value.data(), 1, energy);
     return status;
 }
@@ -69,20 +73,16 @@ NumberStepper::Parts NumberStepper::momentum(const Parts& time, const Parts& q, 
 }
 
 lobatto_status NumberStepper::velocity(const Parts& time, const Parts& q, const Parts& p, Parts& velocity) const {
-    const Bytes t = numbers(time.data(), 1), position = numbers(q.data(), n_), momentum = numbers(p.data(), n_);
     Bytes rate = room(n_);
-    const auto status = static_cast<lobatto_status>(
-        kernel_->velocity(stepper_, t.data(), position.data(), momentum.data(), rate.data()));
+    const lobatto_status status = evaluate(kernel_->velocity, time.data(), q.data(), p.data(), rate);
     velocity = parts_of(rate, n_);
     return status;
 }
 
 lobatto_status NumberStepper::multipliers(const Parts& time, const Parts& q, const Parts& p, Parts& lambda) const {
-    const Bytes t = numbers(time.data(), 1), position = numbers(q.data(), n_), momentum = numbers(p.data(), n_);
     const auto count = static_cast<std::size_t>(kernel_->constraints);
     Bytes values = room(count);
-    const auto status = static_cast<lobatto_status>(
-        kernel_->multipliers(stepper_, t.data(), position.data(), momentum.data(), values.data()));
+    const lobatto_status status = evaluate(kernel_->multipliers, time.data(), q.data(), p.data(), values);
     lambda = parts_of(values, count);
     return status;
 }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,10 @@ private:
     Bytes numbers(const double* values, std::size_t count) const;
     Bytes room(std::size_t count) const { return Bytes(count * bytes_); }
     Parts parts_of(const Bytes& numbers, std::size_t count) const;
+    using StateFunction = std::int32_t (*)(const void* stepper, const void* time, const void* q, const void* p,
+                                           void* value);
+    lobatto_status evaluate(StateFunction function, const double* time, const double* q, const double* p,
+                            Bytes& value) const;
 
     Kernel kernel_;
     std::size_t parts_, n_, bytes_;

@@ -297,22 +297,20 @@ constexpr std::uint64_t two_over_pi[] = {0xa2f9836e4e441529, 0xfc2757d1f534ddc0,
     quadrant = static_cast<std::int64_t>(turns[4]);
     const bool beyond_half = turns[3] >> 63 != 0;
     if (beyond_half) ++quadrant;
-    DoubleDouble part = beyond_half ? -1.0 : 0.0;
-    // From the last word on, so that the sum loses nothing of what is small; the first by halves, which are doubles.
+    // From the last word on, so that the sum loses nothing of what is small; words by halves, which are doubles.
     DoubleDouble fraction = 0;
-    for (int i = 0; i < 4; ++i) {
-        const double low = static_cast<double>(turns[i] & 0xffffffffu), high = static_cast<double>(turns[i] >> 32);
-        double scale = 0x1p-256;
-        for (int j = 0; j < i; ++j) scale *= 0x1p64;
-        if (i < 3) {
-            fraction = two_fold::accurate_sum(fraction, DoubleDouble(low * scale));
-            fraction = two_fold::accurate_sum(fraction, DoubleDouble(high * scale * 0x1p32));
-        } else {  // less one first, where it is beyond a half
-            const double signed_high = beyond_half ? high - 0x1p32 : high;
-            part = DoubleDouble(signed_high * 0x1p-32);
-            part = two_fold::accurate_sum(part, DoubleDouble(low * 0x1p-64));
-        }
+    const auto add_half = [&](double half, double unit) {
+        fraction = two_fold::accurate_sum(fraction, DoubleDouble(half * unit));
+    };
+    double unit = 0x1p-256;
+    for (int i = 0; i < 3; ++i, unit *= 0x1p64) {
+        add_half(static_cast<double>(turns[i] & 0xffffffffu), unit);
+        add_half(static_cast<double>(turns[i] >> 32), unit * 0x1p32);
     }
+    // The first word, less one where it is beyond a half.
+    const double low = static_cast<double>(turns[3] & 0xffffffffu), high = static_cast<double>(turns[3] >> 32);
+    const DoubleDouble part = two_fold::accurate_sum(DoubleDouble((beyond_half ? high - 0x1p32 : high) * 0x1p-32),
+                                                     DoubleDouble(low * 0x1p-64));
     return wide_half_pi * two_fold::accurate_sum(part, fraction);
 }
 
@@ -426,26 +424,24 @@ LOBATTO_INLINE DoubleDoublePack<width> complement(const DoubleDoublePack<width>&
     using X = DoubleDoublePack<width>;
     return sqrt(accurate_sum(X(1.0), -x) * accurate_sum(X(1.0), x));
 }
+// The angle near y0 of this sine and cosine.
+template <int width>
+LOBATTO_INLINE DoubleDoublePack<width> inverse(const Doubles<width>& y0, const DoubleDoublePack<width>& sine,
+                                               const DoubleDoublePack<width>& cosine) {
+    DoubleDoublePack<width> sine0, cosine0;
+    sincos(of_parts(y0, Doubles<width>(0.0)), sine0, cosine0);
+    return where(y0 == y0, turned(y0, accurate_sum(sine * cosine0, -(cosine * sine0))), y0);
+}
 
 }  // namespace functions
 
 template <int width>
 LOBATTO_CALLED Pack<DoubleDouble, width> asin(const Pack<DoubleDouble, width>& x) {
-    using X = Pack<DoubleDouble, width>;
-    const auto y0 = lobatto::asin(high_part(x));
-    X sine, cosine;
-    sincos(of_parts(y0, functions::Doubles<width>(0.0)), sine, cosine);
-    const X value = functions::turned(y0, accurate_sum(x * cosine, -(functions::complement(x) * sine)));
-    return functions::where(y0 == y0, value, y0);
+    return functions::inverse(lobatto::asin(high_part(x)), x, functions::complement(x));
 }
 template <int width>
 LOBATTO_CALLED Pack<DoubleDouble, width> acos(const Pack<DoubleDouble, width>& x) {
-    using X = Pack<DoubleDouble, width>;
-    const auto y0 = lobatto::acos(high_part(x));
-    X sine, cosine;
-    sincos(of_parts(y0, functions::Doubles<width>(0.0)), sine, cosine);
-    const X value = functions::turned(y0, accurate_sum(functions::complement(x) * cosine, -(x * sine)));
-    return functions::where(y0 == y0, value, y0);
+    return functions::inverse(lobatto::acos(high_part(x)), functions::complement(x), x);
 }
 // Of 1/x where |x| > 1.
 template <int width>
