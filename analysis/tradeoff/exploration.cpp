@@ -39,9 +39,9 @@ std::vector<Member> tour(bool is_separable) {
     add(Family::lobatto, Precision::double_, {6, 10});
     add(Family::lobatto, Precision::single, {6});
     add(Family::gauss, Precision::double_, {3, 1});
+    add(Family::lobatto, Precision::double_double, {12});
     add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::extended, {12});
-    add(Family::lobatto, Precision::double_double, {12});
     if (is_separable) {
         add(Family::splitting, Precision::double_, {11, 17});
         for (const int count : {8, 12})
