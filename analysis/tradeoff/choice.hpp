@@ -9,8 +9,6 @@
 
 namespace lobatto {
 
-constexpr double least_error = 1e-28, largest_error = 0.1;  // that can be asked for
-
 struct Choice {
     Measurement measurement;  // its error is the prediction
     double until = 0;

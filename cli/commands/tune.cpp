@@ -35,11 +35,11 @@ double error_of(const TuneOptions& options) {
     const double error = std::strtod(options.error.c_str(), &rest);
     if (rest == options.error.c_str() || *rest != '\0')
         throw InputError(fmt::format("--error: '{}' is not a number; write 1e-8", options.error));
-    if (!(error >= least_error && error <= largest_error))
+    if (!(error >= Run::least_error && error <= Run::largest_error))
         throw InputError(
             fmt::format("--error: {} cannot be promised; it is relative to the amplitude of the motion, at most {} and "
                         "at least {:.0e}",
-                        options.error, largest_error, least_error));
+                        options.error, Run::largest_error, Run::least_error));
     return error;
 }
 

@@ -215,11 +215,11 @@ private:
             GiNaC::numeric value = 0;
             system_.read_formula(*error, system_.scope_of("the error", false), &value);
             scene_.run.error = value.to_double();
-            if (!(scene_.run.error >= 1e-15 && scene_.run.error <= 0.1))
+            if (!(scene_.run.error >= Run::least_error && scene_.run.error <= Run::largest_error))
                 fail(error->value.at,
-                     fmt::format("the error is {}; it is relative to the amplitude of the motion, at least "
-                                 "1e-15 and at most 0.1",
-                                 shown(value)));
+                     fmt::format("the error is {}; it is relative to the amplitude of the motion, at least {:.0e} and "
+                                 "at most {}",
+                                 shown(value), Run::least_error, Run::largest_error));
         }
     }
 

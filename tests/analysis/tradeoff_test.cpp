@@ -187,6 +187,14 @@ TEST_CASE("a choice written into a scene leaves everything else, and reads back"
     CHECK(second.evaluate(second.run.step, "step").to_double() == 0.5);
     CHECK(second.evaluate(second.run.until, "until").to_double() == 20);
     CHECK(contains(second.source.content(), "# [method]\n  - x^2/2\"\"\""));
+    // In numbers of more digits the step is an exact part of the end.
+    Choice wide = choice_of({Family::lobatto, 12, 1e-23}, 24, 20);
+    wide.measurement.candidate.member.precision = Precision::double_double;
+    const Scene third = read_scene(Source("wide.toml", with_choice(other, wide, 1e-20, true)));
+    CHECK(third.method.numbers == Precision::double_double);
+    CHECK(third.method.tolerance == 1e-23);
+    CHECK(third.run.error == 1e-20);
+    CHECK(abs(third.evaluate(third.run.step, "step") - GiNaC::numeric(20, 24)) < GiNaC::pow(10, -50));
 }
 
 TEST_CASE("a measurement store keeps measurements, and leaves out a torn line and another subject's") {
