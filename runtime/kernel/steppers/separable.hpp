@@ -43,7 +43,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     using Stages = StageEquations<K>;
     using Newton = NewtonIteration<K>;
     static constexpr bool has_fixed_point = N > 0 && K::any_number && !K::linear && !K::clean;
-    static constexpr bool along_coordinates = lobatto::along_coordinates<K>();
+    static constexpr bool along_coordinates = has_fixed_point && lobatto::along_coordinates<K>();
 
     struct Nothing {};
     struct Arrays : Newton::Arrays {

@@ -211,6 +211,16 @@ TEST_CASE("banded and repeated equations give the motion of full matrices") {
     }
 }
 
+TEST_CASE("a chain with the fewest nodes takes the general path's steps") {
+    Scene chain = library("fput_beta");
+    chain.run.step = GiNaC::numeric(1, 100);
+    for (const Method& method : {Method{Family::lobatto, 2}, Method{Family::lobatto, 3}, Method{Family::gauss, 1}}) {
+        CAPTURE(method.name());
+        chain.method = method;
+        CHECK(distance(motion(derive(chain), 20), motion(derive(chain, true), 20)) < 1e-13);
+    }
+}
+
 TEST_CASE("positions and velocities of one formula are told apart in the energy of loops") {
     const Scene squares = scene(
         "lagrangian = \"sum(i=1..12, x[i]'^2/2 + x[i]^4*x[i]'^2/2) - sum(i=1..12, x[i]^2)\"\n"
