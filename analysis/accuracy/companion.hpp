@@ -12,6 +12,7 @@
 #pragma once
 
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <mutex>
@@ -28,6 +29,8 @@
 
 namespace lobatto {
 
+inline constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
+
 struct MeasuredError {
     double end = 0;                      // at `until`: of the positions, relative to the amplitude of each; the largest
     std::size_t coordinate = 0;          // of which it is
@@ -42,6 +45,7 @@ struct MeasuredError {
     std::optional<double> companion_stopped;  // the time where the companion could not go on, though the run could
 
     bool is_lost() const { return lost_after.has_value(); }
+    double worst() const { return std::fmax(at_end, largest); }
 };
 
 // Of a companion, for so many steps of the run: about 3/2 of them, without a common divisor.

@@ -19,6 +19,7 @@ namespace {
 constexpr int few_coordinates = 10, some_coordinates = 20;
 constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
 constexpr double reference_share = 0.4;        // of the seconds
+constexpr double quadruple_compilation = 2;    // in units of that in long double
 constexpr double longest_radians = 4;          // h omega of the coarsest steps tried; Lobatto's limits are near pi
 const std::string measurements_version = "3";  // of what is measured: older stores are begun anew
 
@@ -95,6 +96,8 @@ Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequ
     }
     // What rounding has grown to: with more digits, if there is the time.
     if (first == Precision::extended && reference_.disagreement.back() > request_.wanted && !reference_.is_late) {
+        reference_.is_late = left() < quadruple_compilation * kernels_.compile_seconds(reference);
+        if (reference_.is_late) return;
         try {
             compute(Precision::quadruple);
         } catch (const TooSlow&) {

@@ -15,6 +15,7 @@ KernelBuilder::KernelBuilder(Derivation derivation) : derivation_(std::move(deri
 
 KernelBuilder::~KernelBuilder() {
     cancel();
+    abandoned_ = true;
     {
         const std::lock_guard lock(mutex_);
         closing_ = true;
@@ -89,7 +90,7 @@ void KernelBuilder::work() {
         std::optional<Compiled> compiled;
         std::exception_ptr failure;
         try {
-            compiled = compile(item->translation);
+            compiled = compile(item->translation, &abandoned_);
         } catch (...) {
             failure = std::current_exception();
         }

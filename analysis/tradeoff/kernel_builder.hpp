@@ -2,6 +2,7 @@
 // The kernels of the family for one scene, compiled on all processors while others are measured.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -21,7 +22,7 @@ namespace lobatto {
 class KernelBuilder {
 public:
     explicit KernelBuilder(Derivation derivation);
-    ~KernelBuilder();  // waits for the compilers at work, a few seconds at most
+    ~KernelBuilder();  // ends the compilers at work
     KernelBuilder(const KernelBuilder&) = delete;
     KernelBuilder& operator=(const KernelBuilder&) = delete;
 
@@ -56,6 +57,7 @@ private:
     mutable std::mutex mutex_;
     std::condition_variable ordered_, finished_;
     bool closing_ = false;
+    std::atomic<bool> abandoned_ = false;
     std::vector<std::thread> workers_;
 };
 

@@ -346,16 +346,14 @@ std::string loss_of(const RunOptions& options, const Scene& scene, const Traject
         *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, chaos);
 }
 
-constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
-constexpr double missed = 2;          // times the error wanted
+constexpr double missed = 2;  // times the error wanted
 
 std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) {
     if (error.is_lost()) return {};
     std::vector<std::string> texts;
-    const double worst = std::fmax(error.at_end, error.largest);
-    if (worst > large_error)
+    if (error.worst() > large_error)
         texts.push_back(
-            fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points", worst));
+            fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points", error.worst()));
     else if (wanted > 0 && error.at_end > missed * wanted)
         texts.push_back(
             fmt::format("the scene asks for an error of {:.2g}, and it is {:.2g}; `lobatto tune` chooses a step",

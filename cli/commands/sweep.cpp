@@ -48,7 +48,6 @@ const char* const reason[] = {"reached the end",
                               "not resolved: the error is as large as the motion",
                               "start off the constraints",
                               "a formula has no value there"};
-constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
 constexpr int departed = 7, unresolved = 8, undefined = 10;
 
 struct SweepOptions {

@@ -46,7 +46,7 @@ std::string how_it_ended(const ProcessResult& result, double seconds_limit) {
 
 }  // namespace
 
-Compiled compile(const Translation& translation) {
+Compiled compile(const Translation& translation, const std::atomic<bool>* abandoned) {
     const Compiler compiler = find_compiler(translation.quadruple);
     const std::string source = translation.name + ".cpp", object = translation.name + ".so";
     ProcessRequest request;
@@ -64,11 +64,17 @@ Compiled compile(const Translation& translation) {
     const bool was_altered = entry.is_there();
 
     request.folder = entry.building_path();
+    request.abandoned = abandoned;
     request.environment = {{"TMPDIR", request.folder}};  // what a killed compiler leaves is removed with the folder
     write_file(request.folder + "/" + source, translation.text);
     const auto start = std::chrono::steady_clock::now();
     const ProcessResult result = run_process(request);
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    if (result.abandoned) {
+        std::error_code ignored;
+        std::filesystem::remove_all(request.folder, ignored);
+        throw MachineError("the C++ compiler was ended, since nobody waited for it");
+    }
     const bool has_object = std::filesystem::exists(request.folder + "/" + object);
     if (!result.succeeded() || !has_object) {
         std::string kept = "Source, command and whole output are kept in " + entry.failed_path();

@@ -2,6 +2,7 @@
 // Kernel text to shared object, through the user's compiler and a content-addressed cache (docs/architecture.md).
 #pragma once
 
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,8 @@ struct Compiled {
 };
 
 // Compiles, or finds in the cache. Safe with any number of processes and threads at once. Throws MachineError with the
-// compiler's own output.
-Compiled compile(const Translation& translation);
+// compiler's own output; also where `abandoned` becomes true, on which the compiler is ended.
+Compiled compile(const Translation& translation, const std::atomic<bool>* abandoned = nullptr);
 
 // The cache folder: $LOBATTO_CACHE_DIR, else $XDG_CACHE_HOME/lobatto, else ~/.cache/lobatto; made with, or brought to,
 // mode 0700. Refused (MachineError) when it belongs to another user, others may write to it, or a folder above it

@@ -140,10 +140,9 @@ ProcessResult run_process(const ProcessRequest& request) {
     pollfd watched = {*output_end, POLLIN, 0};
     siginfo_t ended{};
     while (ended.si_pid == 0) {
-        if (Clock::now() >= deadline) {
-            result.timed_out = true;
-            ::kill(-pid, SIGKILL);
-        }
+        result.timed_out = Clock::now() >= deadline;
+        result.abandoned = request.abandoned != nullptr && *request.abandoned;
+        if (result.timed_out || result.abandoned) ::kill(-pid, SIGKILL);
         // The output ends together with the process, unless one of the two is strange: then look again every 100 ms or
         // every 1 ms.
         ::poll(&watched, 1, watched.fd >= 0 ? 100 : 1);

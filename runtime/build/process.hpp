@@ -2,6 +2,7 @@
 // Runs another program: fork and exec with an argument list, never a shell; bounded in time and output.
 #pragma once
 
+#include <atomic>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@ struct ProcessRequest {
     std::string folder;                                            // where it runs
     std::vector<std::pair<std::string, std::string>> environment;  // set in addition to ours
     double seconds_limit = 120;
+    const std::atomic<bool>* abandoned = nullptr;  // true: nobody waits for it any longer, so it is ended
 };
 
 struct ProcessResult {
@@ -20,6 +22,7 @@ struct ProcessResult {
     int exit_code = -1;      // when it ended by itself
     int signal = 0;          // when a signal ended it
     bool timed_out = false;  // when we ended it
+    bool abandoned = false;  // likewise, since nobody waited
     bool succeeded() const { return exit_code == 0; }
 };
 

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -252,6 +253,21 @@ TEST_CASE("what a killed process left of an entry is removed when another entry 
     CHECK(kernel_builder.endings() == std::vector<std::string>{".building", ".lock"});
     kernel_builder.set_compiler("exec g++ \"$@\"\n");
     compile({"other", answer.text});
+    CHECK(kernel_builder.endings() == one_entry);
+}
+
+TEST_CASE("a compiler that nobody waits for is ended, and leaves nothing") {
+    const KernelBuilder kernel_builder(
+        "echo $$ > $(dirname $0)/pid.new; mv $(dirname $0)/pid.new $(dirname $0)/pid\nexec sleep 300\n");
+    std::atomic<bool> abandoned = false;
+    std::thread waiting([&] { CHECK_THROWS_AS(compile(answer, &abandoned), MachineError); });
+    while (!fs::exists(kernel_builder.folder / "pid")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    abandoned = true;
+    waiting.join();
+    CHECK_FALSE(is_running(std::stoi(read_file(kernel_builder.folder / "pid"))));
+    CHECK(kernel_builder.endings().empty());
+    kernel_builder.set_compiler("exec g++ \"$@\"\n");
+    compile(answer);
     CHECK(kernel_builder.endings() == one_entry);
 }
 
