@@ -26,7 +26,7 @@ void append_part(std::string& whole, const std::string& text) {
 std::string support_of(const KernelSource& source, bool is_ensemble) {
     if (source.support.empty()) return support_text();
     std::vector<std::string> names = source.support;
-    names.push_back("steppers/events.hpp");
+    names.push_back("steppers/impacts.hpp");
     if (is_ensemble) names.push_back("steppers/ensemble.hpp");
     if (is_ensemble && source.form == Form::separable) names.push_back("iteration/ensemble_fixed_point.hpp");
     return support_text(names);

@@ -9,6 +9,7 @@
 #include "generator/formula/limits.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/programs/programs.hpp"
 
@@ -57,6 +58,7 @@ Derivation derive(const Scene& scene, bool general) {
     derivation.scene = in_clock_time(scene);
     derivation.system = build_system(derivation.scene);
     check_method(scene, derivation.system, general);
+    check_impacts(derivation.scene, derivation.system);
     check_start(derivation.scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     std::tie(derivation.structure, derivation.findings) =
@@ -90,6 +92,7 @@ KernelSource emit(const Derivation& derivation, const EmitOptions& options) {
 PlainSource emit_plain(Scene scene, Precision precision) {
     refuse_clock(scene, "the plain text");
     refuse_constraints(scene, "the plain text");
+    refuse_impacts(scene, "the plain text");
     const auto refuse = [&](const std::string& why) { throw InputError(scene.path + ": " + why); };
     if (precision == Precision::quadruple || precision == Precision::double_double)
         refuse("the plain text has the functions of the standard library, which knows no numbers in " +

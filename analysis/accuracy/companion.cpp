@@ -95,6 +95,7 @@ void Companion::observe(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
         const double* const row = records.rows + i * records.columns + 1;
         widen_to(least_, most_, row, count);
+        if (records.is_stop) continue;
         // With a clock the states at its steps stand between the arrivals, which are told by their times.
         const bool is_arrival = request_.arrivals.interval == 0 || row[-1] == time_after(request_, seen_);
         if (!is_arrival) continue;
@@ -320,6 +321,12 @@ void Companion::restore(const std::vector<double>& saved) {
         }
 }
 
+// Where a stop ended the run before its time: whether nothing is left to compare.
+bool Companion::has_caught_up() const {
+    const std::lock_guard lock(mutex_);
+    return companion_.size() >= run_.size();
+}
+
 std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
     if (has_end) {
@@ -329,7 +336,7 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
         const double longest = result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                : begins_now               ? result.seconds / 2
                                                           : 0;
-        while (!finished_ && seconds_since(now) < longest) std::this_thread::sleep_for(std::chrono::microseconds(200));
+        while (!finished_ && !has_caught_up() && seconds_since(now) < longest) std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();

@@ -95,6 +95,7 @@ private:
     void take(Place& place, const Segment& part);
     void take_finely(Place& place, double from, double step);
     void take_one(Place& place, double from, double step);
+    bool has_caught_up() const;
     bool can_halve(double from, double step) const;
     bool is_near_pulse(double from, double step) const;
     std::vector<double> amplitudes() const;  // 2n; 0: of what does not move, or by rounding alone

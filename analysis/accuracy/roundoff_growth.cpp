@@ -247,7 +247,7 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
     scene.outputs.events.clear();
     if (!reference) {
         const Derivation derivation = derive(scene);
-        if (!derivation.system.autonomous || derivation.system.has_forces())
+        if (!derivation.conserves_energy())
             throw InputError(
                 fmt::format("{}: --no-reference compares energies with the first, and a force or the time changes this "
                             "one's; leave --no-reference away",

@@ -27,7 +27,7 @@ double floor_of(std::size_t n) {
 std::string linear_departure(const Derivation& derivation, const Scene& scene, const Kernel& kernel,
                              const TrajectoryRequest& request, const TrajectoryResult& result) {
     const std::size_t n = scene.coordinates.size();
-    const bool energy_tells = derivation.system.autonomous && !derivation.system.has_forces();
+    const bool energy_tells = derivation.conserves_energy();
     LoadedStepper<double> stepper(kernel);
     if (!derivation.system.linear || energy_tells || n > most_coordinates ||
         stepper.prepare(request.parameters, request.step) != LOBATTO_OK)

@@ -65,7 +65,7 @@ Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequ
       request_(std::move(request)),
       start_(scene),
       kernels_(std::move(derivation)),
-      conserves_(kernels_.derivation().system.autonomous && !kernels_.derivation().system.has_forces()) {
+      conserves_(kernels_.derivation().conserves_energy()) {
     Member reference = reference_member(scene, request_.wanted);
     const double until = end_of(scene);
     kernels_.order(reference);

@@ -88,7 +88,7 @@ TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
     header.multipliers = 0;
     header.energy = false;
     header.columns.insert(header.columns.begin(), {"event", ""});
-    for (const Event& event : scene.outputs.events) header.events.push_back(event.text);
+    for (const Event& event : scene.watched()) header.events.push_back(event.text);
     return header;
 }
 
@@ -124,7 +124,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const Kernel&
                  const TrajectoryRequest& request, const TrajectoryResult& result, const Watch& watch) {
     const bool clocked = scene.clock.has_value();
     const std::string of_all =
-        clocked || result.steps_done == request.steps ? "" : fmt::format(" of {}", request.steps);
+        clocked || result.steps_done == request.steps || result.stop >= 0 ? "" : fmt::format(" of {}", request.steps);
     const std::int64_t steps = clocked ? result.chain_steps : result.steps_done;
     print_row("steps", fmt::format("{}{}, h = {:.6g}{}, to t = {:.6g}", steps, of_all, request.step,
                                    clocked ? " in the time of the clock " + scene.clock->text : "", result.time));
@@ -132,7 +132,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const Kernel&
     const lobatto_kernel& kernel = run_kernel.table();
     print_row("time per step", duration(result.seconds / static_cast<double>(steps)));
     print_row("iterations", iterations_text(kernel, result, steps));
-    const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
+    const bool conserves = derivation.conserves_energy();
     if (scene.outputs.energy) {
         const double H0 = std::fabs(result.energy_start);
         const bool relative = conserves && H0 > result.energy_error_largest;
@@ -156,10 +156,22 @@ void print_table(const Derivation& derivation, const Scene& scene, const Kernel&
 }
 
 // `counts`: of the states, then of each kind of event.
-void print_events(const std::vector<Event>& events, const std::vector<double>& counts, const std::string& path) {
-    for (std::size_t i = 0; i < events.size(); ++i)
-        print_row(i == 0 ? "events" : "", fmt::format("{} of '{}'{}", counts[1 + i], events[i].text,
-                                                      i + 1 < events.size() ? "" : ", in " + path));
+void print_events(const Scene& scene, const TrajectoryResult& result, const std::vector<double>& counts,
+                  const std::string& path) {
+    const std::vector<Event> watched = scene.watched();
+    if (result.stop >= 0)
+        print_row("stopped", fmt::format("by '{}' at t = {:.9g}", watched[static_cast<std::size_t>(result.stop)].text,
+                                         result.time));
+    const std::size_t stops = scene.outputs.events.size(), impacts = stops + scene.run.stops.size();
+    bool is_named = false;
+    for (std::size_t i = 0; i < watched.size(); ++i) {
+        if (i == impacts) is_named = false;
+        if (i >= stops && i < impacts) continue;
+        print_row(is_named ? "" : i < impacts ? "events" : "impacts",
+                  fmt::format("{} of '{}'{}", counts[1 + i], watched[i].text,
+                              i + 1 < watched.size() ? "" : ", in " + path));
+        is_named = true;
+    }
 }
 
 // Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
@@ -220,7 +232,7 @@ public:
           energy(run.derivation, run.plain),
           domains(run.scene, run.derivation.system),
           parameters(request.parameters),
-          counts(1 + run.scene.outputs.events.size(), 0) {
+          counts(1 + run.scene.watched().size(), 0) {
         if (measures) companion.emplace(run.derivation, run.kernel, request);
     }
 
@@ -273,7 +285,7 @@ public:
           const std::optional<Checkpoint>& from)
         : path_(output_path(options.output, result_name(run.scene.path) + ".csv")),
           trajectory_(path_, header, from ? from->files[0] : Written()) {
-        if (!run.scene.outputs.events.empty()) {
+        if (!run.scene.watched().empty()) {
             event_path_ = event_path(options, run.scene);
             events_.emplace(event_path_, event_header_of(run.scene, header), from ? from->files[1] : Written());
         }
@@ -314,7 +326,7 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
         files.write(records);
         observers.observe(records);
     };
-    if (!run.scene.outputs.events.empty())
+    if (!run.scene.watched().empty())
         request.events = [&](const EventRecords& records) {
             files.write(records);
             observers.observe(records);
@@ -375,7 +387,7 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
             observers.domains.text(observers.parameters, row.data()));
     }
     const std::string departure = observers.energy.departure(run.derivation, run.plain, request);
-    if (run.scene.clock) return departure;
+    if (run.scene.clock || !run.scene.impacts.empty()) return departure;
     return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
 }
 
@@ -412,7 +424,7 @@ void run(const RunOptions& options) {
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
     add_digits(request, scene, run.kernel);
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
-    const bool has_events = !scene.outputs.events.empty();
+    const bool has_events = !scene.watched().empty();
     keep_scene(scene.path, path);
     keep_foreign(path);
     if (has_events) {
@@ -452,7 +464,7 @@ void run(const RunOptions& options) {
     if (departure.empty()) departure = loss_of(options, scene, request, error);
     std::vector<std::string> warnings;
     if (error && departure.empty()) warnings = warnings_of(*error, scene.run.error);
-    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock)
+    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && scene.impacts.empty())
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
             warnings.push_back(warning);
@@ -460,7 +472,7 @@ void run(const RunOptions& options) {
     if (!options.quiet) {
         print_table(run.derivation, scene, run.kernel, request, result, observers.watch);
         if (error) print_row("measured error", text_of(*error, scene));
-        print_events(scene.outputs.events, observers.counts, files.events_path());
+        print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
         if (!run.steps.reaches_end)

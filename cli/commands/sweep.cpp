@@ -274,7 +274,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const Grid& g
         print_row("time per step", duration(result.processor_seconds / steps) + " of a processor, for one trajectory");
     }
     if (scene.outputs.energy && result.energy_error_index >= 0) {
-        const bool conserves = derivation.system.autonomous && !derivation.system.has_forces();
+        const bool conserves = derivation.conserves_energy();
         print_row(conserves ? "energy error" : "energy change",
                   fmt::format("{:.2g} at most, of trajectory {}, {}", result.energy_error_largest,
                               result.energy_error_index, values_of(grid, result.energy_error_index)));

@@ -375,12 +375,34 @@ private:
 
     void events() {
         std::vector<ex> values;
-        for (const Event& event : derivation_.scene.outputs.events) values.push_back(event.value);
+        for (const Event& event : derivation_.scene.watched()) values.push_back(event.value);
         if (values.empty()) return;
         machine_.set("q", values_of(system_.q));
         machine_.set("velocity", values_of(system_.v));
         machine_.run("event");
         compare("emitted events", formulas_(values), machine_.get("value", values.size()));
+        if (!derivation_.scene.impacts.empty()) impacts();
+    }
+
+    void impacts() {
+        const std::vector<Impact>& walls = derivation_.scene.impacts;
+        std::vector<ex> gradient, rate, restitution, position, velocity;
+        for (const Impact& wall : walls) {
+            for (const GiNaC::symbol& q : system_.q) gradient.push_back(wall.when.value.diff(q));
+            rate.push_back(wall.when.value.diff(system_.t));
+            restitution.push_back(wall.restitution);
+            position.insert(position.end(), wall.reset_position.begin(), wall.reset_position.end());
+            velocity.insert(velocity.end(), wall.reset_velocity.begin(), wall.reset_velocity.end());
+        }
+        const std::string claim = "emitted impacts";
+        machine_.run("impact");
+        compare(claim, formulas_(gradient), machine_.get("G", gradient.size()));
+        compare(claim, formulas_(rate), machine_.get("g_t", rate.size()));
+        compare(claim, formulas_(restitution), machine_.get("restitution", restitution.size()));
+        if (position.empty()) return;
+        machine_.run("reset");
+        compare(claim, formulas_(position), machine_.get("q1", position.size()));
+        compare(claim, formulas_(velocity), machine_.get("velocity1", velocity.size()));
     }
 
     // The closed form against the stage equations solved by numbers.

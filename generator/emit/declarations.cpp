@@ -12,6 +12,22 @@ namespace {
 const char* const in = "const real*";
 const char* const out = "real*";
 
+const Declaration of_events = {"event",
+                               "What is watched, at a state: the scene's events, stops and walls.",
+                               "void",
+                               {{in, "q"}, {in, "velocity"}, {out, "value"}},
+                               true};
+const Declaration of_impacts = {"impact",
+                                "(D52) Of each wall g(q, t) = 0: dg/dq, dg/dt at fixed q, and its restitution.",
+                                "void",
+                                {{in, "q"}, {out, "G"}, {out, "g_t"}, {out, "restitution"}},
+                                true};
+const Declaration of_resets = {"reset",
+                               "The state after each impact that the scene gives one.",
+                               "void",
+                               {{in, "q"}, {in, "velocity"}, {out, "q1"}, {out, "velocity1"}},
+                               true};
+
 const std::vector<Declaration>& separable() {
     static const std::vector<Declaration> table = {
         {"energy",
@@ -46,11 +62,9 @@ const std::vector<Declaration>& separable() {
          "(D31) S0 = the part of M^-1 V'' that does not depend on q; its entries as those of S.",
          "void",
          {{out, "S0"}}},
-        {"event",
-         "What the scene's events watch, at a state.",
-         "void",
-         {{in, "q"}, {in, "velocity"}, {out, "value"}},
-         true},
+        of_events,
+        of_impacts,
+        of_resets,
     };
     return table;
 }
@@ -105,11 +119,9 @@ const std::vector<Declaration>& general() {
          true,
          true},
         {"slope", "(D25) g alone.", "void", {{in, "z"}, {out, "g"}}, true, true},
-        {"event",
-         "What the scene's events watch, at a state.",
-         "void",
-         {{in, "q"}, {in, "velocity"}, {out, "value"}},
-         true},
+        of_events,
+        of_impacts,
+        of_resets,
     };
     return table;
 }
@@ -184,6 +196,10 @@ const std::set<std::string>& member_names() {
                                                 "reach",
                                                 "ahead",
                                                 "event_direction",
+                                                "stops",
+                                                "impacts",
+                                                "resets",
+                                                "reset_of",
                                                 "parameter",
                                                 "prepare",
                                                 "Parameters",

@@ -321,7 +321,7 @@ private:
 
     std::string body(const Declaration& declaration) const {
         const std::string name = declaration.program;
-        if (d_.structure.looped && name != "event") return looped_.body(name);
+        if (d_.structure.looped && name != "event" && name != "impact" && name != "reset") return looped_.body(name);
         if (name == "remainder" && !optimised_.has_remainder) return "";
         const auto program =
             std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
@@ -410,7 +410,7 @@ std::string stepper_of(const Scene& scene, const Structure& structure) {
 std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
     std::set<std::string> parts = {stepper_of(derivation.scene, derivation.structure)};
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
-    if (!derivation.scene.outputs.events.empty()) parts.insert("steppers/events.hpp");
+    if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
             case Op::sin:
             case Op::cos:

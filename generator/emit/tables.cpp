@@ -177,6 +177,24 @@ const char* type_name(Precision precision) {
     }
 }
 
+// What is looked for in each step.
+std::string watched_shapes(const Scene& scene) {
+    std::string text;
+    const std::vector<Event> watched = scene.watched();
+    line(text, fmt::format("int events = {}", watched.size()), "that are watched for");
+    std::vector<int> directions, reset_of;
+    for (const Event& event : watched) directions.push_back(event.direction);
+    text += integer_table("event_direction", directions);
+    if (watched.empty()) return text;
+    int resets = 0;
+    for (const Impact& impact : scene.impacts) reset_of.push_back(impact.reset_position.empty() ? -1 : resets++);
+    line(text, fmt::format("int stops = {}", scene.run.stops.size()), "which end the motion");
+    line(text, fmt::format("int impacts = {}", scene.impacts.size()), "the last ones: walls that throw it back");
+    if (scene.impacts.empty()) return text;
+    line(text, fmt::format("int resets = {}", resets), "walls with an outcome of their own");
+    return text + integer_table("reset_of", reset_of);
+}
+
 std::string shapes(const Derivation& d, Precision precision, const std::string& name, const std::string& digest) {
     const Structure& structure = d.structure;
     const Outputs& outputs = d.scene.outputs;
@@ -213,10 +231,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size() - (d.scene.clock ? 1 : 0)),
          d.scene.clock ? "in the order of the scene; the one after them is the energy at the start"
                        : "in the order of the scene");
-    line(text, fmt::format("int events = {}", outputs.events.size()), "that are watched for");
-    std::vector<int> directions;
-    for (const Event& event : outputs.events) directions.push_back(event.direction);
-    text += integer_table("event_direction", directions);
+    text += watched_shapes(d.scene);
     if (structure.form() == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.system, d.quadrature.points, precision);
     const bool solves = structure.form() == Form::separable && !structure.is_explicit();

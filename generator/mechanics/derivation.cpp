@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "generator/mechanics/derivation.hpp"
 
+#include <algorithm>
+
 #include "generator/formula/limits.hpp"
 
 namespace lobatto {
@@ -10,6 +12,14 @@ const Discretisation& Derivation::discretisation() const {
     const DerivationLimits limits(scene.path);
     discretisation_ = std::make_shared<const Discretisation>(discretise(system, quadrature));
     return *discretisation_;
+}
+
+bool Derivation::conserves_energy() const {
+    const auto gives_all_back = [&](const Impact& impact) {
+        return impact.reset_position.empty() && impact.restitution.is_equal(1) && !impact.when.value.has(system.t);
+    };
+    return system.autonomous && !system.has_forces() &&
+           std::all_of(scene.impacts.begin(), scene.impacts.end(), gives_all_back);
 }
 
 }  // namespace lobatto

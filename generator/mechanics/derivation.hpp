@@ -20,6 +20,9 @@ struct Derivation {
     Structure structure;
     std::vector<Finding> findings;  // what the structure rests on, and what was looked for in vain
 
+    // Whether the motion keeps its energy: no time, no forces, and walls that give all of it back.
+    bool conserves_energy() const;
+
     // The equations of all nodes written out, for people and for checks; a kernel is assembled from one node's formulas
     // and does not need them. Made at the first call.
     const Discretisation& discretisation() const;

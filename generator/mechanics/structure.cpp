@@ -181,7 +181,7 @@ private:
                  "so that rounding errors grow like a random walk");
             return;
         }
-        const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.outputs.events.empty();
+        const bool polynomial_wanted = scene_.outputs.dense > 0 || !scene_.watched().empty();
         // The inverse of a full mass matrix is written out: few coordinates only, or nothing to solve.
         const bool takes_mass = separable_.diagonal_mass || interior_ <= full_mass_limit;
         if (!system_.separable || (!takes_mass && !separable_.is_explicit))

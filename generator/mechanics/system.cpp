@@ -291,8 +291,11 @@ public:
 
         keep_second_order(derived, {kinds.begin() + static_cast<std::ptrdiff_t>(first_order), kinds.end()});
         keep_first_order(kinds, dependence);
-        for (const Event& event : scene_.outputs.events)
-            if (event.value.has(system_.t)) system_.autonomous = false;  // events are given the time, as all else is
+        // What is watched is given the time, as all else is.
+        for (const Event& event : scene_.watched()) watch_time(event.value);
+        for (const Impact& impact : scene_.impacts)
+            for (const auto* reset : {&impact.reset_position, &impact.reset_velocity})
+                for (const ex& value : *reset) watch_time(value);
         if (system_.autonomous && mentions(system_, system_.t)) return build_system(without_time(scene_));
         check_mass(scene_, system_);
         if (system_.separable) check_rest(dependence);
@@ -304,6 +307,9 @@ public:
     }
 
 private:
+    void watch_time(const ex& value) {
+        if (value.has(system_.t)) system_.autonomous = false;
+    }
     void differentiate_once() {
         system_.n = static_cast<int>(scene_.coordinates.size());
         system_.t = scene_.time;

@@ -33,8 +33,9 @@ protected:
     }
     Ids times(const IdMatrix& matrix, const Ids& vector);
     void program(const std::string& name, const std::string& array, const Ids& values);
-    // The program event(q, velocity): what the scene's events watch.
+    // The programs event, impact and reset: what is watched in each step, and what walls do.
     void events();
+    void impacts();
     // Inputs velocity[k] in the place of the scene's velocities.
     void velocities_as_inputs();
 

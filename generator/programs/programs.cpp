@@ -60,8 +60,32 @@ void ProgramBuilder::velocities_as_inputs() {
 
 void ProgramBuilder::events() {
     Ids values;
-    for (const Event& event : d_.scene.outputs.events) values.push_back(convert(event.value));
-    if (!values.empty()) program("event", "value", values);
+    for (const Event& event : d_.scene.watched()) values.push_back(convert(event.value));
+    if (values.empty()) return;
+    program("event", "value", values);
+    if (!d_.scene.impacts.empty()) impacts();
+}
+
+void ProgramBuilder::impacts() {
+    Program impact{"impact", {}}, reset{"reset", {}};
+    std::vector<GiNaC::ex> walls;
+    for (const Impact& wall : d_.scene.impacts) walls.push_back(wall.when.value);
+    std::size_t resets = 0;
+    for (std::size_t w = 0; w < walls.size(); ++w) {
+        const Impact& wall = d_.scene.impacts[w];
+        for (std::size_t k = 0; k < n_; ++k)
+            impact.outputs.push_back({at("G", w * n_ + k), convert(walls[w].diff(d_.system.q[k]))});
+        impact.outputs.push_back({at("g_t", w), convert(walls[w].diff(d_.system.t))});
+        impact.outputs.push_back({at("restitution", w), convert(wall.restitution)});
+        if (wall.reset_position.empty()) continue;
+        for (std::size_t k = 0; k < n_; ++k) {
+            reset.outputs.push_back({at("q1", resets * n_ + k), convert(wall.reset_position[k])});
+            reset.outputs.push_back({at("velocity1", resets * n_ + k), convert(wall.reset_velocity[k])});
+        }
+        ++resets;
+    }
+    p_.programs.push_back(std::move(impact));
+    if (resets > 0) p_.programs.push_back(std::move(reset));
 }
 
 Programs build_programs(const Derivation& derivation) {

@@ -21,7 +21,7 @@
 namespace lobatto {
 namespace {
 
-constexpr std::size_t longest_title = 200, longest_event = 1000, most_events = 100;
+constexpr std::size_t longest_title = 200;
 constexpr long long most_steps = 9'000'000'000'000'000;  // step numbers are exact as doubles up to 2^53
 
 // The values of the run-time parameters: as given, or else those of the scene.
@@ -43,7 +43,7 @@ public:
           document_(read_document(source)),
           root_(source, document_.entries, {1, 1}, "a scene",
                 {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "constraints",
-                 "method", "run", "output"}),
+                 "impacts", "method", "run", "output"}),
           system_(source, root_, scene_) {}
 
     Scene run() {
@@ -59,6 +59,7 @@ public:
         scene_.conditions = system_.conditions();
         for (std::size_t i = of_motion; i < scene_.conditions.size(); ++i) scene_.conditions[i].of_motion = false;
         read_output();
+        refuse_beside_impacts();
         system_.refuse_unused();
         return std::move(scene_);
     }
@@ -170,7 +171,7 @@ private:
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
         const Table table(source_, table_of(source_, section, example), section.at, "[run]",
-                          {"step", "steps_per_period", "period", "until", "error", "beyond_horizon", "assemble"});
+                          {"step", "steps_per_period", "period", "until", "error", "beyond_horizon", "assemble", "stop"});
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
         const Entry* period = table.find("period");
@@ -209,6 +210,7 @@ private:
             if (scene_.constraints.empty())
                 fail(assemble->at, "without constraints there is nothing to assemble; leave it out");
         }
+        if (const Entry* stop = table.find("stop")) scene_.run.stops = system_.read_events(*stop, "stop");
         if (const Entry* beyond = table.find("beyond_horizon"))
             scene_.run.beyond_horizon = boolean_of(source_, *beyond);
         if (const Entry* error = table.find("error")) {
@@ -260,33 +262,14 @@ private:
             if (outputs.dense > 0 && outputs.every > 1)
                 fail(dense->at, "dense fills the time between two steps, so all steps are kept: remove every");
         }
-        if (const Entry* events = table.find("events")) read_events(*events);
+        if (const Entry* events = table.find("events")) outputs.events = system_.read_events(*events, "events");
     }
 
-    void read_events(const Entry& entry) {
-        if (entry.value.kind != Value::Kind::list)
-            fail(entry.value.at,
-                 fmt::format("events must be a list such as [\"x = 0 rising\"], not {}", entry.value.kind_name()));
-        if (entry.value.items.size() > most_events)
-            fail(entry.value.at, fmt::format("{} events; at most {}", entry.value.items.size(), most_events));
-        for (const Value& item : entry.value.items) {
-            if (item.kind != Value::Kind::text)
-                fail(item.at,
-                     fmt::format("an event must be a text such as \"x = 0 rising\", not {}", item.kind_name()));
-            Event event;
-            event.at = item.text.at.front();
-            event.text = collapsed(item.text.value);
-            if (event.text.size() > longest_event)
-                fail(item.at, fmt::format("an event of {} bytes; at most {}", event.text.size(), longest_event));
-            const Scope scope = system_.scope_of("the event", true);
-            const EventSyntax crossing = parse_crossing(source_, item.text, scope);
-            const Operand value = evaluate(source_, crossing.difference, scope);
-            if (!value.moves && !value.velocities)
-                fail(item.at, "this event never happens: it holds neither a coordinate nor the time");
-            event.value = value.expression;
-            event.direction = crossing.direction;
-            scene_.outputs.events.push_back(event);
-        }
+    void refuse_beside_impacts() const {
+        if (scene_.impacts.empty()) return;
+        const auto refuse = [&](const std::string& why) { fail(scene_.impacts.front().when.at, "impacts need " + why); };
+        if (scene_.clock) refuse("equal steps in time; leave out the clock");
+        if (scene_.outputs.dense > 0) refuse("dense = 0: a step with an impact is no polynomial");
     }
 
     const Source& source_;
@@ -297,6 +280,13 @@ private:
 };
 
 }  // namespace
+
+std::vector<Event> Scene::watched() const {
+    std::vector<Event> all = outputs.events;
+    all.insert(all.end(), run.stops.begin(), run.stops.end());
+    for (const Impact& impact : impacts) all.push_back(impact.when);
+    return all;
+}
 
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
                                const std::vector<GiNaC::ex>& given) const {

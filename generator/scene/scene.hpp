@@ -34,6 +34,14 @@ struct Parameter {
     std::string written = name;  // in formulas: m[3]
 };
 
+// An event: the value crosses zero. Located on the step's own polynomial.
+struct Event {
+    std::string text;   // as written, white space collapsed: "theta = 0 rising"
+    GiNaC::ex value;    // left side minus right side, in positions, velocities, time and parameters
+    int direction = 0;  // 1: rising only, -1: falling only, 0: both
+    Position at = {};
+};
+
 struct Run {
     static constexpr double least_error = 1e-28, largest_error = 0.1;  // that can be asked for
 
@@ -42,14 +50,7 @@ struct Run {
     double error = 0;             // that is wanted, relative to the amplitude of the motion; 0: nothing is said
     bool beyond_horizon = false;  // goes on where nothing of the motion is left: statistics of chaos
     bool assemble = false;        // a start that does not keep the constraints is moved to the nearest that does
-};
-
-// An event: the value crosses zero. Located on the step's own polynomial.
-struct Event {
-    std::string text;   // as written, white space collapsed: "theta = 0 rising"
-    GiNaC::ex value;    // left side minus right side, in positions, velocities, time and parameters
-    int direction = 0;  // 1: rising only, -1: falling only, 0: both
-    Position at = {};
+    std::vector<Event> stops;     // a run ends at the first of them
 };
 
 // What a kernel computes beside the motion itself; it has no code for anything else.
@@ -83,6 +84,17 @@ struct Constraint {
     Position at = {};
 };
 
+// A wall: the motion is on the one side of it where `when` has not happened, and is thrown back when it meets it
+// (generator/mechanics/impacts.hpp).
+struct Impact {
+    std::string name;               // an identifier; element 3 of an array touch is touch_3
+    std::string written = name;     // in the scene: touch[3]
+    Event when = {};                // with a direction, free of velocities
+    GiNaC::ex restitution = 1;      // in parameters
+    // n each, of the state after it in that before it; empty: the momentum jumps instead.
+    std::vector<GiNaC::ex> reset_position = {}, reset_velocity = {};
+};
+
 // Initial rates are given either as velocities or as momenta, for all coordinates.
 enum class Start { velocity, momentum };
 
@@ -106,11 +118,15 @@ struct Scene {
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;
     std::vector<Constraint> constraints;
+    std::vector<Impact> impacts;
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
     std::optional<Clock> clock;
     Run run;
     Outputs outputs;
+
+    // All that a kernel looks for in each step: events, then stops, then impacts.
+    std::vector<Event> watched() const;
 
     // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
     // order: 60 decimal digits; throws InputError naming `what` when it is not a finite real number.

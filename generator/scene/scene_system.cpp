@@ -58,6 +58,7 @@ void SystemReader::read() {
     read_lagrangian();
     read_forces();
     read_constraints();
+    read_impacts();
     names_.records = false;
     read_places();
     names_.records = true;
@@ -318,52 +319,61 @@ void SystemReader::read_constraints() {
     for (const Entry& entry : entries) read_constraint(entry);
 }
 
-void SystemReader::read_constraint(const Entry& entry) {
-    const Subject subject =
-        parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, "[constraints]", true, {}});
+SystemReader::ArrayName SystemReader::declare_array(const Entry& entry, const std::string& what,
+                                                    const std::string& section) {
+    const Subject subject = parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, section, true, {}});
     const std::string name(subject.name.text);
-    declarations_.declare(name, subject.name.at, "constraint");
-    const bool array = subject.subscripted;
-    if (array && subject.indices.size() != 1)
+    declarations_.declare(name, subject.name.at, what);
+    if (!subject.subscripted) return {name, std::nullopt};
+    if (subject.indices.size() != 1)
         fail(subject.subscript.at.at,
-             fmt::format("an array of constraints has one index without another meaning: write \"{}[i]\"", name));
-    const Entry* equation = &entry;
-    long count = 1;
+             fmt::format("an array of {}s has one index without another meaning: write \"{}[i]\"", what, name));
+    return {name, std::string(subject.indices.front().text)};
+}
+
+long SystemReader::count_of(const Entry& entry, const Entry* count, const ArrayName& array, const std::string& what) {
+    const auto& [name, index] = array;
+    if (count != nullptr && !index)
+        fail(count->at, fmt::format("a count makes an array: write \"{}[i]\" = {{ ..., count = ... }}", name));
+    if (count == nullptr && index)
+        fail(entry.at, fmt::format("how many {}s {}[i] are there? add count = 3", what, name));
+    if (count == nullptr) return 1;
+    const Scope scope{&names_, "count", false, {}};
+    const long n = evaluate_whole(source_, parse_formula(source_, formula_of(source_, *count), scope), scope);
+    if (n < 1 || n > static_cast<long>(most_constraints))
+        fail(count->value.at, fmt::format("count is {}; at least 1 and at most {}", n, most_constraints));
+    declarations_.declare_elements(name, entry.at, static_cast<std::size_t>(n));
+    return n;
+}
+
+void SystemReader::read_constraint(const Entry& entry) {
+    const ArrayName array = declare_array(entry, "constraint", "[constraints]");
+    const auto& [name, index] = array;
+    const Entry *equation = &entry, *number = nullptr;
     if (entry.value.kind == Value::Kind::table) {
         const Table table(source_, entry.value.entries, entry.at, "constraint " + name, {"equation", "count"});
         equation = &table.get("equation", "for example equation = \"x^2 + y^2 = l^2\"");
-        const Entry* given = table.find("count");
-        if (given != nullptr && !array)
-            fail(given->at,
-                 fmt::format("a count makes an array: write \"{}[i]\" = {{ equation = ..., count = ... }}", name));
-        if (given != nullptr) {
-            const Scope scope{&names_, "count", false, {}};
-            count = evaluate_whole(source_, parse_formula(source_, formula_of(source_, *given), scope), scope);
-            if (count < 1 || count > static_cast<long>(most_constraints))
-                fail(given->value.at, fmt::format("count is {}; at least 1 and at most {}", count, most_constraints));
-        } else if (array) {
-            fail(entry.at, fmt::format("how many constraints {}[i] are there? add count = 3", name));
-        }
-    } else if (array) {
+        number = table.find("count");
+    } else if (index) {
         fail(entry.at, fmt::format("an array of constraints has a count: write \"{}[i]\" = {{ equation = \"...\", "
                                    "count = 3 }}",
                                    name));
     }
+    const long count = count_of(entry, number, array, "constraint");
     if (equation->value.kind != Value::Kind::text)
         fail(equation->value.at,
              fmt::format("a constraint must be an equation in quotes such as \"x^2 + y^2 = l^2\", not {}",
                          equation->value.kind_name()));
-    if (array) declarations_.declare_elements(name, entry.at, static_cast<std::size_t>(count));
     Scope scope{&names_, "the constraint " + name, true, {}};
-    if (array) scope.indices = {std::string(subject.indices.front().text)};
+    if (index) scope.indices = {*index};
     const EventSyntax sides = parse_crossing(source_, equation->value.text, scope);
     if (sides.direction != 0)
         fail(equation->value.at, "a constraint holds at all times: leave out 'rising' or 'falling'");
     for (long i = 1; i <= count; ++i) {
         const std::vector<long> indices(scope.indices.size(), i);
         const Operand value = evaluate(source_, sides.difference, scope, indices);
-        Constraint constraint{array ? element_name(name, static_cast<std::size_t>(i)) : name};
-        if (array) constraint.written = fmt::format("{}[{}]", name, i);
+        Constraint constraint{index ? element_name(name, static_cast<std::size_t>(i)) : name};
+        if (index) constraint.written = fmt::format("{}[{}]", name, i);
         constraint.text = collapsed(equation->value.text.value);
         if (constraint.text.size() > longest_equation)
             fail(equation->value.at,

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +34,9 @@ public:
     // A formula whose value with the parameters of the scene must be a real number that a double can hold.
     GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr);
 
+    // A list such as ["x = 0 rising"], or one of them.
+    std::vector<Event> read_events(const Entry& entry, const std::string& key);
+
 private:
     // The lines of [coordinates]: one coordinate, or an array of them.
     struct Group {
@@ -59,6 +63,17 @@ private:
     void read_forces();
     void read_constraints();
     void read_constraint(const Entry& entry);
+    // "link" or "link[i]"; how many links there are.
+    struct ArrayName {
+        std::string name;
+        std::optional<std::string> index;
+    };
+    ArrayName declare_array(const Entry& entry, const std::string& what, const std::string& section);
+    long count_of(const Entry& entry, const Entry* count, const ArrayName& array, const std::string& what);
+    void read_impacts();
+    void read_impact(const Entry& entry);
+    void read_reset(const Entry& entry, Impact& impact, const Scope& scope, const std::vector<long>& indices);
+    Event read_event(const Value& value, const std::string& key);
     const Group& group_of(const Subject& subject) const;
     void read_places();
     void read_initial_values();

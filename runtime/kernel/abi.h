@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 7u
+#define LOBATTO_ABI_VERSION 8u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -33,7 +33,11 @@ typedef enum lobatto_status {
     LOBATTO_SINGULAR_MASS = 4,     /* the mass matrix has no inverse for these parameters or at this state */
     LOBATTO_TIME_STANDS_STILL = 5, /* t + h equals t in this precision */
     LOBATTO_UNSUPPORTED = 6,       /* the kernel was compiled without this */
-    LOBATTO_OFF_CONSTRAINTS = 9    /* a start does not keep the constraints; 7 and 8 are what sweeps say of motions */
+    LOBATTO_OFF_CONSTRAINTS = 9, /* a start does not keep the constraints, or is behind a wall; 7, 8 and 10 are what
+                                    sweeps say of motions */
+    LOBATTO_STOPPED = 11,            /* a stop was met: the last row of events says which, where and when */
+    LOBATTO_IMPACTS_ACCUMULATE = 12, /* more impacts in one step than can be told apart, or a motion along a wall */
+    LOBATTO_STATUSES = 13
 } lobatto_status;
 
 typedef enum lobatto_real {
@@ -100,7 +104,9 @@ typedef struct lobatto_kernel {
     int32_t has_energy;     /* 0: `energy` is unsupported */
     int32_t has_tangent;    /* 0: `tangent` is unsupported */
     int32_t has_dense;      /* 0: `dense` is unsupported, in `advance` too */
-    int32_t events;         /* event functions */
+    int32_t events;         /* event functions: those of events, then of stops, then of walls */
+    int32_t stops;          /* that end the motion; only where `advance` has room for events */
+    int32_t impacts;        /* walls, which each step heeds */
     int32_t events_of_step; /* the most event rows of one step */
     int32_t stepper_bytes;
     int32_t stepper_alignment;

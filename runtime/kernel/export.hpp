@@ -82,7 +82,19 @@ struct Export {
     }
 
     static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
-        return code(static_cast<S*>(stepper)->start(*in(time), in(q), in(p)));
+        const Status status = static_cast<S*>(stepper)->start(*in(time), in(q), in(p));
+        if constexpr (is_whole && impacts_of<K>() > 0) {
+            if (status == Status::ok) return code(side_of_walls(of(stepper), *in(time), in(q), in(p)));
+        }
+        return code(status);
+    }
+    // Whether a state is where the motion may be.
+    static Status side_of_walls(const S& stepper, real time, const real* q, const real* p) {
+        Walls<K> wall;
+        const Status status = wall.look(stepper, time, q, p);
+        for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
+            if (wall.is_behind(w)) return Status::off_constraints;
+        return status;
     }
 
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
@@ -105,15 +117,15 @@ struct Export {
 
     static Status advance_in(S& stepper, lobatto_advance& call) {
         if constexpr (event_count > 0) {
-            if (call.events != nullptr) {
-                Events<K> events(stepper);
-                return take_steps(stepper, call, &events);
+            if (call.events != nullptr || impacts_of<K>() > 0) {
+                Watch<K> watch(stepper);
+                return take_steps(stepper, call, &watch);
             }
         }
-        return take_steps(stepper, call, static_cast<NoEvents*>(nullptr));
+        return take_steps(stepper, call, static_cast<NoWatch*>(nullptr));
     }
 
-    struct NoEvents {};
+    struct NoWatch {};
     static void count(const S& stepper, lobatto_advance& call) {
         if constexpr (S::N > 0) {
             call.iterations += stepper.iterations;
@@ -124,9 +136,9 @@ struct Export {
     }
 
     // Arrivals at equally spaced times, of a stepper with a clock. What does not fit into one call goes on in the next.
-    template <class AnyEvents>
-    static Status take_intervals(S& stepper, lobatto_advance& call, AnyEvents* events) {
-        constexpr bool has_events = !std::is_same_v<AnyEvents, NoEvents>;
+    template <class AnyWatch>
+    static Status take_intervals(S& stepper, lobatto_advance& call, AnyWatch* watch) {
+        constexpr bool is_watched = !std::is_same_v<AnyWatch, NoWatch>;
         constexpr std::int64_t most = 65536;  // steps of the chain in one call
         stepper.tolerance = static_cast<real>(call.tolerance);
         const real end = static_cast<real>(call.end), interval = static_cast<real>(call.interval);
@@ -136,9 +148,9 @@ struct Export {
             while (stepper.is_short_of(target)) {
                 if (call.chain_steps == most || (call.record_every > 0 && call.records_written + 2 > call.capacity))
                     return Status::ok;
-                if constexpr (has_events) {
-                    if (call.events_written + AnyEvents::most > call.event_capacity) return Status::ok;
-                    events->keep(stepper);
+                if constexpr (is_watched) {
+                    if (call.events_written + AnyWatch::most > call.event_capacity) return Status::ok;
+                    watch->keep(stepper);
                 }
                 if (call.chain_records != 0 && !stepper.is_recorded)
                     put_row(stepper.now.time, stepper.q, stepper.p, call);
@@ -150,8 +162,8 @@ struct Export {
                 }
                 ++call.chain_steps;
                 count(stepper, call);
-                if constexpr (has_events) {
-                    const Status found = find_events(stepper, call, *events, end);
+                if constexpr (is_watched) {
+                    const Status found = look(stepper, call, *watch, end);
                     if (found != Status::ok) return found;
                 }
             }
@@ -165,15 +177,17 @@ struct Export {
         return Status::ok;
     }
     // The events of a step of the chain that are not beyond the end.
-    template <class AnyEvents>
-    static Status find_events(S& stepper, lobatto_advance& call, AnyEvents& events, real end) {
+    template <class AnyWatch>
+    static Status look(S& stepper, lobatto_advance& call, AnyWatch& watch, real end) {
         const std::int64_t first = call.events_written;
         real* const rows = out(call.events);
-        const Status status = events.find(stepper, rows + first * AnyEvents::columns, call.events_written);
-        while (call.events_written > first &&
-               (rows[(call.events_written - 1) * AnyEvents::columns + 1] - end) * stepper.step_size > real(0))
-            --call.events_written;
-        return status;
+        const Status status = watch.look(stepper, rows + first * AnyWatch::columns, call.events_written);
+        const auto is_beyond = [&] {
+            return (rows[(call.events_written - 1) * AnyWatch::columns + 1] - end) * stepper.step_size > real(0);
+        };
+        const bool stops_beyond = status == Status::stopped && is_beyond();
+        while (call.events_written > first && is_beyond()) --call.events_written;
+        return stops_beyond ? Status::ok : status;
     }
     static void put_row(real time, const real* q, const real* p, lobatto_advance& call) {
         real* const row = next_row(call);
@@ -184,23 +198,23 @@ struct Export {
         }
     }
 
-    template <class AnyEvents>
-    static Status take_steps(S& stepper, lobatto_advance& call, AnyEvents* events) {
+    template <class AnyWatch>
+    static Status take_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
         if constexpr (is_clocked<K>())
-            return take_intervals(stepper, call, events);
+            return take_intervals(stepper, call, watch);
         else
-            return take_equal_steps(stepper, call, events);
+            return take_equal_steps(stepper, call, watch);
     }
-    template <class AnyEvents>
-    static Status take_equal_steps(S& stepper, lobatto_advance& call, AnyEvents* events) {
-        constexpr bool has_events = !std::is_same_v<AnyEvents, NoEvents>;
+    template <class AnyWatch>
+    static Status take_equal_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
+        constexpr bool is_watched = !std::is_same_v<AnyWatch, NoWatch>;
         stepper.tolerance = static_cast<real>(call.tolerance);
         std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
         for (std::int64_t i = 0; i < call.steps; ++i) {
             if (until_record == 1 && call.records_written + call.dense >= call.capacity) break;
-            if constexpr (has_events) {
-                if (call.events_written + AnyEvents::most > call.event_capacity) break;
-                events->keep(stepper);
+            if constexpr (is_watched) {
+                if (call.events != nullptr && call.events_written + AnyWatch::most > call.event_capacity) break;
+                watch->keep(stepper);
             }
             const Status status = stepper.step();
             if (status != Status::ok) {
@@ -209,10 +223,13 @@ struct Export {
             }
             ++call.steps_done;
             count(stepper, call);
-            if constexpr (has_events) {
-                real* const rows = out(call.events) + call.events_written * AnyEvents::columns;
-                const Status found = events->find(stepper, rows, call.events_written);
-                if (found != Status::ok) return found;
+            if constexpr (is_watched) {
+                real* const rows = call.events == nullptr ? nullptr : out(call.events);
+                const Status found = watch->look(stepper, rows, call.events_written);
+                if (found != Status::ok) {
+                    --call.steps_done;
+                    return found;
+                }
             }
             if (--until_record == 0) {
                 if constexpr (has_dense) {
@@ -340,7 +357,7 @@ struct Export {
     }
     static constexpr std::int32_t events_of_step() {
         if constexpr (event_count > 0)
-            return Events<K>::most;
+            return Watch<K>::most;
         else
             return 0;
     }
@@ -368,6 +385,8 @@ struct Export {
                                              has_tangent ? 1 : 0,
                                              has_dense ? 1 : 0,
                                              event_count,
+                                             is_whole ? stops_of<K>() : 0,
+                                             is_whole ? impacts_of<K>() : 0,
                                              events_of_step(),
                                              sizeof(S),
                                              alignof(S),
@@ -398,9 +417,10 @@ struct Export {
                                              K::has_energy ? E::energy : nullptr};
 };
 
-// With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster.
+// With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster, and where
+// none ends before the others or meets a wall.
 #ifdef LOBATTO_ENSEMBLES
-template <class K, int lanes = ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+template <class K, int lanes = stops_of<K>() + impacts_of<K>() > 0 ? 0 : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportEnsemble<K, lanes>>, Export<K>>;
 #else
 template <class K>

@@ -34,6 +34,7 @@
 #include "steppers/ensemble.hpp"
 #include "steppers/events.hpp"
 #include "steppers/general.hpp"
+#include "steppers/impacts.hpp"
 #include "steppers/linear.hpp"
 #include "steppers/separable.hpp"
 #include "steppers/splitting.hpp"

@@ -66,7 +66,7 @@ struct Spread {
 struct EnsembleResult {
     bool interrupted = false;
     std::int64_t trajectories = 0;                                     // handed over: all, unless interrupted
-    std::array<std::int64_t, LOBATTO_OFF_CONSTRAINTS + 1> count_of{};  // of each lobatto_status
+    std::array<std::int64_t, LOBATTO_STATUSES> count_of{};  // of each lobatto_status
     std::int64_t steps_done = 0;                                       // of all trajectories
     std::int64_t iterations = 0;
     std::vector<Spread> q, p;  // at the end, n each

@@ -40,7 +40,7 @@ public:
     }
 
     // `between`: that many of every between + 1 rows lie between two steps.
-    void keep(const Parts& whole, std::int64_t count, int between) {
+    void keep(const Parts& whole, std::int64_t count, int between, bool is_stop = false) {
         const std::size_t columns = 1 + 2 * n_;
         energies_.resize(static_cast<std::size_t>(count) * parts_);
         for (std::size_t i = 0; i < static_cast<std::size_t>(count) && has_energy(); ++i) {
@@ -55,6 +55,7 @@ public:
         if (!has_energy()) result_.energy_error_final = result_.energy_error_largest = std::nan("");
         if (!request_.sink || count == 0) return;
         Records records{whole.data(), has_energy() ? energies_.data() : nullptr, count, static_cast<int>(columns)};
+        records.is_stop = is_stop;
         if (parts_ > 1) {
             rows_ = rounded(whole, parts_);
             rounded_energies_ = rounded(energies_, parts_);
@@ -150,6 +151,20 @@ void add(TrajectoryResult& result, const lobatto_advance& call) {
     result.increment_failed = call.increment_failed;
 }
 
+// The run ends at its last event: that row, without the number of the event.
+NumberStepper::Parts stop_at(const NumberStepper::Parts& events, std::size_t parts, std::size_t columns,
+                             TrajectoryResult& result) {
+    const auto begin = events.end() - static_cast<std::ptrdiff_t>(columns * parts);
+    const NumberStepper::Parts row(begin, events.end());
+    const std::vector<double> state = rounded(row, parts);
+    const auto middle = state.begin() + 1 + std::ssize(result.q);
+    result.stop = static_cast<int>(*(begin - static_cast<std::ptrdiff_t>(parts)));
+    result.time = state[0];
+    result.q.assign(state.begin() + 1, middle);
+    result.p.assign(middle, state.end());
+    return row;
+}
+
 constexpr int most_halvings = 14;    // of a step that could not be taken
 constexpr double same_place = 0.01;  // of the way
 
@@ -231,6 +246,11 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
                             static_cast<int>(parts)});
         }
         keeper.keep(records, call.records_written, request.dense);
+        if (result.status == LOBATTO_STOPPED) {
+            result.status = LOBATTO_OK;
+            keeper.keep(stop_at(events, parts, columns, result), 1, 0, true);
+            return result;
+        }
 
         // The clock ticks coarsely against a short block: grow at most eightfold at a time.
         const double pace = block_seconds / std::max(seconds, block_seconds / 8);
@@ -283,6 +303,8 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
     std::string why, advice;
     switch (result.status) {
         case LOBATTO_OK:
+        case LOBATTO_STOPPED:
+        case LOBATTO_STATUSES:
             return {};
         case LOBATTO_NOT_CONVERGED:
             why = fmt::format(
@@ -332,6 +354,15 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
         case LOBATTO_OFF_CONSTRAINTS:
             why = "the start does not keep the constraints: its positions or its momenta are off";
             advice = "positions and velocities that keep them, or assemble = true under [run] of the scene";
+            break;
+        case LOBATTO_IMPACTS_ACCUMULATE:
+            why =
+                "impacts accumulate within this step, more than 100 of them or nearer to one another than can be told "
+                "apart: the motion comes to rest on a wall, or slides along it, and walls throw back only";
+            advice =
+                "an end before that time, a stop under [run] where the motion has become slow, a larger restitution, "
+                "or " +
+                smaller + " where many impacts belong into a step";
             break;
         case LOBATTO_TIME_STANDS_STILL:
             if (request.arrivals.interval != 0) {

@@ -24,6 +24,7 @@ struct Records {
     const double* whole = nullptr;        // count x columns x parts; null: `rows` has all digits
     const double* whole_energy = nullptr;
     int parts = 1;
+    bool is_stop = false;  // the one row is where a stop ended the run, between two steps
 };
 
 // Where event functions vanished: rows of event number, t, q[n], p[n], in the order of the motion.
@@ -49,6 +50,7 @@ struct TrajectoryResult {
     std::vector<double> q, p;         // the last good state
     double seconds = 0;               // of processor time inside the kernel
     std::int64_t events = 0;          // found
+    int stop = -1;                    // the number of the event that ended the run; -1: it went to its end
     double energy_start = 0;          // not a number when the kernel has no energy, and the errors with it
     double energy_error_largest = 0;  // max over the kept states at steps |H - H(0)|, absolute; H in double, so about
                                       // |H| 2^-53 of it is rounding

@@ -7,7 +7,10 @@
 //   linear       the second derivatives are constant, so that one correction solves a step
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
 //   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
-//                for falling, 0 for both
+//                for falling, 0 for both. Where there are any: the last `impacts` of them are walls, the `stops` before
+//                these end the motion. impact(k, q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of
+//                each wall; where reset_of[] is not below 0, reset(k, q, velocity, q1, velocity1) gives the state after
+//                that one of the `resets`
 // Form::linear_map and Form::separable: is_explicit; of splitting methods they have c, b and drift_length[s - 1], the
 //   way between nodes, and neither A nor E nor what orders unknowns.
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), minus_acceleration(k, q, W),
@@ -47,7 +50,9 @@ enum class Status : std::int32_t {
     singular_mass = 4,
     time_stands_still = 5,
     unsupported = 6,
-    off_constraints = 9
+    off_constraints = 9,
+    stopped = 11,
+    impacts_accumulate = 12
 };
 
 // The same values as lobatto_form in abi.h.
@@ -73,6 +78,8 @@ struct Formulas {
     LOBATTO_WITH_TIME(legendre)
     LOBATTO_WITH_TIME(momentum)  // of Form::general
     LOBATTO_WITH_TIME(event)
+    LOBATTO_WITH_TIME(impact)
+    LOBATTO_WITH_TIME(reset)
     LOBATTO_WITH_TIME(energy)
     LOBATTO_WITH_TIME(clock)
     LOBATTO_WITH_TIME(constraint)

@@ -5,6 +5,9 @@
 // is sampled at twice as many pieces as the step has nodes, and between samples where |g| is least. What decides is
 // not the polynomial, of lower order than the steps, but g at the end of a step of the same method from the same
 // start, shortened to theta h: the signs, and the root between them.
+//
+// The last functions may be those of walls (impacts.hpp): the motion is on their one side until it meets them, and
+// values that are rounding there are zero.
 #ifndef LOBATTO_KERNEL_EVENTS_HPP
 #define LOBATTO_KERNEL_EVENTS_HPP
 
@@ -38,6 +41,22 @@ struct Between {
     }
 };
 
+// The functions at the end of those that are watched: of walls, and before them of stops.
+template <class K>
+constexpr int impacts_of() {
+    if constexpr (K::events > 0)
+        return K::impacts;
+    else
+        return 0;
+}
+template <class K>
+constexpr int stops_of() {
+    if constexpr (K::events > 0)
+        return K::stops;
+    else
+        return 0;
+}
+
 // A stepper that knows its parameters, for steps of other lengths.
 template <class K>
 struct WatchedStepper : Stepper<K> {
@@ -53,6 +72,7 @@ struct Events {
     static constexpr int room = grid_size + pieces;  // samples of one function
     static constexpr int columns = 1 + Between<K>::columns;
     static constexpr int most = K::events * room;  // rows of one step
+    static constexpr int walls = impacts_of<K>(), first_wall = K::events - walls;
     static constexpr real rounding = real(2) * Limits<real>::epsilon;
 
     struct Sample {
@@ -72,11 +92,12 @@ struct Events {
         stepper.momentum(p);
     }
 
-    // Adds rows of event number, t, q[n], p[n] of the step taken since keep, in the order of the motion. Where a
-    // shortened step fails, its status.
-    Status find(S& stepper, real* rows, std::int64_t& count) {
+    // What happened with functions `first` ... `last` - 1 until theta in the step taken since keep: `found` places in
+    // the order of the motion, each with its number. Where a shortened step fails, its status.
+    Status find(S& stepper, int first, int last, real until) {
         step = &stepper;
         status = Status::ok;
+        found = 0;
         for (int i = 0; i < grid_size; ++i) {
             grid[i] = i == 0               ? real(0)
                       : i == 1             ? real(1) / real(1024 * pieces)
@@ -84,18 +105,27 @@ struct Events {
                                            : real(i == grid_size - 1 ? pieces : i - 1) / real(pieces);
             on_polynomial(grid[i], grid_values[i]);
         }
-        int found = 0;
-        for (int e = 0; e < K::events && status == Status::ok; ++e) find_events(e, rows, found);
-        if (status == Status::ok) count += found;
+        for (int e = first; e < last && status == Status::ok; ++e) find_events(e, until);
         return status;
     }
+
+    // t, q, p at t + theta h, by a step of that length.
+    Status state(real theta, real* row) {
+        state_at(theta, row);
+        return status;
+    }
+
+    int found{};           // places of the last find:
+    real thetas[most]{};   // where
+    int numbers[most]{};   // of which function
+    real slack[walls > 0 ? walls : 1]{};  // of each wall: up to here its function is zero, but for rounding
 
 private:
     S* step{};
     S* partial;  // the shortened step
     Status status{};
     real time{}, q[n]{}, p[n]{};
-    real grid[grid_size]{}, grid_values[grid_size][K::events]{}, thetas[most]{};
+    real grid[grid_size]{}, grid_values[grid_size][K::events]{};
     Sample samples[room]{};
     int sample_count{};
 
@@ -163,9 +193,16 @@ private:
         if (!sample.is_exact) sample = {sample.theta, exactly(sample.theta, e), true};
     }
 
-    void find_events(int e, real* rows, int& found) {
+    static constexpr bool is_wall(int e) { return e >= first_wall; }
+    // The sign of a wall's function where the motion may be.
+    static real side(int e) { return real(-K::event_direction[e]); }
+
+    void find_events(int e, real until) {
         sample_count = grid_size;
         for (int i = 0; i < grid_size; ++i) samples[i] = {grid[i], grid_values[i][e], false};
+        if constexpr (walls > 0) {
+            if (is_wall(e) && !begin_at_wall(e)) return;
+        }
         const auto exact = [&](real theta) { return exactly(theta, e); };
         const auto polynomial = [&](real theta) { return on_polynomial(theta, e); };
         reach_undefined(false, polynomial);
@@ -174,7 +211,27 @@ private:
         make_exact(samples[sample_count - 1], e);
         decide_signs(e);
         reach_undefined(true, exact);  // where the motion, not only its polynomial, leaves the domain of g
-        walk(e, rows, found);
+        walk(e, until);
+    }
+
+    // Where the step begins at the wall, a sample on the way that it takes before it comes back. False: it stays there.
+    bool begin_at_wall(int e) {
+        const real least = slack[e - first_wall];
+        step->event_values[e] = side(e);
+        make_exact(samples[0], e);
+        if (!(fabs(samples[0].value) <= least)) return true;
+        samples[0].value = real(0);
+        bool stays = true;
+        for (int i = 1; i < sample_count; ++i) stays = stays && fabs(samples[i].value) <= least;
+        if (stays) return false;
+        make_exact(samples[1], e);
+        for (real theta = samples[1].theta; !(samples[1].value * side(e) > least) && theta > rounding;) {
+            theta *= real(0.5);
+            const Sample there{theta, exactly(theta, e), true};
+            if (status != Status::ok) return true;
+            if (there.value * side(e) > least) insert(1, there);
+        }
+        return true;
     }
 
     // From a sample where g is defined towards a place where it is not: the last sample before its domain ends, or one
@@ -263,6 +320,9 @@ private:
         }
     }
 
+    bool is_zero(const Sample& sample, int e) {
+        return is_wall(e) ? fabs(sample.value) <= slack[e - first_wall] : is_rounding(sample, e);
+    }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number.
     bool is_rounding(const Sample& sample, int e) {
         real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
@@ -287,7 +347,7 @@ private:
 
     // The changes of sign along the samples. A zero at a sample, or what is rounding there, is one if the sign beyond
     // it is another: else g only touches zero. Where g is not defined in between, nothing has happened.
-    void walk(int e, real* rows, int& found) {
+    void walk(int e, real until) {
         real& last = step->event_values[e];  // that is not zero
         int zero = -1, before = -1;          // samples: the first zero since the one before, which has the sign of last
         for (int i = 0; i < sample_count && status == Status::ok; ++i) {
@@ -295,9 +355,9 @@ private:
             if (!is_finite(here.value)) {
                 last = real(0);
                 zero = before = -1;
-            } else if (here.value == real(0) || is_rounding(here, e)) {
+            } else if (here.value == real(0) || is_zero(here, e)) {
                 if (zero < 0) zero = i;
-                if (i == 0 && step->steps == 1) last = real(0);  // the motion starts there
+                if (i == 0 && step->steps == 1 && !is_wall(e)) last = real(0);  // the motion starts there
             } else {
                 if (changes(last, here.value)) {
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
@@ -309,7 +369,7 @@ private:
                                           : changes(samples[from].value, here.value)
                                               ? locate(e, samples[from], here, is_root)
                                               : samples[from].theta;
-                        if (is_root) add(e, root, rows, found);
+                        if (is_root && root <= until) add(e, root);
                     }
                 }
                 last = here.value;
@@ -353,15 +413,14 @@ private:
         return nearest.theta;
     }
 
-    void add(int e, real root, real* rows, int& found) {
+    void add(int e, real root) {
         int place = found++;
         for (; place > 0 && thetas[place - 1] > root; --place) {
             thetas[place] = thetas[place - 1];
-            for (int k = 0; k < columns; ++k) rows[place * columns + k] = rows[(place - 1) * columns + k];
+            numbers[place] = numbers[place - 1];
         }
         thetas[place] = root;
-        rows[place * columns] = real(e);
-        state_at(root, rows + place * columns + 1);
+        numbers[place] = e;
     }
 };
 

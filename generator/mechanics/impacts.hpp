@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What impacts ask of a system, and what cannot be had with them, said in one place.
+#pragma once
+
+#include "generator/mechanics/system.hpp"
+
+namespace lobatto {
+
+// InputError unless momenta are affine in velocities, so that an impulse changes velocities by M^-1 of it (D52), and the
+// scene starts on the right side of its walls.
+void check_impacts(const Scene& scene, const System& system);
+
+// InputError where a scene with impacts is given to what knows none: "lobatto stability".
+void refuse_impacts(const Scene& scene, const std::string& what);
+
+}  // namespace lobatto

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+// What is looked for in each step: events, impacts, and where the motion is to stop.
+//
+// A wall is g(t, q) = 0, and the motion is on one side of it. A step that meets it is cut there, at the end of a step
+// of the same method; the momentum jumps along dg/dq (D52), and a step of the rest of h leads back to the times of the
+// run. So a step with impacts is one from t to t + h like any other, and of the method's order. (R. C. Fetecau, J. E.
+// Marsden, M. Ortiz, M. West 2003.)
+#ifndef LOBATTO_KERNEL_IMPACTS_HPP
+#define LOBATTO_KERNEL_IMPACTS_HPP
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "events.hpp"
+
+namespace lobatto {
+
+// At a state: the walls of K, what they are there, and what they do.
+template <class K>
+struct Walls {
+    using real = typename K::real;
+    using S = Stepper<K>;
+    static constexpr int n = K::coordinates, count = K::impacts, first = K::events - count;
+    static constexpr real few = real(64) * Limits<real>::epsilon;
+
+    real time{}, q[n]{}, p[n]{}, velocity[n]{};
+    real value[K::events]{};                       // of all that is watched
+    real gradient[count * n]{}, rate[count]{};     // dg/dq, and dg/dt at fixed q
+    real restitution[count]{};
+    real slack[count]{};       // g as small as this is zero
+    real approach[count]{};    // dg/dt along the motion, where it is above rounding; below 0: towards the wall
+
+    // Everything at (t, q, p); h: of the steps.
+    Status look(const S& stepper, real t, const real* position, const real* momentum) {
+        time = t;
+        for (int k = 0; k < n; ++k) {
+            q[k] = position[k];
+            p[k] = momentum[k];
+        }
+        const Status status = stepper.velocity(time, q, p, velocity);
+        if (status != Status::ok) return status;
+        const auto& k = stepper.coefficients;
+        Formulas<K>::event(k, time, static_cast<const real*>(q), static_cast<const real*>(velocity), +value);
+        Formulas<K>::impact(k, time, static_cast<const real*>(q), +gradient, +rate, +restitution);
+        for (int w = 0; w < count; ++w) {
+            real along = rate[w], speed = fabs(rate[w]), moved = fabs(rate[w] * stepper.step_size);
+            for (int c = 0; c < n; ++c) {
+                const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
+                along += slope * velocity[c];
+                speed += fabs(slope * velocity[c]);
+                moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+            }
+            slack[w] = few * moved;
+            approach[w] = fabs(along) <= few * speed ? real(0) : along * side(w);
+        }
+        return Status::ok;
+    }
+
+    // The sign of g where the motion may be.
+    static real side(int w) { return real(-K::event_direction[first + w]); }
+    bool is_behind(int w) const { return value[first + w] * side(w) < -slack[w]; }
+    bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
+
+    // (D52) What wall w does to the momentum.
+    Status hit(const S& stepper, int w) {
+        if (K::reset_of[w] >= 0) return reset(stepper, K::reset_of[w]);
+        const real* const G = gradient + w * n;
+        real still[n] = {}, rest[n], pushed[n], without[n], with[n];
+        stepper.momentum(time, q, still, rest);
+        for (int c = 0; c < n; ++c) pushed[c] = rest[c] + G[c];
+        Status status = stepper.velocity(time, q, rest, without);
+        if (status == Status::ok) status = stepper.velocity(time, q, pushed, with);
+        if (status != Status::ok) return status;
+        real mobility = real(0);
+        for (int c = 0; c < n; ++c) mobility += G[c] * (with[c] - without[c]);
+        const real impulse = -(real(1) + restitution[w]) * approach[w] * side(w) / mobility;
+        if (!is_finite(impulse)) return Status::not_finite;
+        if constexpr (constraints_of<K>() > 0) {
+            for (int c = 0; c < n; ++c) velocity[c] += impulse * (with[c] - without[c]);
+            stepper.momentum(time, q, velocity, p);
+        } else {
+            for (int c = 0; c < n; ++c) p[c] += impulse * G[c];
+        }
+        return look(stepper, time, q, p);
+    }
+
+    // Positions and velocities as the scene gives them.
+    Status reset(const S& stepper, int r) {
+        if constexpr (K::resets > 0) {
+            real positions[K::resets * n], velocities[K::resets * n];
+            Formulas<K>::reset(stepper.coefficients, time, static_cast<const real*>(q),
+                               static_cast<const real*>(velocity), +positions, +velocities);
+            stepper.momentum(time, positions + r * n, velocities + r * n, p);
+            return look(stepper, time, positions + r * n, static_cast<const real*>(p));
+        }
+        (void)stepper, (void)r;
+        return Status::unsupported;
+    }
+};
+
+// Looks at each step of one stepper: keep before it, look after it.
+template <class K>
+class Watch {
+public:
+    using real = typename K::real;
+    using S = WatchedStepper<K>;
+    static constexpr int n = K::coordinates, columns = Events<K>::columns;
+    static constexpr int walls = impacts_of<K>(), first_wall = K::events - walls, stops = stops_of<K>();
+    static constexpr int most_impacts = walls > 0 ? 100 : 0;  // in one step
+    static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
+
+    explicit Watch(const S& stepper) : events(stepper), rest(walls > 0 ? new S(stepper) : nullptr) {}
+    Watch(const Watch&) = delete;
+    Watch& operator=(const Watch&) = delete;
+    ~Watch() { delete rest; }
+
+    void keep(const S& stepper) {
+        events.keep(stepper);
+        if constexpr (walls > 0) {
+            time = stepper.time();
+            for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
+            stepper.momentum(p);
+        }
+    }
+
+    // Adds rows of event number, t, q[n], p[n] of the step taken since keep, in the order of the motion; of an impact
+    // the state after it. Without rows none are sought, and the motion does not stop. Status::stopped: the last row
+    // says where and why. Where walls fail, the stepper is where it was before the step.
+    Status look(S& stepper, real* rows, std::int64_t& count) {
+        if constexpr (walls > 0) {
+            const Status status = look_with_walls(stepper, rows, count);
+            if (status != Status::ok) go_back(stepper);
+            return status;
+        } else {
+            return rows == nullptr ? Status::ok : find(stepper, real(1), rows, count);
+        }
+    }
+
+private:
+    Events<K> events;
+    S* rest;  // the steps from an impact to the end
+    real time{}, q[n]{}, p[n]{};
+    int impacts{};  // of this step
+
+    // Events and stops until theta.
+    Status find(S& stepper, real until, real* rows, std::int64_t& count) {
+        Status status = events.find(stepper, 0, first_wall, until);
+        for (int i = 0; i < events.found && status == Status::ok; ++i) {
+            real* const row = rows + count * columns;
+            row[0] = real(events.numbers[i]);
+            status = events.state(events.thetas[i], row + 1);
+            if (status != Status::ok) break;
+            ++count;
+            if (events.numbers[i] >= first_wall - stops) return Status::stopped;
+        }
+        return status;
+    }
+
+    void go_back(S& stepper) { put(stepper, q, p, stepper.steps - 1); }
+    // A state at one of the stepper's own times.
+    static void put(S& stepper, const real* position, const real* momentum, std::int64_t steps) {
+        const real start = stepper.start_time;
+        stepper.steps = steps;
+        stepper.start(stepper.time(), position, momentum);
+        stepper.start_time = start;
+        stepper.steps = steps;
+    }
+
+    Status look_with_walls(S& stepper, real* rows, std::int64_t& count) {
+        const real end = stepper.time();
+        Walls<K> wall;
+        Status status = wall.look(stepper, time, q, p);
+        S* step = &stepper;
+        impacts = 0;
+        while (status == Status::ok) {
+            for (int w = 0; w < walls; ++w) events.slack[w] = wall.slack[w];
+            status = events.find(*step, first_wall, K::events, real(1));
+            if (status != Status::ok) break;
+            const bool is_hit = events.found > 0;
+            const real theta = is_hit ? events.thetas[0] : real(1);
+            const int number = is_hit ? events.numbers[0] : -1;
+            if (rows != nullptr) {
+                status = find(*step, theta, rows, count);
+                if (status != Status::ok) break;
+            }
+            if (!is_hit) break;
+            real row[1 + 2 * n];
+            status = events.state(theta, row);
+            if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
+            if (status == Status::ok) status = meet(stepper, wall, number - first_wall, rows, count);
+            if (status != Status::ok) break;
+            const real left = end - wall.time;
+            step = rest;
+            if (!(left * stepper.step_size > real(0)) || wall.time + left == wall.time) {
+                put(stepper, wall.q, wall.p, stepper.steps);
+                return Status::ok;
+            }
+            status = take_rest(stepper, wall, left);
+        }
+        if (status == Status::ok && step == rest) finish(stepper);
+        return status;
+    }
+
+    // All walls that are met there, one after another, until none is.
+    Status meet(const S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
+        for (bool is_first = true;; is_first = false) {
+            int met = is_first && K::reset_of[first] >= 0 ? first : -1;
+            for (int w = 0; w < walls && met < 0; ++w)
+                if (wall.is_met(w) || (is_first && w == first && wall.approach[w] < real(0))) met = w;
+            if (met < 0) return is_first ? Status::impacts_accumulate : Status::ok;
+            if (++impacts > most_impacts) return Status::impacts_accumulate;
+            const Status status = wall.hit(stepper, met);
+            if (status != Status::ok) return status;
+            if (rows == nullptr) continue;
+            real* const row = rows + count++ * columns;
+            row[0] = real(first_wall + met);
+            row[1] = wall.time;
+            for (int k = 0; k < n; ++k) {
+                row[2 + k] = wall.q[k];
+                row[2 + n + k] = wall.p[k];
+            }
+        }
+    }
+
+    Status take_rest(S& stepper, const Walls<K>& wall, real left) {
+        rest->parameters = stepper.parameters;
+        Status status = rest->prepare(stepper.parameters, left);
+        rest->tolerance = stepper.tolerance;
+        if (status == Status::ok) status = rest->start(wall.time, wall.q, wall.p);
+        events.keep(*rest);
+        if (status == Status::ok) status = rest->step();
+        if constexpr (S::N > 0) stepper.iterations += rest->iterations;
+        return status;
+    }
+
+    void finish(S& stepper) {
+        real momentum[n];
+        rest->momentum(momentum);
+        put(stepper, rest->q, momentum, stepper.steps);
+        for (int e = 0; e < K::events; ++e) stepper.event_values[e] = rest->event_values[e];
+    }
+};
+
+}  // namespace lobatto
+
+#endif
