@@ -83,6 +83,8 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
     companion.steps = steps / every * taken;
     companion.every = taken / looks;
     companion.counts = nullptr;
+    companion.stops = false;
+    companion.reducer = nullptr;
     companion.progress = nullptr;
     companion.sink = [&](const EnsembleTrajectory& trajectory) {
         Known& known = known_[static_cast<std::size_t>(trajectory.index)];
@@ -142,10 +144,12 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     request.every = request_.every == 0 ? request_.steps : request_.every;
     request.tolerance = request_.tolerance;
     Companion companion(derivation_, kernel_, request);
-    companion.observe(trajectory.kept);
+    Records kept = trajectory.kept;
+    if (trajectory.stop >= 0) --kept.count;  // where it was stopped, between two steps
+    companion.observe(kept);
     TrajectoryResult result;
-    result.steps_done = request_.steps;
-    result.time = request_.time + static_cast<double>(request_.steps) * request_.step;
+    result.steps_done = trajectory.steps_done;
+    result.time = time_after(request_, trajectory.steps_done);
     const std::optional<MeasuredError> error = companion.finish(result);
     if (!error || error->companion_stopped) return {unknown, true};
     return {error->end, error->is_lost()};
@@ -163,15 +167,18 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const std::int64_t place = trajectory.index - first_;
     if (place >= std::ssize(known_)) return {unknown, false};  // interrupted
     Known& known = known_[static_cast<std::size_t>(place)];
-    if (known.status != LOBATTO_OK) return {unknown, true};
     const std::size_t n = groups_.size();
     const Records& kept = trajectory.kept;
+    const std::int64_t compared = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n);
+    const bool is_stopped = trajectory.stop >= 0;
+    // Of a trajectory that was stopped: the start, and where it was stopped, between two steps.
+    const std::int64_t comparisons = is_stopped ? std::max<std::int64_t>(kept.count - 2, 0) : compared,
+                       skipped = is_stopped ? 1 : kept.count - comparisons;
+    if (known.status != LOBATTO_OK && !(is_stopped && comparisons < compared)) return {unknown, true};
     for (std::int64_t i = 0; i < kept.count; ++i)
         widen_to(known.least, known.most, kept.rows + i * kept.columns + 1, 2 * n);
     const std::vector<double> amplitude = amplitudes_of(known.least, known.most, groups_);
-    const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
-                       comparisons = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n),
-                       skipped = kept.count - comparisons;  // the start, if it is kept
+    const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
                              : static_cast<double>(steps_taken(every)) / static_cast<double>(every),

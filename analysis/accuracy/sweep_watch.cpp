@@ -49,7 +49,7 @@ bool SweepWatch::departs(const EnsembleTrajectory& trajectory) {
     const double* const middle = row + 1 + start_.q.size();
     const double kinetic = std::max(kinetic_energy(stepper_, request_.time, start_.q, p_),
                                     kinetic_energy(stepper_, row[0], {row + 1, middle}, {middle, middle + p_.size()}));
-    return !(trajectory.energy_error_largest < doubtful * kinetic) && run_again();
+    return !(trajectory.energy_error_largest < doubtful * kinetic) && run_again(trajectory);
 }
 
 bool SweepWatch::prepare(const EnsembleTrajectory& trajectory) {
@@ -90,7 +90,7 @@ std::string SweepWatch::warning() const {
         trajectory_, radians_, limit, limit / radians_);
 }
 
-bool SweepWatch::run_again() {
+bool SweepWatch::run_again(const EnsembleTrajectory& trajectory) {
     if (!alone_) {
         try {
             alone_ = kernel_of(source_, Precision::double_);
@@ -105,7 +105,7 @@ bool SweepWatch::run_again() {
     again.time = request_.time;
     again.step = request_.step;
     again.tolerance = request_.tolerance;
-    again.steps = request_.steps;
+    again.steps = trajectory.steps_done;
     again.interrupted = request_.interrupted;
     EnergyWatch watch(derivation_, *alone_);
     again.sink = [&](const Records& records) { watch.observe(records); };

@@ -30,7 +30,7 @@ public:
     std::string warning() const;
 
 private:
-    bool run_again();
+    bool run_again(const EnsembleTrajectory& trajectory);
     bool prepare(const EnsembleTrajectory& trajectory);
 
     const Derivation& derivation_;

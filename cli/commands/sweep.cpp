@@ -14,6 +14,7 @@
 #include "analysis/accuracy/sweep_watch.hpp"
 #include "analysis/kernel_of.hpp"
 #include "analysis/motion.hpp"
+#include "analysis/reductions.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
@@ -47,12 +48,15 @@ const char* const reason[] = {"reached the end",
                               "energy off: beyond stability, or past a singularity",
                               "not resolved: the error is as large as the motion",
                               "start off the constraints",
-                              "a formula has no value there"};
+                              "a formula has no value there",
+                              "stopped",
+                              "impacts accumulate"};
 constexpr int departed = 7, unresolved = 8, undefined = 10;
 
 struct SweepOptions {
     std::string scene;
     std::vector<std::string> vary;
+    std::vector<std::string> keep;
     std::string output;  // empty: out/NAME.sweep.csv
     std::string format;  // empty: told by the name of the output
     MethodOption method;
@@ -88,6 +92,13 @@ SweepTable::Format format_of(const SweepOptions& options) {
     return options.format == "csv" ? SweepTable::Format::csv : SweepTable::Format::npy;
 }
 
+// A comma would end the column.
+std::string name_of_column(std::string text) {
+    std::erase(text, '"');
+    std::replace(text.begin(), text.end(), ',', ';');
+    return text;
+}
+
 // Initial values are written q(0), as other columns hold q at the time t. A name of the scene keeps its column; ours
 // gives way to it, as in steps_.
 std::vector<Column> columns_of(const Scene& scene, const Grid& grid, bool measures) {
@@ -111,7 +122,13 @@ std::vector<Column> columns_of(const Scene& scene, const Grid& grid, bool measur
     }
     own("status", true);
     own("steps", true);
+    if (!scene.run.stops.empty()) own("stop", true);
     columns.push_back({"t", ""});
+    for (const Kept& kept : scene.outputs.kept) columns.push_back({name_of_column(kept.text), ""});
+    if (!scene.outputs.kept.empty()) {
+        if (measures) own("error", false);
+        return columns;
+    }
     for (const Coordinate& coordinate : scene.coordinates) columns.push_back({coordinate.name, coordinate.unit});
     if (scene.outputs.momenta)
         for (const Coordinate& coordinate : scene.coordinates) columns.push_back({"p_" + coordinate.name, ""});
@@ -135,8 +152,10 @@ std::vector<std::string> comments_of(const Scene& scene, const KernelSource& sou
     }
     if (!parameters.empty()) comments.push_back(fmt::format("parameters: {}", fmt::join(parameters, ", ")));
     for (const Axis& axis : grid.axes()) comments.push_back(fmt::format("vary: {} = {}", axis.name, axis.written));
-    for (int status = 0; status <= undefined; ++status)
-        if (status != LOBATTO_UNSUPPORTED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
+    for (std::size_t i = 0; i < scene.run.stops.size(); ++i)
+        comments.push_back(fmt::format("stop {}: {}", i + 1, scene.run.stops[i].text));
+    for (int status = 0; status < LOBATTO_STATUSES; ++status)
+        if (status != LOBATTO_UNSUPPORTED && status != LOBATTO_STOPPED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
     comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
     return comments;
 }
@@ -219,6 +238,18 @@ void write(SweepTable& table, const Scene& scene, const Grid& grid, const Ensemb
         for (std::size_t a = 0; a < grid.axes().size(); ++a) table.add(grid.value(trajectory.index, a));
         table.add(static_cast<std::int64_t>(last ? verdict.status : LOBATTO_OK));
         table.add(last ? trajectory.steps_done : i * request.every);
+        if (const std::size_t stops = scene.run.stops.size(); stops > 0) {
+            const auto first = static_cast<std::int64_t>(scene.outputs.events.size()) - 1;
+            table.add(last && trajectory.stop >= 0 ? trajectory.stop - first : std::int64_t(0));
+        }
+        if (!scene.outputs.kept.empty()) {
+            table.add(kept.rows[i * kept.columns]);
+            for (std::size_t k = 0; k < scene.outputs.kept.size(); ++k)
+                table.add(k < trajectory.reduced->size() ? (*trajectory.reduced)[k] : std::nan(""));
+            if (verdict.measures) table.add(verdict.error);
+            table.end_row();
+            continue;
+        }
         for (int column = 0; column < numbers; ++column) table.add(kept.rows[i * kept.columns + column]);
         if (scene.outputs.energy) table.add(kept.energy[i] - trajectory.energy_start);
         if (verdict.measures) table.add(last ? verdict.error : std::nan(""));
@@ -379,11 +410,15 @@ EnsembleRequest request_of(const SweepOptions& options, const Scene& scene, cons
     request.arrivals.keeps_chain = false;
     request.every = looked_at(states_kept(options, scene), steps.count, options.unmeasured);
     request.threads = options.threads;
+    request.stops = !scene.run.stops.empty();
     return request;
 }
 
 void sweep(const SweepOptions& options) {
-    Scene scene = read_scene(options.scene);
+    Scene scene = read_scene(options.scene, options.keep);
+    if (!scene.outputs.kept.empty() && options.overrides.every)
+        throw InputError("--every: what is kept of a trajectory is one row; leave out --every, or --keep");
+    scene.outputs.watch_kept();
     options.method.apply(scene);
     MethodOption::require_double(scene, "sweep");
     const Scene as_written = scene;  // one kernel serves all values
@@ -395,14 +430,18 @@ void sweep(const SweepOptions& options) {
 
     Derivation derivation = derive(as_written);
     if (!options.overrides.set.empty()) check_domains(scene, derivation.system);
-    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
+    if (EnergyWatch::can_watch(derivation) || !scene.outputs.kept.empty()) derivation.scene.outputs.energy = true;
     const KernelSource source = emit(derivation);
     EnsembleRequest request = request_of(options, scene, grid, steps);
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
     // number of them changes what a trajectory becomes.
+    // Stops, impacts and what is kept are of single trajectories.
+    const bool is_alone = !scene.outputs.kept.empty() || !scene.run.stops.empty() || !scene.impacts.empty();
     const std::int64_t together = scene.coordinates.size() > 2 ? std::min<std::int64_t>(request.count, 8)
                                                                : request.count / thread_count(options.threads);
-    const Kernel kernel = ensemble_kernel_of(source, Precision::double_, together);
+    const Kernel kernel = is_alone ? kernel_of(source, Precision::double_)
+                                   : ensemble_kernel_of(source, Precision::double_, together);
+    if (!scene.outputs.kept.empty()) request.reducer = [&scene] { return std::make_unique<Reductions>(scene); };
     refuse_too_much(grid, kernel, request);
 
     const SweepTable::Format format = format_of(options);
@@ -474,6 +513,11 @@ void add_sweep(CommandLine& program) {
                 "Values of an initial position, velocity or momentum or of a parameter: NAME=FROM:TO:COUNT, both "
                 "ends included; NAME=FROM:TO:COUNT:log, in equal ratios; NAME=a,b,c. Repeated: all combinations")
         .required()
+        .one_value_each();
+    command
+        .option("--keep", options->keep,
+                "One row for each trajectory, of what is listed: first(EVENT), count(EVENT), max, min, mean or "
+                "last(FORMULA); in formulas also H and momenta p_x. Instead of [output] keep")
         .one_value_each();
     command.option("-o,--output", options->output, "Table (default: out/NAME.sweep.csv)");
     command

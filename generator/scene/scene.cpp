@@ -46,7 +46,7 @@ public:
                  "impacts", "method", "run", "output"}),
           system_(source, root_, scene_) {}
 
-    Scene run() {
+    Scene run(const std::vector<std::string>& kept) {
         scene_.source = source_;
         scene_.path = source_.path();
         scene_.name = identifier_of_file(source_.path());
@@ -59,6 +59,7 @@ public:
         scene_.conditions = system_.conditions();
         for (std::size_t i = of_motion; i < scene_.conditions.size(); ++i) scene_.conditions[i].of_motion = false;
         read_output();
+        system_.read_kept(kept);
         refuse_beside_impacts();
         system_.refuse_unused();
         return std::move(scene_);
@@ -229,7 +230,7 @@ private:
         const Entry* section = root_.find("output");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
-                          "[output]", {"every", "energy", "momenta", "multipliers", "tangent", "dense", "events"});
+                          "[output]", {"every", "energy", "momenta", "multipliers", "tangent", "dense", "events", "keep"});
         Outputs& outputs = scene_.outputs;
         const Entry* every = table.find("every");
         if (every != nullptr && scene_.clock) {
@@ -281,6 +282,14 @@ private:
 
 }  // namespace
 
+void Outputs::watch_kept() {
+    for (Kept& one : kept) {
+        if (one.of != Kept::Of::first && one.of != Kept::Of::count) continue;
+        one.event = events.size();
+        events.push_back(one.crossing);
+    }
+}
+
 std::vector<Event> Scene::watched() const {
     std::vector<Event> all = outputs.events;
     all.insert(all.end(), run.stops.begin(), run.stops.end());
@@ -316,12 +325,12 @@ Names parameter_names(const Scene& scene) {
     return names;
 }
 
-Scene read_scene(const std::string& path) {
-    return read_scene(Source::read(path));
+Scene read_scene(const std::string& path, const std::vector<std::string>& kept) {
+    return Reader(Source::read(path)).run(kept);
 }
 
 Scene read_scene(const Source& source) {
-    return Reader(source).run();
+    return Reader(source).run({});
 }
 
 }  // namespace lobatto

@@ -53,6 +53,16 @@ struct Run {
     std::vector<Event> stops;     // a run ends at the first of them
 };
 
+// What a sweep keeps of a trajectory: "first(b = pi)", "max(x^2 + y^2)" (analysis/reductions.hpp).
+struct Kept {
+    enum class Of { first, count, max, min, mean, last };
+    std::string text;       // as written, white space collapsed
+    Of of = Of::last;
+    Event crossing = {};    // first, count: of this event
+    std::size_t event = 0;  // its number, once it is watched
+    GiNaC::ex value = 0;    // else: in positions, velocities, time, parameters, and the two below
+};
+
 // What a kernel computes beside the motion itself; it has no code for anything else.
 struct Outputs {
     long every = 1;            // keep each state whose step index is a multiple of this
@@ -63,6 +73,11 @@ struct Outputs {
     bool tangent = true;       // the derivative of a step: its symplectic defect, monodromy
     int dense = 0;             // states between two steps, evenly spaced, from the step's own polynomial
     std::vector<Event> events;
+    std::vector<Kept> kept;                // by sweeps
+    GiNaC::symbol energy_of_kept{"H"};     // in their formulas: H, and p_x of the coordinates
+    std::vector<GiNaC::symbol> momenta_of_kept;
+
+    void watch_kept();  // makes the events of what is kept events of the kernel
 };
 
 // A clock: steps are equally long in a time tau with dt = g(q) dtau (generator/mechanics/clock.hpp).
@@ -139,7 +154,8 @@ struct Names;
 Names parameter_names(const Scene& scene);
 
 // Throws InputError: what, where, why, how to mend.
-Scene read_scene(const std::string& path);
+// `kept`: instead of [output] keep; an error names the option --keep.
+Scene read_scene(const std::string& path, const std::vector<std::string>& kept = {});
 Scene read_scene(const Source& source);
 
 }  // namespace lobatto

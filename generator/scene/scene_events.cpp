@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "generator/formula/real.hpp"
 #include "generator/formula/token.hpp"
@@ -11,6 +12,7 @@
 namespace lobatto {
 namespace {
 
+constexpr const char* no_energy_here = "events are of positions, velocities and the time, not of H and momenta";
 constexpr std::size_t longest_event = 1000, most_events = 100, most_impacts = 1000;
 
 }  // namespace
@@ -129,6 +131,105 @@ void SystemReader::read_reset(const Entry& entry, Impact& impact, const Scope& s
         (is_rate ? impact.reset_velocity : impact.reset_position)[k] =
             evaluate(source_, parse_formula(source_, formula_of(source_, line), scope), scope, indices).expression;
     }
+}
+
+namespace {
+
+// Part of a text.
+Text piece_of(const Text& text, std::size_t begin, std::size_t end) {
+    return {text.value.substr(begin, end - begin),
+            {text.at.begin() + static_cast<std::ptrdiff_t>(begin),
+             text.at.begin() + static_cast<std::ptrdiff_t>(end) + 1}};
+}
+
+// At its commas, but for those within brackets; without the blanks around.
+std::vector<Text> pieces_of(const Text& text) {
+    std::vector<Text> pieces;
+    std::size_t begin = 0;
+    int depth = 0;
+    for (std::size_t i = 0; i <= text.value.size(); ++i) {
+        const char c = i < text.value.size() ? text.value[i] : ',';
+        depth += c == '(' || c == '[' ? 1 : c == ')' || c == ']' ? -1 : 0;
+        if (c != ',' || (depth > 0 && i < text.value.size())) continue;
+        std::size_t end = i;
+        while (begin < end && std::isspace(static_cast<unsigned char>(text.value[begin]))) ++begin;
+        while (begin < end && std::isspace(static_cast<unsigned char>(text.value[end - 1]))) --end;
+        pieces.push_back(piece_of(text, begin, end));
+        begin = i + 1;
+    }
+    return pieces;
+}
+
+const std::vector<std::pair<std::string, Kept::Of>> reductions = {
+    {"first", Kept::Of::first}, {"count", Kept::Of::count}, {"max", Kept::Of::max},
+    {"min", Kept::Of::min},     {"mean", Kept::Of::mean},   {"last", Kept::Of::last}};
+
+}  // namespace
+
+void SystemReader::name_energy_and_momenta() {
+    const auto add = [&](const std::string& name, const GiNaC::symbol& symbol) {
+        if (names_.all.count(name) == 0) names_.add_parameter(name, {symbol});
+    };
+    add("H", scene_.outputs.energy_of_kept);
+    for (const Coordinate& coordinate : scene_.coordinates) {
+        scene_.outputs.momenta_of_kept.emplace_back("p_" + coordinate.name);
+        add("p_" + coordinate.name, scene_.outputs.momenta_of_kept.back());
+    }
+}
+
+void SystemReader::read_kept(const std::vector<std::string>& given) {
+    const Entry* section = root_.find("output");
+    const Entry* entry = nullptr;
+    if (section != nullptr)
+        for (const Entry& line : section->value.entries)
+            if (line.key == "keep") entry = &line;
+    if (entry == nullptr && given.empty()) return;
+    name_energy_and_momenta();
+    for (const std::string& option : given) {
+        const Source source("--keep", option);
+        Text text{option, {}};
+        for (int column = 1; std::ssize(text.at) <= std::ssize(option); ++column) text.at.push_back({1, column});
+        for (const Text& piece : pieces_of(text)) read_kept(source, piece);
+    }
+    if (!given.empty()) return;
+    if (entry->value.kind != Value::Kind::list)
+        fail(entry->value.at,
+             fmt::format("keep must be a list such as [\"first(x = 0)\", \"max(x)\"], not {}", entry->value.kind_name()));
+    for (const Value& item : entry->value.items) {
+        if (item.kind != Value::Kind::text)
+            fail(item.at, fmt::format("what is kept must be a text such as \"max(x)\", not {}", item.kind_name()));
+        read_kept(source_, item.text);
+    }
+}
+
+// first(b = pi), count(y = 0 rising), or max, min, mean, last of a formula.
+void SystemReader::read_kept(const Source& source, const Text& text) {
+    const std::size_t open = text.value.find('(');
+    const std::string name = text.value.substr(0, open == std::string::npos ? text.value.size() : open);
+    const auto found = std::find_if(reductions.begin(), reductions.end(),
+                                    [&](const auto& reduction) { return reduction.first == name; });
+    if (found == reductions.end() || open == std::string::npos || !text.value.ends_with(')'))
+        source.fail(text.at.front(),
+                    "what is kept of a trajectory is first(x = 0) or count(x = 0 rising) of an event, or max(x), "
+                    "min(x), mean(x), last(x) of a formula");
+    const Text inner = piece_of(text, open + 1, text.value.size() - 1);
+    Kept kept{collapsed(text.value), found->second};
+    if (kept.text.size() > longest_event)
+        source.fail(text.at.front(), fmt::format("{} bytes; at most {}", kept.text.size(), longest_event));
+    const Scope scope = scope_of("what is kept", true);
+    if (kept.of == Kept::Of::first || kept.of == Kept::Of::count) {
+        const EventSyntax crossing = parse_crossing(source, inner, scope);
+        const Operand value = evaluate(source, crossing.difference, scope);
+        kept.crossing = {collapsed(inner.value), value.expression, crossing.direction, text.at.front()};
+        if (!value.moves && !value.velocities)
+            source.fail(inner.at.front(), "this event never happens: it holds neither a coordinate nor the time");
+        for (const GiNaC::symbol& symbol : scene_.outputs.momenta_of_kept)
+            if (value.expression.has(symbol)) source.fail(inner.at.front(), no_energy_here);
+        if (value.expression.has(scene_.outputs.energy_of_kept)) source.fail(inner.at.front(), no_energy_here);
+    } else {
+        kept.value = evaluate(source, parse_formula(source, inner, scope), scope).expression;
+    }
+    scene_.outputs.kept.push_back(kept);
 }
 
 }  // namespace lobatto

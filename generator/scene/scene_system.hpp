@@ -36,6 +36,8 @@ public:
 
     // A list such as ["x = 0 rising"], or one of them.
     std::vector<Event> read_events(const Entry& entry, const std::string& key);
+    // [output] keep, or in its place what --keep gives.
+    void read_kept(const std::vector<std::string>& given);
 
 private:
     // The lines of [coordinates]: one coordinate, or an array of them.
@@ -74,6 +76,8 @@ private:
     void read_impact(const Entry& entry);
     void read_reset(const Entry& entry, Impact& impact, const Scope& scope, const std::vector<long>& indices);
     Event read_event(const Value& value, const std::string& key);
+    void name_energy_and_momenta();
+    void read_kept(const Source& source, const Text& text);
     const Group& group_of(const Subject& subject) const;
     void read_places();
     void read_initial_values();

@@ -420,7 +420,7 @@ struct Export {
 // With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster, and where
 // none ends before the others or meets a wall.
 #ifdef LOBATTO_ENSEMBLES
-template <class K, int lanes = stops_of<K>() + impacts_of<K>() > 0 ? 0 : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+template <class K, int lanes = (stops_of<K>() + impacts_of<K>() > 0) ? 0 : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportEnsemble<K, lanes>>, Export<K>>;
 #else
 template <class K>

@@ -20,6 +20,7 @@
 #include <thread>
 
 #include "runtime/error.hpp"
+#include "runtime/run/side_by_side.hpp"
 #include "runtime/run/timing.hpp"
 
 namespace lobatto {
@@ -32,99 +33,6 @@ constexpr std::int64_t rows_of_group = 4096;
 
 const double no_number = std::numeric_limits<double>::quiet_NaN();
 
-// Trajectories that take their steps together. All arrays are lane-major, status is one a lane (abi.h).
-class Trajectories {
-public:
-    virtual ~Trajectories() = default;
-    virtual int width() const = 0;
-    virtual void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) = 0;
-    virtual void start(double time, const std::vector<double>& q, const std::vector<double>& p,
-                       std::int32_t* status) = 0;
-    virtual void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status,
-                         std::int64_t* steps_done, std::int64_t* iterations) = 0;
-    virtual void state(std::vector<double>& q, std::vector<double>& p) = 0;
-    // Of (q, p), the start or the state just read; not numbers without one.
-    virtual void energy(const std::vector<double>& q, const std::vector<double>& p,
-                        std::vector<double>& energy) const = 0;
-};
-
-class SingleTrajectory : public Trajectories {
-public:
-    explicit SingleTrajectory(const Kernel& kernel) : stepper_(kernel) {}
-    int width() const override { return 1; }
-    void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) override {
-        *status = stepper_.prepare(parameters, step);
-    }
-    void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override {
-        time_ = time;
-        if (*status == LOBATTO_OK) *status = stepper_.start(time, q, p);
-    }
-    void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
-                 std::int64_t* iterations) override {
-        lobatto_advance call{};
-        call.tolerance = request.tolerance;
-        call.interval = request.arrivals.interval;
-        call.end = request.arrivals.end;
-        *steps_done = *iterations = 0;
-        do {  // a clock may need several calls for one arrival
-            call.steps = steps - *steps_done;
-            *status = stepper_.advance(call);
-            *steps_done += call.steps_done;
-            *iterations += call.iterations;
-        } while (*status == LOBATTO_OK && *steps_done < steps);
-    }
-    void state(std::vector<double>& q, std::vector<double>& p) override { stepper_.state(time_, q, p); }
-    void energy(const std::vector<double>& q, const std::vector<double>& p,
-                std::vector<double>& energy) const override {
-        const bool has_one =
-            stepper_.kernel()->has_energy != 0 && stepper_.energy(time_, q, p, energy[0]) == LOBATTO_OK;
-        if (!has_one) energy[0] = no_number;
-    }
-
-private:
-    LoadedStepper<double> stepper_;
-    double time_ = 0;
-};
-
-class LaneTrajectories : public Trajectories {
-public:
-    explicit LaneTrajectories(const Kernel& kernel)
-        : kernel_(kernel),
-          memory_(::operator new(static_cast<std::size_t>(kernel->ensemble_bytes), alignment(kernel)),
-                  Deleter{alignment(kernel)}) {}
-    int width() const override { return kernel_->lanes; }
-    void prepare(const std::vector<double>& parameters, double step, std::int32_t* status) override {
-        kernel_->ensemble_prepare(memory_.get(), parameters.data(), &step, status);
-    }
-    void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override {
-        kernel_->ensemble_start(memory_.get(), &time, q.data(), p.data(), status);
-    }
-    void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
-                 std::int64_t* iterations) override {
-        kernel_->ensemble_advance(memory_.get(), steps, request.tolerance, status, steps_done, iterations);
-    }
-    void state(std::vector<double>& q, std::vector<double>& p) override {
-        kernel_->ensemble_state(memory_.get(), q.data(), p.data());
-    }
-    void energy(const std::vector<double>&, const std::vector<double>&, std::vector<double>& energy) const override {
-        if (kernel_->ensemble_energy == nullptr)
-            std::fill(energy.begin(), energy.end(), no_number);
-        else
-            kernel_->ensemble_energy(memory_.get(), energy.data());
-    }
-
-private:
-    static std::align_val_t alignment(const Kernel& kernel) {
-        return std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)};
-    }
-    struct Deleter {
-        std::align_val_t alignment;
-        void operator()(void* memory) const { ::operator delete(memory, alignment); }
-    };
-    Kernel kernel_;
-    std::unique_ptr<void, Deleter> memory_;
-};
-
 // The most that a trajectory keeps.
 std::int64_t rows_kept(const EnsembleRequest& request) {
     return request.every == 0 ? 1 : request.steps / request.every + 2;
@@ -136,6 +44,10 @@ struct Ended {
     std::int64_t steps_done = 0, iterations = 0;
     std::vector<double> rows, energies;
     std::int64_t row_step = 0;  // steps before the last row
+    int stop = -1;              // of a trajectory that a stop ended: which
+    std::vector<double> reduced;
+
+    bool goes_on() const { return status == LOBATTO_OK && stop < 0; }
     double energy_start = 0, energy_error_largest = 0;
 };
 
@@ -174,7 +86,7 @@ public:
         if (kernel->lanes > 0)
             lanes_ = std::make_unique<LaneTrajectories>(kernel);
         else
-            lanes_ = std::make_unique<SingleTrajectory>(kernel);
+            lanes_ = std::make_unique<SingleTrajectory>(kernel, request);
         const auto width = static_cast<std::size_t>(lanes_->width());
         start_.parameters.resize(static_cast<std::size_t>(kernel->parameters));
         start_.q.resize(n_);
@@ -232,6 +144,8 @@ private:
             if (ended[lane].status != LOBATTO_OK) energy_[lane] = no_number;
             keep(lane, ended[lane]);
         }
+        reduces_ = request_.reducer && ended[0].status == LOBATTO_OK;
+        if (reduces_) lanes_->reduce(start_);
     }
 
     void keep(std::size_t lane, Ended& ended) const {
@@ -244,7 +158,7 @@ private:
             ended.rows.clear();
             ended.energies.clear();
         }
-        ended.rows.push_back(time_after(request_, ended.steps_done));
+        ended.rows.push_back(ended.stop >= 0 ? lanes_->stop_time() : time_after(request_, ended.steps_done));
         for (const std::vector<double>* numbers : {&q_, &p_}) {
             const auto begin = numbers->begin() + static_cast<std::ptrdiff_t>(lane * n_);
             ended.rows.insert(ended.rows.end(), begin, begin + static_cast<std::ptrdiff_t>(n_));
@@ -259,7 +173,7 @@ private:
     bool run_together(std::int64_t first, std::vector<Ended>& ended, double& seconds) {
         begin(first, ended);
         const auto active = [&] {
-            return std::any_of(ended.begin(), ended.end(), [](const Ended& e) { return e.status == LOBATTO_OK; });
+            return std::any_of(ended.begin(), ended.end(), [](const Ended& e) { return e.goes_on(); });
         };
         const auto side_by_side = static_cast<std::int64_t>(ended.size());
         std::int64_t done = 0;
@@ -281,6 +195,7 @@ private:
             shared_.steps_gone += (done - from) * side_by_side;
         }
         shared_.steps_gone += (request_.steps - done) * side_by_side;
+        if (reduces_) ended[0].reduced = lanes_->reduced();
         return true;
     }
 
@@ -296,12 +211,18 @@ private:
         }
         for (std::size_t lane = 0; lane < ended.size(); ++lane) {
             Ended& trajectory = ended[lane];
-            if (trajectory.status != LOBATTO_OK) continue;  // ended before
+            if (!trajectory.goes_on()) continue;  // ended before
             trajectory.status = static_cast<lobatto_status>(status_[lane]);
+            if (trajectory.status == LOBATTO_STOPPED) {
+                trajectory.status = LOBATTO_OK;
+                trajectory.stop = lanes_->stop();
+            }
             trajectory.steps_done += steps_done_[lane];
             trajectory.iterations += iterations_[lane];
             const bool failed = trajectory.status != LOBATTO_OK;
-            if (failed ? trajectory.steps_done > trajectory.row_step : kept_here) keep(lane, trajectory);
+            if (trajectory.stop >= 0)
+                keep(lane, trajectory);
+            else if (failed ? trajectory.steps_done > trajectory.row_step : kept_here) keep(lane, trajectory);
         }
     }
 
@@ -314,6 +235,7 @@ private:
     std::vector<double> parameters_, q_, p_, energy_;
     std::vector<std::int32_t> status_;
     std::vector<std::int64_t> steps_done_, iterations_;
+    bool reduces_ = false;  // the one trajectory
     std::int64_t chunk_ = 256;
 };
 
@@ -447,6 +369,8 @@ EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
     trajectory.status = ended.status;
     trajectory.steps_done = ended.steps_done;
     trajectory.iterations = ended.iterations;
+    trajectory.stop = ended.stop;
+    trajectory.reduced = &ended.reduced;
     const std::int64_t count = std::ssize(ended.energies);
     trajectory.kept = {ended.rows.data(), ended.energies.data(), count,
                        static_cast<int>(std::ssize(ended.rows) / count)};

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "runtime/build/library.hpp"
@@ -36,6 +37,19 @@ struct EnsembleTrajectory {
     double energy_start = 0;          // not a number when there is none, and the errors with it
     double energy_error_final = 0;    // H - H(0)
     double energy_error_largest = 0;  // max over the kept states |H - H(0)|
+    int stop = -1;                    // of a trajectory that a stop ended: the number of the event; its last state is
+                                      // that of the stop
+    const std::vector<double>* reduced = nullptr;  // what its reducer made of it
+};
+
+// Makes a few numbers of one trajectory after another, each from its first state to its last.
+class Reducer {
+public:
+    virtual ~Reducer() = default;
+    virtual void begin(const LoadedStepper<double>& stepper, const EnsembleStart& start) = 0;
+    virtual void observe(const double* rows, std::int64_t count) = 0;         // t, q, p of every step
+    virtual void observe_events(const double* rows, std::int64_t count) = 0;  // event number, t, q, p
+    virtual std::vector<double> values() const = 0;
 };
 
 struct EnsembleRequest {
@@ -49,6 +63,8 @@ struct EnsembleRequest {
     std::int64_t steps = 0;  // >= 0, of each trajectory; count * steps < 2^63
     Arrivals arrivals;       // of kernels with a clock
     std::int64_t every = 0;  // keep every such state; 0: the last one alone
+    bool stops = false;      // the kernel's stops end trajectories
+    std::function<std::unique_ptr<Reducer>()> reducer;  // one a thread; nothing: none. Of kernels without lanes
     int threads = 0;         // that compute; 0: as many as the machine runs at once
     // Whether a trajectory that reached the end counts in the statistics; nothing: all do. Called before the sink.
     std::function<bool(const EnsembleTrajectory&)> counts;

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What a sweep keeps of each trajectory instead of its states: the time of the first event, how many there were, the
+// largest, least, mean and last value of a formula. Formulas are looked at after every step, and where a stop ended it;
+// means are taken by the trapezoidal rule.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "analysis/accuracy/tape.hpp"
+#include "generator/scene/scene.hpp"
+#include "runtime/run/ensemble.hpp"
+
+namespace lobatto {
+
+class Reductions : public Reducer {
+public:
+    // InputError for a formula that cannot be evaluated. The scene outlives it.
+    explicit Reductions(const Scene& scene);
+
+    void begin(const LoadedStepper<double>& stepper, const EnsembleStart& start) override;
+    void observe(const double* rows, std::int64_t count) override;
+    void observe_events(const double* rows, std::int64_t count) override;
+    // One for each Outputs::kept; not a number: an event that did not happen.
+    std::vector<double> values() const override;
+
+private:
+    struct Part {
+        Kept::Of of;
+        std::size_t event;
+        std::optional<Tape> formula;
+        double value = 0, before = 0;
+    };
+    void look(Part& part, double value, double time) const;
+
+    std::vector<Part> parts_;
+    std::size_t n_;
+    bool needs_energy_ = false, needs_velocity_ = false;
+    const LoadedStepper<double>* stepper_ = nullptr;
+    std::vector<double> variables_;  // of the formulas: parameters, time, q, v, p, H
+    std::size_t parameters_;
+    double first_time_ = 0, last_time_ = 0;
+    bool has_begun_ = false;
+};
+
+}  // namespace lobatto
