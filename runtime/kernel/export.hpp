@@ -84,13 +84,14 @@ struct Export {
     static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
         const Status status = static_cast<S*>(stepper)->start(*in(time), in(q), in(p));
         if constexpr (is_whole && impacts_of<K>() > 0) {
-            if (status == Status::ok) return code(side_of_walls(of(stepper), *in(time), in(q), in(p)));
+            if (status == Status::ok) return code(side_of_walls(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
         }
         return code(status);
     }
     // Whether a state is where the motion may be.
-    static Status side_of_walls(const S& stepper, real time, const real* q, const real* p) {
+    static Status side_of_walls(S& stepper, real time, const real* q, const real* p) {
         Walls<K> wall;
+        for (real& scale : stepper.wall_scale) scale = real(0);
         const Status status = wall.look(stepper, time, q, p);
         for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
             if (wall.is_behind(w)) return Status::off_constraints;

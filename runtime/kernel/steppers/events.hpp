@@ -60,7 +60,9 @@ constexpr int stops_of() {
 // A stepper that knows its parameters, for steps of other lengths.
 template <class K>
 struct WatchedStepper : Stepper<K> {
+    using real = typename K::real;
     typename K::Parameters parameters{};
+    real wall_scale[impacts_of<K>() > 0 ? impacts_of<K>() : 1]{};  // the most that went into each wall's function so far
 };
 
 template <class K>
@@ -80,7 +82,15 @@ struct Events {
         bool is_exact;
     };
 
-    explicit Events(const S& stepper) : partial(new S(stepper)) {}
+    explicit Events(const S& stepper) : partial(new S(stepper)) {
+        for (int i = 0; i < grid_size; ++i) {
+            grid[i] = i == 0               ? real(0)
+                      : i == 1             ? real(1) / real(1024 * pieces)
+                      : i == grid_size - 2 ? real(1) - grid[1]
+                                           : real(i == grid_size - 1 ? pieces : i - 1) / real(pieces);
+            if constexpr (S::basis > 0) S::basis_at(grid[i], basis_value[i], basis_slope[i]);
+        }
+    }
     Events(const Events&) = delete;
     Events& operator=(const Events&) = delete;
     ~Events() { delete partial; }
@@ -98,13 +108,8 @@ struct Events {
         step = &stepper;
         status = Status::ok;
         found = 0;
-        for (int i = 0; i < grid_size; ++i) {
-            grid[i] = i == 0               ? real(0)
-                      : i == 1             ? real(1) / real(1024 * pieces)
-                      : i == grid_size - 2 ? real(1) - grid[1]
-                                           : real(i == grid_size - 1 ? pieces : i - 1) / real(pieces);
-            on_polynomial(grid[i], grid_values[i]);
-        }
+        knows_end[0] = knows_end[1] = false;
+        for (int i = 0; i < grid_size; ++i) on_grid(i);
         for (int e = first; e < last && status == Status::ok; ++e) find_events(e, until);
         return status;
     }
@@ -125,13 +130,27 @@ private:
     S* partial;  // the shortened step
     Status status{};
     real time{}, q[n]{}, p[n]{};
+    static constexpr int basis_room = S::basis > 0 ? S::basis : 1;
     real grid[grid_size]{}, grid_values[grid_size][K::events]{};
+    real basis_value[grid_size][basis_room]{}, basis_slope[grid_size][basis_room]{};  // of the step's polynomial
+    real end_values[2][K::events]{};  // where the step begins and ends, once they were asked for
+    bool knows_end[2]{};
     Sample samples[room]{};
     int sample_count{};
 
     static bool has_sign(real value) { return is_finite(value) && value != real(0); }
     static bool changes(real a, real b) { return has_sign(a) && has_sign(b) && (a > real(0)) != (b > real(0)); }
 
+    void on_grid(int i) {
+        if constexpr (S::basis > 0) {
+            real position[n], velocity[n];
+            step->polynomial(basis_value[i], basis_slope[i], position, velocity);
+            Formulas<K>::event(step->coefficients, Between<K>::time(*step, grid[i]), position, velocity,
+                               +grid_values[i]);
+        } else {
+            on_polynomial(grid[i], grid_values[i]);
+        }
+    }
     void on_polynomial(real theta, real* values) const {
         real position[n], velocity[n];
         step->polynomial(theta, position, velocity);
@@ -176,12 +195,24 @@ private:
         partial->momentum(momentum);
     }
     real exactly(real theta, int e) {
-        real row[1 + 2 * n], velocity[n], values[K::events];
+        real values[K::events];
+        if (theta == real(0) || theta == real(1)) {
+            const int end = theta == real(0) ? 0 : 1;
+            if (!knows_end[end]) exactly(theta, end_values[end]);
+            knows_end[end] = true;
+            return end_values[end][e];
+        }
+        exactly(theta, values);
+        return values[e];
+    }
+    void exactly(real theta, real* values) {
+        real row[1 + 2 * n], velocity[n];
         state_at(theta, row);
         if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
-        if (status != Status::ok) return real(0);
-        Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
-        return values[e];
+        if (status == Status::ok)
+            Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
+        else
+            for (int e = 0; e < K::events; ++e) values[e] = real(0);
     }
 
     void insert(int place, Sample sample) {

@@ -102,7 +102,12 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     // The polynomial of the last step through its control points, at t + theta h.
     void polynomial(real theta, real* position, real* velocity) const {
         real value[m + 1], slope[m + 1];
-        lagrange<m + 1>(K::control, theta, value, slope);
+        basis_at(theta, value, slope);
+        polynomial(value, slope, position, velocity);
+    }
+    static constexpr int basis = m + 1;  // polynomials
+    static void basis_at(real theta, real* value, real* slope) { lagrange<m + 1>(K::control, theta, value, slope); }
+    void polynomial(const real* value, const real* slope, real* position, real* velocity) const {
         refresh();
         for (int a = 0; a < active; ++a) {
             const int k = K::active_index[a];

@@ -18,7 +18,7 @@ namespace lobatto {
 template <class K>
 struct Walls {
     using real = typename K::real;
-    using S = Stepper<K>;
+    using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, count = K::impacts, first = K::events - count;
     static constexpr real few = real(64) * Limits<real>::epsilon;
 
@@ -29,8 +29,8 @@ struct Walls {
     real slack[count]{};       // g as small as this is zero
     real approach[count]{};    // dg/dt along the motion, where it is above rounding; below 0: towards the wall
 
-    // Everything at (t, q, p); h: of the steps.
-    Status look(const S& stepper, real t, const real* position, const real* momentum) {
+    // Everything at (t, q, p) of a stepper.
+    Status look(S& stepper, real t, const real* position, const real* momentum) {
         time = t;
         for (int k = 0; k < n; ++k) {
             q[k] = position[k];
@@ -49,7 +49,8 @@ struct Walls {
                 speed += fabs(slope * velocity[c]);
                 moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
             }
-            slack[w] = few * moved;
+            if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
+            slack[w] = few * stepper.wall_scale[w];
             approach[w] = fabs(along) <= few * speed ? real(0) : along * side(w);
         }
         return Status::ok;
@@ -61,7 +62,7 @@ struct Walls {
     bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
 
     // (D52) What wall w does to the momentum.
-    Status hit(const S& stepper, int w) {
+    Status hit(S& stepper, int w) {
         if (K::reset_of[w] >= 0) return reset(stepper, K::reset_of[w]);
         const real* const G = gradient + w * n;
         real still[n] = {}, rest[n], pushed[n], without[n], with[n];
@@ -84,7 +85,7 @@ struct Walls {
     }
 
     // Positions and velocities as the scene gives them.
-    Status reset(const S& stepper, int r) {
+    Status reset(S& stepper, int r) {
         if constexpr (K::resets > 0) {
             real positions[K::resets * n], velocities[K::resets * n];
             Formulas<K>::reset(stepper.coefficients, time, static_cast<const real*>(q),
@@ -201,7 +202,7 @@ private:
     }
 
     // All walls that are met there, one after another, until none is.
-    Status meet(const S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
+    Status meet(S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
         for (bool is_first = true;; is_first = false) {
             int met = is_first && K::reset_of[first] >= 0 ? first : -1;
             for (int w = 0; w < walls && met < 0; ++w)

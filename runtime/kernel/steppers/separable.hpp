@@ -91,7 +91,12 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
     // The polynomial of the last step through its positions, at t + theta h.
     void polynomial(real theta, real* position, real* velocity) const {
         real value[s], slope[s];
-        lagrange<s>(K::c, theta, value, slope);
+        basis_at(theta, value, slope);
+        polynomial(value, slope, position, velocity);
+    }
+    static constexpr int basis = s;  // polynomials
+    static void basis_at(real theta, real* value, real* slope) { lagrange<s>(K::c, theta, value, slope); }
+    void polynomial(const real* value, const real* slope, real* position, real* velocity) const {
         for (int k = 0; k < n; ++k) {
             const real start = position_before(k);
             real moved = value[s - 1] * (q[k] - start), rate = slope[s - 1] * (q[k] - start);

@@ -249,6 +249,7 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
 
     // The polynomial of degree 5 that has the positions, velocities and accelerations at both ends of the last step, at
     // t + theta h.
+    static constexpr int basis = 0;
     void polynomial(real theta, real* position, real* velocity) const {
         evaluate_ends();
         const real t = theta, t2 = t * t, t3 = t2 * t, h = step_size;
