@@ -30,9 +30,9 @@ std::vector<GiNaC::symbol> variables_of(const Scene& scene) {
 Reductions::Reductions(const Scene& scene) : n_(scene.coordinates.size()), parameters_(scene.parameters.size()) {
     const std::vector<GiNaC::symbol> variables = variables_of(scene);
     variables_.resize(variables.size());
-    for (const Kept& kept : scene.outputs.kept) {
+    for (const Reduction& kept : scene.outputs.kept) {
         Part part{kept.of, kept.event, std::nullopt};
-        if (kept.of != Kept::Of::first && kept.of != Kept::Of::count) {
+        if (kept.of != Reduction::Of::first && kept.of != Reduction::Of::count) {
             part.formula = Tape::of(kept.value, variables);
             if (!part.formula) throw InputError(fmt::format("{}: cannot be evaluated along a trajectory", kept.text));
             needs_energy_ = needs_energy_ || kept.value.has(scene.outputs.energy_of_kept);
@@ -47,7 +47,7 @@ void Reductions::begin(const LoadedStepper<double>& stepper, const EnsembleStart
     stepper_ = &stepper;
     std::copy(start.parameters.begin(), start.parameters.end(), variables_.begin());
     has_begun_ = false;
-    for (Part& part : parts_) part.value = part.of == Kept::Of::count || part.of == Kept::Of::mean ? 0 : none;
+    for (Part& part : parts_) part.value = part.of == Reduction::Of::count || part.of == Reduction::Of::mean ? 0 : none;
 }
 
 void Reductions::observe(const double* rows, std::int64_t count) {
@@ -74,10 +74,12 @@ void Reductions::observe(const double* rows, std::int64_t count) {
 }
 
 void Reductions::look(Part& part, double value, double time) const {
-    if (part.of == Kept::Of::last || std::isnan(value)) part.value = value;
-    if (part.of == Kept::Of::max && !(part.value >= value) && !(has_begun_ && std::isnan(part.value))) part.value = value;
-    if (part.of == Kept::Of::min && !(part.value <= value) && !(has_begun_ && std::isnan(part.value))) part.value = value;
-    if (part.of == Kept::Of::mean && has_begun_) part.value += (time - last_time_) * (value + part.before) / 2;
+    if (part.of == Reduction::Of::last || std::isnan(value)) part.value = value;
+    if (part.of == Reduction::Of::max && !(part.value >= value) && !(has_begun_ && std::isnan(part.value)))
+        part.value = value;
+    if (part.of == Reduction::Of::min && !(part.value <= value) && !(has_begun_ && std::isnan(part.value)))
+        part.value = value;
+    if (part.of == Reduction::Of::mean && has_begun_) part.value += (time - last_time_) * (value + part.before) / 2;
     part.before = value;
 }
 
@@ -87,8 +89,8 @@ void Reductions::observe_events(const double* rows, std::int64_t count) {
         const double* const row = rows + static_cast<std::size_t>(i) * columns;
         for (Part& part : parts_) {
             if (part.formula || part.event != static_cast<std::size_t>(row[0])) continue;
-            if (part.of == Kept::Of::count) ++part.value;
-            if (part.of == Kept::Of::first && std::isnan(part.value)) part.value = row[1];
+            if (part.of == Reduction::Of::count) ++part.value;
+            if (part.of == Reduction::Of::first && std::isnan(part.value)) part.value = row[1];
         }
     }
 }
@@ -96,10 +98,10 @@ void Reductions::observe_events(const double* rows, std::int64_t count) {
 std::vector<double> Reductions::values() const {
     std::vector<double> values;
     for (const Part& part : parts_) {
-        const bool is_mean = part.of == Kept::Of::mean && last_time_ != first_time_;
-        values.push_back(is_mean                       ? part.value / (last_time_ - first_time_)
-                         : part.of == Kept::Of::mean ? part.before
-                                                       : part.value);
+        const bool is_mean = part.of == Reduction::Of::mean && last_time_ != first_time_;
+        values.push_back(is_mean                          ? part.value / (last_time_ - first_time_)
+                         : part.of == Reduction::Of::mean ? part.before
+                                                          : part.value);
     }
     return values;
 }

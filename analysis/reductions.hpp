@@ -26,7 +26,7 @@ public:
 
 private:
     struct Part {
-        Kept::Of of;
+        Reduction::Of of;
         std::size_t event;
         std::optional<Tape> formula;
         double value = 0, before = 0;

@@ -336,7 +336,8 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
         const double longest = result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                : begins_now               ? result.seconds / 2
                                                           : 0;
-        while (!finished_ && !has_caught_up() && seconds_since(now) < longest) std::this_thread::sleep_for(std::chrono::microseconds(200));
+        while (!finished_ && !has_caught_up() && seconds_since(now) < longest)
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();

@@ -167,9 +167,11 @@ void print_events(const Scene& scene, const TrajectoryResult& result, const std:
     for (std::size_t i = 0; i < watched.size(); ++i) {
         if (i == impacts) is_named = false;
         if (i >= stops && i < impacts) continue;
-        print_row(is_named ? "" : i < impacts ? "events" : "impacts",
-                  fmt::format("{} of '{}'{}", counts[1 + i], watched[i].text,
-                              i + 1 < watched.size() ? "" : ", in " + path));
+        print_row(
+            is_named      ? ""
+            : i < impacts ? "events"
+                          : "impacts",
+            fmt::format("{} of '{}'{}", counts[1 + i], watched[i].text, i + 1 < watched.size() ? "" : ", in " + path));
         is_named = true;
     }
 }

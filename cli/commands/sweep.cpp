@@ -124,7 +124,7 @@ std::vector<Column> columns_of(const Scene& scene, const Grid& grid, bool measur
     own("steps", true);
     if (!scene.run.stops.empty()) own("stop", true);
     columns.push_back({"t", ""});
-    for (const Kept& kept : scene.outputs.kept) columns.push_back({name_of_column(kept.text), ""});
+    for (const Reduction& kept : scene.outputs.kept) columns.push_back({name_of_column(kept.text), ""});
     if (!scene.outputs.kept.empty()) {
         if (measures) own("error", false);
         return columns;
@@ -155,7 +155,8 @@ std::vector<std::string> comments_of(const Scene& scene, const KernelSource& sou
     for (std::size_t i = 0; i < scene.run.stops.size(); ++i)
         comments.push_back(fmt::format("stop {}: {}", i + 1, scene.run.stops[i].text));
     for (int status = 0; status < LOBATTO_STATUSES; ++status)
-        if (status != LOBATTO_UNSUPPORTED && status != LOBATTO_STOPPED) statuses.push_back(fmt::format("{} {}", status, reason[status]));
+        if (status != LOBATTO_UNSUPPORTED && status != LOBATTO_STOPPED)
+            statuses.push_back(fmt::format("{} {}", status, reason[status]));
     comments.push_back(fmt::format("status: {}", fmt::join(statuses, ", ")));
     return comments;
 }
@@ -439,8 +440,8 @@ void sweep(const SweepOptions& options) {
     const bool is_alone = !scene.outputs.kept.empty() || !scene.run.stops.empty() || !scene.impacts.empty();
     const std::int64_t together = scene.coordinates.size() > 2 ? std::min<std::int64_t>(request.count, 8)
                                                                : request.count / thread_count(options.threads);
-    const Kernel kernel = is_alone ? kernel_of(source, Precision::double_)
-                                   : ensemble_kernel_of(source, Precision::double_, together);
+    const Kernel kernel =
+        is_alone ? kernel_of(source, Precision::double_) : ensemble_kernel_of(source, Precision::double_, together);
     if (!scene.outputs.kept.empty()) request.reducer = [&scene] { return std::make_unique<Reductions>(scene); };
     refuse_too_much(grid, kernel, request);
 

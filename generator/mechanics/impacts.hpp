@@ -6,8 +6,8 @@
 
 namespace lobatto {
 
-// InputError unless momenta are affine in velocities, so that an impulse changes velocities by M^-1 of it (D52), and the
-// scene starts on the right side of its walls.
+// InputError unless momenta are affine in velocities, so that an impulse changes velocities by M^-1 of it (D52), and
+// the scene starts on the right side of its walls.
 void check_impacts(const Scene& scene, const System& system);
 
 // InputError where a scene with impacts is given to what knows none: "lobatto stability".

@@ -171,8 +171,9 @@ private:
     void read_run() {
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
-        const Table table(source_, table_of(source_, section, example), section.at, "[run]",
-                          {"step", "steps_per_period", "period", "until", "error", "beyond_horizon", "assemble", "stop"});
+        const Table table(
+            source_, table_of(source_, section, example), section.at, "[run]",
+            {"step", "steps_per_period", "period", "until", "error", "beyond_horizon", "assemble", "stop"});
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
         const Entry* period = table.find("period");
@@ -230,7 +231,8 @@ private:
         const Entry* section = root_.find("output");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
-                          "[output]", {"every", "energy", "momenta", "multipliers", "tangent", "dense", "events", "keep"});
+                          "[output]",
+                          {"every", "energy", "momenta", "multipliers", "tangent", "dense", "events", "keep"});
         Outputs& outputs = scene_.outputs;
         const Entry* every = table.find("every");
         if (every != nullptr && scene_.clock) {
@@ -268,7 +270,9 @@ private:
 
     void refuse_beside_impacts() const {
         if (scene_.impacts.empty()) return;
-        const auto refuse = [&](const std::string& why) { fail(scene_.impacts.front().when.at, "impacts need " + why); };
+        const auto refuse = [&](const std::string& why) {
+            fail(scene_.impacts.front().when.at, "impacts need " + why);
+        };
         if (scene_.clock) refuse("equal steps in time; leave out the clock");
         if (scene_.outputs.dense > 0) refuse("dense = 0: a step with an impact is no polynomial");
     }
@@ -283,8 +287,8 @@ private:
 }  // namespace
 
 void Outputs::watch_kept() {
-    for (Kept& one : kept) {
-        if (one.of != Kept::Of::first && one.of != Kept::Of::count) continue;
+    for (Reduction& one : kept) {
+        if (one.of != Reduction::Of::first && one.of != Reduction::Of::count) continue;
         one.event = events.size();
         events.push_back(one.crossing);
     }

@@ -54,9 +54,9 @@ struct Run {
 };
 
 // What a sweep keeps of a trajectory: "first(b = pi)", "max(x^2 + y^2)" (analysis/reductions.hpp).
-struct Kept {
+struct Reduction {
     enum class Of { first, count, max, min, mean, last };
-    std::string text;       // as written, white space collapsed
+    std::string text;  // as written, white space collapsed
     Of of = Of::last;
     Event crossing = {};    // first, count: of this event
     std::size_t event = 0;  // its number, once it is watched
@@ -73,8 +73,8 @@ struct Outputs {
     bool tangent = true;       // the derivative of a step: its symplectic defect, monodromy
     int dense = 0;             // states between two steps, evenly spaced, from the step's own polynomial
     std::vector<Event> events;
-    std::vector<Kept> kept;                // by sweeps
-    GiNaC::symbol energy_of_kept{"H"};     // in their formulas: H, and p_x of the coordinates
+    std::vector<Reduction> kept;        // by sweeps
+    GiNaC::symbol energy_of_kept{"H"};  // in their formulas: H, and p_x of the coordinates
     std::vector<GiNaC::symbol> momenta_of_kept;
 
     void watch_kept();  // makes the events of what is kept events of the kernel
@@ -102,10 +102,10 @@ struct Constraint {
 // A wall: the motion is on the one side of it where `when` has not happened, and is thrown back when it meets it
 // (generator/mechanics/impacts.hpp).
 struct Impact {
-    std::string name;               // an identifier; element 3 of an array touch is touch_3
-    std::string written = name;     // in the scene: touch[3]
-    Event when = {};                // with a direction, free of velocities
-    GiNaC::ex restitution = 1;      // in parameters
+    std::string name;            // an identifier; element 3 of an array touch is touch_3
+    std::string written = name;  // in the scene: touch[3]
+    Event when = {};             // with a direction, free of velocities
+    GiNaC::ex restitution = 1;   // in parameters
     // n each, of the state after it in that before it; empty: the momentum jumps instead.
     std::vector<GiNaC::ex> reset_position = {}, reset_velocity = {};
 };

@@ -68,9 +68,9 @@ void SystemReader::read_impact(const Entry& entry) {
     const Entry& when = table.get("when", "for example when = \"y = 0 falling\"");
     const Entry *restitution = table.find("restitution"), *reset = table.find("reset");
     if (when.value.kind != Value::Kind::text)
-        fail(when.value.at, fmt::format("when must be a text such as \"y = 0 falling\", not {}", when.value.kind_name()));
-    if (restitution != nullptr && reset != nullptr)
-        fail(reset->at, "an impact has a restitution or a reset; keep one");
+        fail(when.value.at,
+             fmt::format("when must be a text such as \"y = 0 falling\", not {}", when.value.kind_name()));
+    if (restitution != nullptr && reset != nullptr) fail(reset->at, "an impact has a restitution or a reset; keep one");
     const long count = count_of(entry, table.find("count"), array, "impact");
     Scope scope = scope_of("the impact " + name, true);
     if (index) scope.indices = {*index};
@@ -91,9 +91,11 @@ void SystemReader::read_impact(const Entry& entry) {
         impact.when = {fmt::format("{}: {}", impact.written, collapsed(when.value.text.value)), value.expression,
                        crossing.direction, when.value.at};
         if (impact.when.text.size() > longest_event)
-            fail(when.value.at, fmt::format("an impact of {} bytes; at most {}", impact.when.text.size(), longest_event));
+            fail(when.value.at,
+                 fmt::format("an impact of {} bytes; at most {}", impact.when.text.size(), longest_event));
         if (value.velocities)
-            fail(when.value.at, fmt::format("the wall {} holds a velocity; a wall is where positions are", impact.written));
+            fail(when.value.at,
+                 fmt::format("the wall {} holds a velocity; a wall is where positions are", impact.written));
         if (std::none_of(scene_.coordinates.begin(), scene_.coordinates.end(),
                          [&](const Coordinate& c) { return value.expression.has(c.position); }))
             fail(when.value.at, fmt::format("the wall {} holds no coordinate", impact.written));
@@ -137,9 +139,9 @@ namespace {
 
 // Part of a text.
 Text piece_of(const Text& text, std::size_t begin, std::size_t end) {
-    return {text.value.substr(begin, end - begin),
-            {text.at.begin() + static_cast<std::ptrdiff_t>(begin),
-             text.at.begin() + static_cast<std::ptrdiff_t>(end) + 1}};
+    return {
+        text.value.substr(begin, end - begin),
+        {text.at.begin() + static_cast<std::ptrdiff_t>(begin), text.at.begin() + static_cast<std::ptrdiff_t>(end) + 1}};
 }
 
 // At its commas, but for those within brackets; without the blanks around.
@@ -160,9 +162,9 @@ std::vector<Text> pieces_of(const Text& text) {
     return pieces;
 }
 
-const std::vector<std::pair<std::string, Kept::Of>> reductions = {
-    {"first", Kept::Of::first}, {"count", Kept::Of::count}, {"max", Kept::Of::max},
-    {"min", Kept::Of::min},     {"mean", Kept::Of::mean},   {"last", Kept::Of::last}};
+const std::vector<std::pair<std::string, Reduction::Of>> reductions = {
+    {"first", Reduction::Of::first}, {"count", Reduction::Of::count}, {"max", Reduction::Of::max},
+    {"min", Reduction::Of::min},     {"mean", Reduction::Of::mean},   {"last", Reduction::Of::last}};
 
 }  // namespace
 
@@ -193,8 +195,8 @@ void SystemReader::read_kept(const std::vector<std::string>& given) {
     }
     if (!given.empty()) return;
     if (entry->value.kind != Value::Kind::list)
-        fail(entry->value.at,
-             fmt::format("keep must be a list such as [\"first(x = 0)\", \"max(x)\"], not {}", entry->value.kind_name()));
+        fail(entry->value.at, fmt::format("keep must be a list such as [\"first(x = 0)\", \"max(x)\"], not {}",
+                                          entry->value.kind_name()));
     for (const Value& item : entry->value.items) {
         if (item.kind != Value::Kind::text)
             fail(item.at, fmt::format("what is kept must be a text such as \"max(x)\", not {}", item.kind_name()));
@@ -213,11 +215,11 @@ void SystemReader::read_kept(const Source& source, const Text& text) {
                     "what is kept of a trajectory is first(x = 0) or count(x = 0 rising) of an event, or max(x), "
                     "min(x), mean(x), last(x) of a formula");
     const Text inner = piece_of(text, open + 1, text.value.size() - 1);
-    Kept kept{collapsed(text.value), found->second};
+    Reduction kept{collapsed(text.value), found->second};
     if (kept.text.size() > longest_event)
         source.fail(text.at.front(), fmt::format("{} bytes; at most {}", kept.text.size(), longest_event));
     const Scope scope = scope_of("what is kept", true);
-    if (kept.of == Kept::Of::first || kept.of == Kept::Of::count) {
+    if (kept.of == Reduction::Of::first || kept.of == Reduction::Of::count) {
         const EventSyntax crossing = parse_crossing(source, inner, scope);
         const Operand value = evaluate(source, crossing.difference, scope);
         kept.crossing = {collapsed(inner.value), value.expression, crossing.direction, text.at.front()};

@@ -321,7 +321,8 @@ void SystemReader::read_constraints() {
 
 SystemReader::ArrayName SystemReader::declare_array(const Entry& entry, const std::string& what,
                                                     const std::string& section) {
-    const Subject subject = parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, section, true, {}});
+    const Subject subject =
+        parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, section, true, {}});
     const std::string name(subject.name.text);
     declarations_.declare(name, subject.name.at, what);
     if (!subject.subscripted) return {name, std::nullopt};

@@ -27,14 +27,14 @@ extern "C" {
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
-    LOBATTO_NOT_CONVERGED = 1,     /* the equations of the step, or of a velocity, were not solved */
-    LOBATTO_NOT_FINITE = 2,        /* a value overflowed or became not-a-number */
-    LOBATTO_SINGULAR_JACOBIAN = 3, /* the Jacobian of the step's equations has no inverse */
-    LOBATTO_SINGULAR_MASS = 4,     /* the mass matrix has no inverse for these parameters or at this state */
-    LOBATTO_TIME_STANDS_STILL = 5, /* t + h equals t in this precision */
-    LOBATTO_UNSUPPORTED = 6,       /* the kernel was compiled without this */
-    LOBATTO_OFF_CONSTRAINTS = 9, /* a start does not keep the constraints, or is behind a wall; 7, 8 and 10 are what
-                                    sweeps say of motions */
+    LOBATTO_NOT_CONVERGED = 1,       /* the equations of the step, or of a velocity, were not solved */
+    LOBATTO_NOT_FINITE = 2,          /* a value overflowed or became not-a-number */
+    LOBATTO_SINGULAR_JACOBIAN = 3,   /* the Jacobian of the step's equations has no inverse */
+    LOBATTO_SINGULAR_MASS = 4,       /* the mass matrix has no inverse for these parameters or at this state */
+    LOBATTO_TIME_STANDS_STILL = 5,   /* t + h equals t in this precision */
+    LOBATTO_UNSUPPORTED = 6,         /* the kernel was compiled without this */
+    LOBATTO_OFF_CONSTRAINTS = 9,     /* a start does not keep the constraints, or is behind a wall; 7, 8 and 10 are what
+                                        sweeps say of motions */
     LOBATTO_STOPPED = 11,            /* a stop was met: the last row of events says which, where and when */
     LOBATTO_IMPACTS_ACCUMULATE = 12, /* more impacts in one step than can be told apart, or a motion along a wall */
     LOBATTO_STATUSES = 13

@@ -31,10 +31,10 @@ concept KernelOfAnyForm = requires(const typename K::Parameters& values, typenam
     { K::events } -> std::convertible_to<int>;
 }
 &&(K::coordinates > 0) && (K::events == 0 || requires {
-                               K::event_direction[K::events - 1];
-                               { K::stops } -> std::convertible_to<int>;
-                               { K::impacts } -> std::convertible_to<int>;
-                           });
+    K::event_direction[K::events - 1];
+    { K::stops } -> std::convertible_to<int>;
+    { K::impacts } -> std::convertible_to<int>;
+});
 
 // The formulas of a constant mass matrix. `k`, then the time unless the kernel is autonomous, then arrays.
 template <class K, class... Time>

@@ -222,7 +222,8 @@ private:
             const bool failed = trajectory.status != LOBATTO_OK;
             if (trajectory.stop >= 0)
                 keep(lane, trajectory);
-            else if (failed ? trajectory.steps_done > trajectory.row_step : kept_here) keep(lane, trajectory);
+            else if (failed ? trajectory.steps_done > trajectory.row_step : kept_here)
+                keep(lane, trajectory);
         }
     }
 

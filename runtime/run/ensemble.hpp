@@ -58,14 +58,14 @@ struct EnsembleRequest {
     std::function<void(std::int64_t index, EnsembleStart& start)> start;
     bool from_velocities = false;  // momenta are computed with the parameters of each trajectory
     double time = 0;
-    double step = 0;         // h; may be negative
-    double tolerance = 0;    // of a step's iteration; 0: to rounding
-    std::int64_t steps = 0;  // >= 0, of each trajectory; count * steps < 2^63
-    Arrivals arrivals;       // of kernels with a clock
-    std::int64_t every = 0;  // keep every such state; 0: the last one alone
-    bool stops = false;      // the kernel's stops end trajectories
+    double step = 0;                                    // h; may be negative
+    double tolerance = 0;                               // of a step's iteration; 0: to rounding
+    std::int64_t steps = 0;                             // >= 0, of each trajectory; count * steps < 2^63
+    Arrivals arrivals;                                  // of kernels with a clock
+    std::int64_t every = 0;                             // keep every such state; 0: the last one alone
+    bool stops = false;                                 // the kernel's stops end trajectories
     std::function<std::unique_ptr<Reducer>()> reducer;  // one a thread; nothing: none. Of kernels without lanes
-    int threads = 0;         // that compute; 0: as many as the machine runs at once
+    int threads = 0;                                    // that compute; 0: as many as the machine runs at once
     // Whether a trajectory that reached the end counts in the statistics; nothing: all do. Called before the sink.
     std::function<bool(const EnsembleTrajectory&)> counts;
     std::function<void(const EnsembleTrajectory&)> sink;    // in the order of the indices, in the thread of the caller
@@ -81,9 +81,9 @@ struct Spread {
 // Sums are taken in the order of the trajectories.
 struct EnsembleResult {
     bool interrupted = false;
-    std::int64_t trajectories = 0;                                     // handed over: all, unless interrupted
+    std::int64_t trajectories = 0;                          // handed over: all, unless interrupted
     std::array<std::int64_t, LOBATTO_STATUSES> count_of{};  // of each lobatto_status
-    std::int64_t steps_done = 0;                                       // of all trajectories
+    std::int64_t steps_done = 0;                            // of all trajectories
     std::int64_t iterations = 0;
     std::vector<Spread> q, p;  // at the end, n each
     Spread energy_error{};     // H - H(0) at the end

@@ -105,12 +105,12 @@ void SingleTrajectory::energy(const std::vector<double>& q, const std::vector<do
 
 LaneTrajectories::LaneTrajectories(const Kernel& kernel)
     : kernel_(kernel),
-      memory_(::operator new(static_cast<std::size_t>(kernel->ensemble_bytes),
-                             std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)}),
+      memory_(::operator new (static_cast<std::size_t>(kernel->ensemble_bytes),
+                              std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)}),
               Deleter{static_cast<std::size_t>(kernel->ensemble_alignment)}) {}
 
 void LaneTrajectories::Deleter::operator()(void* memory) const {
-    ::operator delete(memory, std::align_val_t{alignment});
+    ::operator delete (memory, std::align_val_t{alignment});
 }
 
 void LaneTrajectories::prepare(const std::vector<double>& parameters, double step, std::int32_t* status) {

@@ -42,8 +42,7 @@ public:
     void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
                  std::int64_t* iterations) override;
     void state(std::vector<double>& q, std::vector<double>& p) override;
-    void energy(const std::vector<double>& q, const std::vector<double>& p,
-                std::vector<double>& energy) const override;
+    void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
     int stop() const override { return stop_; }
     double stop_time() const override { return time_; }
     void reduce(const EnsembleStart& start) override;
@@ -69,8 +68,7 @@ public:
     void advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status, std::int64_t* steps_done,
                  std::int64_t* iterations) override;
     void state(std::vector<double>& q, std::vector<double>& p) override;
-    void energy(const std::vector<double>& q, const std::vector<double>& p,
-                std::vector<double>& energy) const override;
+    void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
 
 private:
     struct Deleter {

@@ -62,7 +62,8 @@ template <class K>
 struct WatchedStepper : Stepper<K> {
     using real = typename K::real;
     typename K::Parameters parameters{};
-    real wall_scale[impacts_of<K>() > 0 ? impacts_of<K>() : 1]{};  // the most that went into each wall's function so far
+    real
+        wall_scale[impacts_of<K>() > 0 ? impacts_of<K>() : 1]{};  // the most that went into each wall's function so far
 };
 
 template <class K>
@@ -120,9 +121,9 @@ struct Events {
         return status;
     }
 
-    int found{};           // places of the last find:
-    real thetas[most]{};   // where
-    int numbers[most]{};   // of which function
+    int found{};                          // places of the last find:
+    real thetas[most]{};                  // where
+    int numbers[most]{};                  // of which function
     real slack[walls > 0 ? walls : 1]{};  // of each wall: up to here its function is zero, but for rounding
 
 private:

@@ -23,11 +23,11 @@ struct Walls {
     static constexpr real few = real(64) * Limits<real>::epsilon;
 
     real time{}, q[n]{}, p[n]{}, velocity[n]{};
-    real value[K::events]{};                       // of all that is watched
-    real gradient[count * n]{}, rate[count]{};     // dg/dq, and dg/dt at fixed q
+    real value[K::events]{};                    // of all that is watched
+    real gradient[count * n]{}, rate[count]{};  // dg/dq, and dg/dt at fixed q
     real restitution[count]{};
-    real slack[count]{};       // g as small as this is zero
-    real approach[count]{};    // dg/dt along the motion, where it is above rounding; below 0: towards the wall
+    real slack[count]{};     // g as small as this is zero
+    real approach[count]{};  // dg/dt along the motion, where it is above rounding; below 0: towards the wall
 
     // Everything at (t, q, p) of a stepper.
     Status look(S& stepper, real t, const real* position, const real* momentum) {
@@ -106,7 +106,7 @@ public:
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, columns = Events<K>::columns;
     static constexpr int walls = impacts_of<K>(), first_wall = K::events - walls, stops = stops_of<K>();
-    static constexpr int most_impacts = walls > 0 ? 100 : 0;  // in one step
+    static constexpr int most_impacts = walls > 0 ? 100 : 0;                             // in one step
     static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
 
     explicit Watch(const S& stepper) : events(stepper), rest(walls > 0 ? new S(stepper) : nullptr) {}

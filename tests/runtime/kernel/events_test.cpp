@@ -16,7 +16,7 @@ namespace {
 
 // The pendulum of generated kernels with events: q = 0 rising, q' = 0 falling, and q^2 = 1 either way.
 struct Swing : HandwrittenPendulum {
-    static constexpr int events = 3;
+    static constexpr int events = 3, stops = 0, impacts = 0;
     static constexpr int event_direction[3] = {1, -1, 0};
     static void event(const Coefficients&, const real* q, const real* velocity, real* value) {
         value[0] = q[0];
@@ -27,7 +27,7 @@ struct Swing : HandwrittenPendulum {
 
 // Events that change their sign through infinity: 1/q = 0, and q'/q = 0, which has roots as well.
 struct Poles : HandwrittenPendulum {
-    static constexpr int events = 2;
+    static constexpr int events = 2, stops = 0, impacts = 0;
     static constexpr int event_direction[2] = {0, 0};
     static void event(const Coefficients&, const real* q, const real* velocity, real* value) {
         value[0] = 1 / q[0];
@@ -108,7 +108,7 @@ TEST_CASE("events do not depend on how steps are grouped, nor on the room for th
     const std::vector<Row> once = events_of<Swing>(0.3, 2, 0.1, 500, 500, 1000);
     REQUIRE(once.size() > 50);
     for (const auto& other :
-         {events_of<Swing>(0.3, 2, 0.1, 500, 1), events_of<Swing>(0.3, 2, 0.1, 500, 17, Events<Swing>::most)}) {
+         {events_of<Swing>(0.3, 2, 0.1, 500, 1), events_of<Swing>(0.3, 2, 0.1, 500, 17, Watch<Swing>::most)}) {
         REQUIRE(other.size() == once.size());
         for (std::size_t i = 0; i < once.size(); ++i) {
             CHECK(other[i].event == once[i].event);

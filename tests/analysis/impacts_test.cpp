@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Walls and stops: exact motions, the order of steps with impacts, what is kept, and how impacts that cannot be told
+// apart end.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "generator/check/check.hpp"
+#include "generator/pipeline.hpp"
+#include "generator/programs/programs.hpp"
+#include "runtime/run/trajectory.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+Scene scene_of(const std::string& text) {
+    return read_scene(Source("impacts.toml", text));
+}
+
+struct Ended {
+    TrajectoryResult result;
+    std::vector<std::vector<double>> events;  // number, t, q, p
+};
+
+Ended run(const Scene& scene, bool with_events = true) {
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    TrajectoryRequest request = request_of(scene, steps_of(scene, {}).count, stepper);
+    Ended ended;
+    if (with_events)
+        request.events = [&](const EventRecords& records) {
+            for (std::int64_t i = 0; i < records.count; ++i)
+                ended.events.emplace_back(records.rows + i * records.columns, records.rows + (i + 1) * records.columns);
+        };
+    ended.result = integrate(kernel, request);
+    return ended;
+}
+Ended run(const std::string& text) {
+    return run(scene_of(text));
+}
+
+std::string method(const std::string& how, double step, double until) {
+    return fmt::format("[method]\n{}\n[run]\nstep = {:.17g}\nuntil = {:.17g}\n", how, step, until);
+}
+
+const std::string ball =
+    "lagrangian = \"m*y'^2/2 - m*g*y\"\n[parameters]\nm = 3\ng = 2\ne = {}\n[coordinates]\n"
+    "y = {{ position = 1, velocity = 0 }}\n[impacts]\nfloor = {{ when = \"y = 0 falling\", restitution = \"e\" }}\n";
+
+std::string refusal(const std::string& text) {
+    try {
+        derive(scene_of(text));
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "";
+}
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("a ball bounces at the exact times, by every method, also where a step holds several impacts") {
+    // From the height 1 at rest under g = 2 it falls for a time of 1, and flies e^k times 2 after impact k.
+    for (const char* how : {"points = 2", "points = 5", "family = \"gauss\"\nstages = 2",
+                            "family = \"splitting\"\nstages = 6", "points = 4\narithmetic = \"clean\""})
+        for (const double step : {0.1, 2.7}) {
+            CAPTURE(how);
+            CAPTURE(step);
+            const double e = 0.5;
+            const Ended ended = run(fmt::format(fmt::runtime(ball), e) + method(how, step, 2.7));
+            CHECK(ended.result.status == LOBATTO_OK);
+            double time = 1, speed = 2;
+            std::size_t count = 0;
+            for (; time < 2.7; time += speed, ++count) {
+                REQUIRE(count < ended.events.size());
+                CHECK(std::fabs(ended.events[count][1] - time) < 1e-14);
+                CHECK(std::fabs(ended.events[count][2]) < 1e-14);
+                speed *= e;
+                CHECK(std::fabs(ended.events[count][3] - 3 * speed) < 1e-14);  // the momentum after it
+            }
+            CHECK(ended.events.size() == count);
+        }
+}
+
+TEST_CASE("the energy stays at rounding over 10^5 impacts in a billiard") {
+    const Ended ended =
+        run("lagrangian = \"(x'^2 + y'^2)/2\"\n[parameters]\nr = 0.4\n[coordinates]\nx = { position = 0.7, velocity = "
+            "0.6 }\n"
+            "y = { position = 0.1, velocity = 0.8 }\n[impacts]\neast = { when = \"x = 1 rising\" }\n"
+            "west = { when = \"x = -1 falling\" }\nnorth = { when = \"y = 1 rising\" }\n"
+            "south = { when = \"y = -1 falling\" }\ndisc = { when = \"x^2 + y^2 = r^2 falling\" }\n" +
+            method("points = 3", 0.5, 105000));
+    CHECK(ended.result.status == LOBATTO_OK);
+    CHECK(ended.events.size() > 100000);
+    CHECK(ended.result.energy_error_largest < 1e-12);
+    for (const std::vector<double>& row : ended.events) {
+        const double r2 = row[2] * row[2] + row[3] * row[3];
+        REQUIRE(std::fabs(row[2]) < 1 + 1e-13);
+        REQUIRE(std::fabs(row[3]) < 1 + 1e-13);
+        REQUIRE(r2 > 0.16 - 1e-13);
+    }
+}
+
+TEST_CASE("steps with impacts have the order of the method") {
+    // A pendulum that meets a wall leaning against its left side, in angles.
+    const std::string pendulum =
+        "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0.3 }\n[impacts]\n"
+        "wall = { when = \"q = -0.4 falling\", restitution = 0.9 }\n";
+    const auto end = [&](const std::string& how, double step) {
+        const Ended ended = run(pendulum + method(how, step, 8));
+        CHECK(ended.events.size() >= 2);
+        return ended.result.q[0];
+    };
+    const double exact = end("points = 8", 0.05);
+    for (const auto& [how, order, step] :
+         {std::tuple{"points = 3", 4, 0.1}, {"points = 4", 6, 0.4}, {"family = \"gauss\"\nstages = 2", 4, 0.1}}) {
+        CAPTURE(how);
+        const double coarse = std::fabs(end(how, step) - exact), fine = std::fabs(end(how, step / 2) - exact);
+        CHECK(std::log2(coarse / fine) > order - 0.7);
+        CHECK(coarse > 1e-9);  // it is the method that is measured, not rounding
+    }
+}
+
+TEST_CASE("a pendulum on a rod meets a wall like the same pendulum in an angle") {
+    const std::string wall = "[impacts]\nwall = {{ when = \"{} falling\", restitution = 0.8 }}\n",
+                      time = method("points = 8", 0.05, 12);
+    const Ended angle = run("lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0.3 }\n" +
+                            fmt::format(fmt::runtime(wall), "sin(q) = -0.4") + time);
+    const Ended rod =
+        run("lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = \"sin(1)\", velocity = "
+            "\"0.3*cos(1)\" }\n"
+            "y = { position = \"-cos(1)\", velocity = \"0.3*sin(1)\" }\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n" +
+            fmt::format(fmt::runtime(wall), "x = -0.4") + time);
+    REQUIRE(angle.events.size() >= 2);
+    REQUIRE(angle.events.size() == rod.events.size());
+    for (std::size_t i = 0; i < angle.events.size(); ++i)
+        CHECK(std::fabs(angle.events[i][1] - rod.events[i][1]) < 1e-11);
+    CHECK(std::fabs(std::sin(angle.result.q[0]) - rod.result.q[0]) < 1e-11);
+    const double length = std::hypot(rod.result.q[0], rod.result.q[1]);
+    CHECK(std::fabs(length - 1) < 1e-14);
+}
+
+TEST_CASE("a coupled mass is thrown back in the metric of the mass") {
+    // Two masses 1 and 3 meet: momentum and energy decide all.
+    const Ended ended =
+        run("lagrangian = \"a*x'^2/2 + b*y'^2/2\"\n[parameters]\na = 1\nb = 3\n[coordinates]\n"
+            "x = { position = 0, velocity = 2 }\ny = { position = 1, velocity = -1 }\n[impacts]\n"
+            "meet = { when = \"x = y rising\" }\n" +
+            method("points = 4", 0.1, 1));
+    REQUIRE(ended.events.size() == 1);
+    CHECK(std::fabs(ended.events[0][1] - 1.0 / 3) < 1e-15);
+    CHECK(std::fabs(ended.result.p[0] + 2.5) < 1e-14);  // (m1 - m2) / (m1 + m2) u1 + 2 m2 / (m1 + m2) u2
+    CHECK(std::fabs(ended.result.p[1] - 1.5) < 1e-14);
+}
+
+TEST_CASE("a moving wall gives its own velocity") {
+    const Ended ended =
+        run("time = \"t\"\nlagrangian = \"x'^2/2\"\n[coordinates]\nx = { position = 1, velocity = -1 }\n[impacts]\n"
+            "piston = { when = \"x = t/2 falling\", restitution = 0.5 }\n" +
+            method("points = 3", 0.1, 2));
+    REQUIRE(ended.events.size() == 1);
+    CHECK(std::fabs(ended.events[0][1] - 2.0 / 3) < 1e-15);
+    CHECK(std::fabs(ended.result.p[0] - 1.25) < 1e-14);  // 1/2 + 1/2 (1 + 1/2)
+}
+
+TEST_CASE("walls that are met at once act one after another: a corner, and Newton's cradle") {
+    const Ended corner =
+        run("lagrangian = \"(x'^2 + y'^2)/2\"\n[coordinates]\nx = { position = 1, velocity = -1 }\n"
+            "y = { position = 1, velocity = -1 }\n[impacts]\na = { when = \"x = 0 falling\" }\n"
+            "b = { when = \"y = 0 falling\" }\n" +
+            method("points = 3", 0.3, 3));
+    REQUIRE(corner.events.size() == 2);
+    CHECK(corner.result.p == std::vector<double>{1, 1});
+
+    const Ended cradle =
+        run("lagrangian = \"sum(i = 1 .. 5, q[i]'^2/2 + cos(q[i]))\"\n[coordinates]\n"
+            "q = { position = [-0.5, 0, 0, 0, 0], velocity = 0 }\n[impacts]\n"
+            "\"touch[i]\" = { when = \"q[i+1] = q[i] falling\", count = 4 }\n" +
+            method("points = 6", 0.1, 100));
+    CHECK(cradle.result.status == LOBATTO_OK);
+    CHECK(cradle.result.energy_error_largest < 1e-13);
+    // The first and the last ball share all of the motion.
+    const double energy = 1 - std::cos(0.5),
+                 outer = 2 - std::cos(cradle.result.q[0]) - std::cos(cradle.result.q[4]) +
+                         (std::pow(cradle.result.p[0], 2) + std::pow(cradle.result.p[4], 2)) / 2;
+    CHECK(std::fabs(outer - energy) < 1e-12);
+}
+
+TEST_CASE("impacts that accumulate end the run, with the state before that step") {
+    // The heights fall by e^2, so that all ends at sqrt(2/g) (1 + e) / (1 - e) = 3.
+    for (const double e : {0.5, 0.0}) {
+        const Ended ended = run(fmt::format(fmt::runtime(ball), e) + method("points = 4", 0.15, 4));
+        CHECK(ended.result.status == LOBATTO_IMPACTS_ACCUMULATE);
+        CHECK(std::fabs(ended.result.time - (e == 0.5 ? 2.85 : 0.9)) < 1e-14);
+        CHECK(std::fabs(ended.events.back()[1] - (e == 0.5 ? 3 : 1)) < 1e-6);
+        CHECK(contains(explain_stop(ended.result, TrajectoryRequest()), "impacts accumulate"));
+    }
+    // At rest on the floor from the start.
+    const Ended rests =
+        run("lagrangian = \"y'^2/2 - y\"\n[coordinates]\ny = { position = 0, velocity = 0 }\n[impacts]\n"
+            "floor = { when = \"y = 0 falling\" }\n" +
+            method("points = 4", 0.1, 1));
+    CHECK(rests.result.status == LOBATTO_IMPACTS_ACCUMULATE);
+    CHECK(rests.result.steps_done == 0);
+}
+
+TEST_CASE("a wall that is touched and not crossed does nothing") {
+    const Ended ended =
+        run("lagrangian = \"(x'^2 + y'^2)/2\"\n[coordinates]\nx = { position = -2, velocity = 1 }\n"
+            "y = { position = 1, velocity = 0 }\n[impacts]\ndisc = { when = \"x^2 + y^2 = 1 falling\" }\n" +
+            method("points = 4", 0.3, 4));
+    CHECK(ended.result.status == LOBATTO_OK);
+    CHECK(ended.result.p == std::vector<double>{1, 0});
+}
+
+TEST_CASE("a reset is the state after the impact") {
+    const Ended ended =
+        run("lagrangian = \"x'^2/2\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[impacts]\n"
+            "gate = { when = \"x = 1 rising\", reset = { \"x\" = \"x - 1\", \"x'\" = \"2*x'\" } }\n" +
+            method("points = 3", 0.1, 1.7));
+    REQUIRE(ended.events.size() == 2);  // at 1 and 1.5
+    CHECK(std::fabs(ended.events[1][1] - 1.5) < 1e-14);
+    CHECK(std::fabs(ended.result.q[0] - 0.8) < 1e-14);
+    CHECK(ended.result.p[0] == 4);
+}
+
+TEST_CASE("a stop ends the run at its time, and says which") {
+    // The separatrix: sin(q/2) = tanh t.
+    const std::string text = "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 0, velocity = 2 }\n" +
+                             method("points = 8", 0.1, 100) + "stop = [\"q = 7\", \"q = 1 rising\"]\n" +
+                             "[output]\nevents = [\"q = 1/2\", \"q = 3/2\"]\n";
+    const Ended ended = run(text);
+    const double exact = std::atanh(std::sin(0.5));
+    CHECK(ended.result.status == LOBATTO_OK);
+    CHECK(ended.result.stop == 3);
+    CHECK(std::fabs(ended.result.time - exact) < 1e-14);
+    CHECK(std::fabs(ended.result.q[0] - 1) < 1e-14);
+    CHECK(ended.result.steps_done == 5);
+    REQUIRE(ended.events.size() == 2);
+    CHECK(ended.events[1][0] == 3);
+    // Who does not ask for events is not stopped.
+    Scene scene = scene_of(text);
+    scene.run.until = 1;
+    CHECK(run(scene, false).result.stop == -1);
+}
+
+TEST_CASE("stops and impacts work together") {
+    const Ended ended =
+        run(fmt::format(fmt::runtime(ball), 0.5) + method("points = 4", 0.125, 4) + "stop = \"y' = 0 falling\"\n");
+    CHECK(ended.result.stop == 0);
+    CHECK(std::fabs(ended.result.time - 1.5) < 1e-14);
+    CHECK(std::fabs(ended.result.q[0] - 0.25) < 1e-14);
+    CHECK(ended.events.size() == 2);
+}
+
+TEST_CASE("the emitted impacts are what the scene says, to 50 digits") {
+    const Scene scene = scene_of(
+        "time = \"t\"\nlagrangian = \"(1 + x^2)*x'^2/2 + y'^2/2 - x*y\"\n[parameters]\ne = 0.7\n[coordinates]\n"
+        "x = { position = 1, velocity = 0 }\ny = { position = 1, velocity = 0 }\n[impacts]\n"
+        "a = { when = \"sin(x*y) = t^2/9 falling\", restitution = \"e^2\" }\n"
+        "b = { when = \"x = 5 rising\", reset = { \"x'\" = \"-x'*y + t\" } }\n" +
+        method("points = 3", 0.1, 1));
+    const Derivation derivation = derive(scene);
+    bool is_there = false;
+    for (const Check& check : check_programs(derivation, optimised_programs(derivation).programs)) {
+        CAPTURE(check.claim);
+        CHECK(check.holds);
+        is_there = is_there || check.claim == "emitted impacts";
+    }
+    CHECK(is_there);
+}
+
+TEST_CASE("what is wrong with a wall is said with its place") {
+    const std::string head = "lagrangian = \"y'^2/2 - y\"\n[coordinates]\ny = { position = 1, velocity = 0 }\n",
+                      tail = method("points = 4", 0.1, 1);
+    const auto wall = [&](const std::string& line) { return refusal(head + "[impacts]\n" + line + "\n" + tail); };
+    CHECK(contains(wall("a = { when = \"y = 0\" }"), "5:14: from which side does the motion meet a?"));
+    CHECK(contains(wall("a = { when = \"y' = 0 falling\" }"), "the wall a holds a velocity"));
+    CHECK(contains(wall("a = { when = \"1 = 0 falling\" }"), "the wall a holds no coordinate"));
+    CHECK(contains(wall("a = { when = \"y = 0 falling\", restitution = 1.5 }"), "5:45: the restitution is 1.5"));
+    CHECK(contains(wall("a = { when = \"y = 2 falling\" }"), "the start is behind the wall a"));
+    CHECK(contains(wall("a = { restitution = 1 }"), "when = \"y = 0 falling\""));
+    CHECK(contains(wall("\"a[i]\" = { when = \"y = 0 falling\" }"), "how many impacts a[i] are there?"));
+    CHECK(contains(wall("a = { when = \"y = 0 falling\", reset = { z = 1 } }"), "there is no coordinate 'z'"));
+    CHECK(contains(wall("y = { when = \"y = 0 falling\" }"), "y"));
+    CHECK(contains(refusal("lagrangian = \"y'^4 + y'^2 - y\"\n[coordinates]\ny = { position = 1, velocity = 1 }\n"
+                           "[impacts]\na = { when = \"y = 0 falling\" }\n" +
+                           tail),
+                   "quadratic"));
+    CHECK(contains(refusal(head + "[impacts]\na = { when = \"y = 0 falling\" }\n" + tail + "[output]\ndense = 3\n"),
+                   "dense = 0"));
+}
