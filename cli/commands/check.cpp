@@ -50,7 +50,9 @@ std::vector<Output> outputs_of(const Derivation& derivation, long operations) {
         remove(less.scene.outputs);
         return operations - operations_of(emit(less));
     };
-    std::string events;
+    std::string events, stops, impacts;
+    for (const Event& stop : derivation.scene.run.stops) stops += (stops.empty() ? "" : ", ") + stop.text;
+    for (const Impact& impact : derivation.scene.impacts) impacts += (impacts.empty() ? "" : ", ") + impact.when.text;
     for (const Event& event : asked.events) events += (events.empty() ? "" : ", ") + event.text;
     return {{"energy", asked.energy, "H at every kept state",
              cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
@@ -62,7 +64,9 @@ std::vector<Output> outputs_of(const Derivation& derivation, long operations) {
             {"dense", asked.dense > 0,
              fmt::format("{} states between two steps, on the step's polynomial", asked.dense), 0},
             {"events", !asked.events.empty(), events,
-             cost(!asked.events.empty(), [](Outputs& outputs) { outputs.events.clear(); })}};
+             cost(!asked.events.empty(), [](Outputs& outputs) { outputs.events.clear(); })},
+            {"stops", !stops.empty(), stops, 0},
+            {"impacts", !impacts.empty(), impacts, 0}};
 }
 
 Checked check(const CheckCommand& options) {

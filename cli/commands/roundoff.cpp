@@ -16,6 +16,7 @@
 #include "generator/formula/source.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 
@@ -96,6 +97,7 @@ void roundoff(const RoundoffCommand& options) {
     Scene scene = read_scene(options.scene);
     refuse_clock(scene, "lobatto roundoff");
     refuse_constraints(scene, "lobatto roundoff");
+    refuse_impacts(scene, "lobatto roundoff");
     options.method.apply(scene);
     MethodOption::require_double(scene, "roundoff");
     if (scene.method.family == Family::splitting)

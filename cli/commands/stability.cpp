@@ -17,6 +17,7 @@
 #include "generator/formula/source.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "generator/method/splitting_stability.hpp"
 
 namespace lobatto {
@@ -88,6 +89,7 @@ void show_scene(const StabilityCommand& options) {
     Scene scene = read_scene(*options.scene);
     refuse_clock(scene, "lobatto stability");
     refuse_constraints(scene, "lobatto stability");
+    refuse_impacts(scene, "lobatto stability");
     options.method.apply(scene);
     MethodOption::require_double(scene, "stability");
     if (scene.method.family == Family::splitting)

@@ -17,6 +17,7 @@
 #include "cli/print/tradeoff_report.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
@@ -41,6 +42,7 @@ void tradeoff(const TradeoffOptions& options) {
     const Scene written = read_scene(options.scene);
     refuse_clock(written, "lobatto tradeoff");
     refuse_constraints(written, "lobatto tradeoff");
+    refuse_impacts(written, "lobatto tradeoff");
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);

@@ -15,6 +15,7 @@
 #include "cli/print/tell.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 
@@ -64,6 +65,7 @@ void tune(const TuneOptions& options) {
     const Scene written = read_scene(options.scene);
     refuse_clock(written, "lobatto tune");
     refuse_constraints(written, "lobatto tune");
+    refuse_impacts(written, "lobatto tune");
     Scene scene = written;
     apply(options.overrides, scene);
     const Interruption interruption;

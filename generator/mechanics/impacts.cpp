@@ -30,7 +30,7 @@ void check_impacts(const Scene& scene, const System& system) {
 
 void refuse_impacts(const Scene& scene, const std::string& what) {
     if (scene.impacts.empty()) return;
-    scene.source.fail(scene.impacts.front().when.at, what + " knows no impacts; run, sweep, emit, derive and check do");
+    scene.source.fail(scene.impacts.front().when.at, what + " knows no impacts; run, sweep, emit, derive, check and verify do");
 }
 
 }  // namespace lobatto

@@ -438,6 +438,35 @@ TEST_CASE("events go to a file beside the trajectory, each on the exact motion")
     }
 }
 
+TEST_CASE("impacts and stops are told, and have their rows beside the trajectory") {
+    const Place place;
+    const std::string scene = place.file("ball.toml");
+    test::write_text(scene,
+                     "lagrangian = \"y'^2/2 - 2*y\"\n[coordinates]\ny = { position = 1, velocity = 0 }\n[impacts]\n"
+                     "floor = { when = \"y = 0 falling\", restitution = 0.5 }\n[run]\nstep = 0.3\nuntil = 2.9\n"
+                     "stop = \"y' = 0 falling\"\n");
+    const test::Finished stopped = place.run({scene, "-o", place.file()});
+    CHECK(stopped.exit_code == 0);
+    CHECK(stopped.out.find("stopped                 by 'y' = 0 falling' at t = 1.5\n") != std::string::npos);
+    CHECK(stopped.out.find("impacts                 1 of 'floor: y = 0 falling', in ") != std::string::npos);
+    const TrajectoryTable states = read_trajectory(place.file()),
+                          events = read_trajectory(place.file("run.events.csv"));
+    CHECK(std::fabs(states.rows.back()[0] - 1.5) < 1e-14);
+    CHECK(std::fabs(states.rows.back()[1] - 0.25) < 1e-14);
+    REQUIRE(events.rows.size() == 2);
+    CHECK(events.rows[0][0] == 2);
+    CHECK(std::fabs(events.rows[0][1] - 1) < 1e-14);
+    CHECK(events.rows[1][0] == 1);
+
+    // Without the stop impacts accumulate at t = 3.
+    test::write_text(scene, test::read_file(scene).substr(0, test::read_file(scene).find("until")) + "until = 4\n");
+    const test::Finished failed = place.run({scene, "-o", place.file()});
+    CHECK(failed.exit_code == 3);
+    CHECK(failed.err.find("after t = 2.7") != std::string::npos);
+    CHECK(failed.err.find("impacts accumulate") != std::string::npos);
+    CHECK(read_trajectory(place.file()).rows.size() == 10);
+}
+
 TEST_CASE("what a drive or friction does to the energy is called a change, and no symplecticity is promised") {
     const Place place;
     const std::string scene = place.file("scene.toml");

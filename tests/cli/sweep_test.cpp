@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <numbers>
 #include <regex>
 #include <thread>
 
@@ -114,6 +115,64 @@ bool same_rows(const std::vector<std::vector<double>>& a, const std::vector<std:
 }
 
 }  // namespace
+
+TEST_CASE("what is kept of a trajectory is one row of numbers") {
+    // q = A cos 2t with A = 1, 2, 3, p = -2 A sin 2t, H = 2 A^2.
+    const Place place;
+    const std::string scene = place.file("oscillator.toml");
+    test::write_text(scene,
+                     "lagrangian = \"q'^2/2 - 2*q^2\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\n"
+                     "points = 8\n[run]\nstep = \"pi/40\"\nuntil = \"2*pi\"\n");
+    const TrajectoryTable table =
+        place.table({scene, "--vary", "q=1:3:3", "--keep",
+                     "first(q = 0), first(q = 5), count(q' = 0 rising), max(q), min(q + 1), mean(q^2)", "--keep",
+                     "last(p_q), max(H), mean(p_q*q')"});
+    CHECK(table.columns[5] == "first(q = 0)");
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double A = 1 + static_cast<double>(i);
+        CHECK(std::fabs(column(table, "first(q = 0)")[i] - std::numbers::pi / 4) < 1e-13);
+        CHECK(std::isnan(column(table, "first(q = 5)")[i]));
+        CHECK(column(table, "count(q' = 0 rising)")[i] == 2);
+        CHECK(std::fabs(column(table, "max(q)")[i] - A) < 1e-12);
+        CHECK(std::fabs(column(table, "min(q + 1)")[i] - (1 - A)) < 1e-12);
+        CHECK(std::fabs(column(table, "mean(q^2)")[i] - A * A / 2) < 1e-12);
+        CHECK(std::fabs(column(table, "last(p_q)")[i]) < 1e-11);
+        CHECK(std::fabs(column(table, "max(H)")[i] - 2 * A * A) < 1e-11);
+        CHECK(std::fabs(column(table, "mean(p_q*q')")[i] - 2 * A * A) < 1e-11);
+        CHECK(column(table, "t")[i] == 2 * std::numbers::pi);
+    }
+    const auto refusal = [&](const std::string& keep) {
+        const test::Finished done = place.sweep({scene, "--vary", "q=1,2", "--keep", keep});
+        CHECK(done.exit_code == 2);
+        return done.err;
+    };
+    CHECK(contains(refusal("mode(q)"), "--keep:1:1: what is kept of a trajectory is first(x = 0)"));
+    CHECK(contains(refusal("max(q), max(r)"), "--keep:1:13: unknown name 'r'"));
+    CHECK(contains(refusal("first(H = 1)"), "not of H and momenta"));
+    CHECK(contains(refusal("max(q"), "--keep:1:1"));
+}
+
+TEST_CASE("a trajectory that meets a stop ends there, alone, and the others go on") {
+    const Place place;
+    const std::string scene = place.file("pendulum.toml");
+    test::write_text(scene,
+                     "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 0, velocity = 1 }\n[method]\n"
+                     "points = 8\n[run]\nstep = 0.1\nuntil = 5\nstop = [\"q = pi\", \"q = -pi\"]\n");
+    const TrajectoryTable table =
+        place.table({scene, "--vary", "q'=1,-2.5,3", "--keep", "first(q = 1)", "--threads", "2"});
+    CHECK(column(table, "stop") == std::vector<double>{0, 2, 1});
+    CHECK(column(table, "status") == std::vector<double>{0, 0, 0});
+    // A turn takes 2 K(k) k with k = 2/q'(0).
+    CHECK(column(table, "t")[0] == 5);
+    CHECK(std::fabs(column(table, "t")[1] - 0.8 * std::comp_ellint_1(0.8)) < 1e-12);
+    CHECK(std::fabs(column(table, "t")[2] - 2.0 / 3 * std::comp_ellint_1(2.0 / 3)) < 1e-12);
+    for (const double error : column(table, "error")) CHECK(error < 1e-9);
+    // The states at the ends, without --keep.
+    const TrajectoryTable states = place.table({scene, "--vary", "q'=1,-2.5,3"});
+    CHECK(std::fabs(column(states, "q")[1] + std::numbers::pi) < 1e-13);
+    CHECK(std::fabs(column(states, "p_q")[2] - std::sqrt(5.0)) < 1e-12);
+    CHECK(column(states, "stop") == std::vector<double>{0, 2, 1});
+}
 
 TEST_CASE("a sweep says what it did and where its table is") {
     const Place place;

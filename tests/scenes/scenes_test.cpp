@@ -465,6 +465,63 @@ TEST_CASE("the four-bar linkage moves like the one whose only coordinate is its 
     CHECK(std::fabs(linkage(linkage.last(), "a") - end_of(minimal)[0]) < 1e-7);
 }
 
+TEST_CASE("the bouncing ball is where parabolas say") {
+    const Trajectory ball("bouncing_ball");
+    const double g = 9.81, e = 0.8;
+    for (std::size_t row = 0; row < ball.size(); ++row) {
+        const double t = ball(row, "t");
+        double impact = std::sqrt(2 / g), speed = std::sqrt(2 * g), y = 1 - g * t * t / 2;
+        while (t >= impact) {
+            speed *= e;
+            const double flown = t - impact;
+            y = flown * (speed - g * flown / 2);
+            impact += 2 * speed / g;
+        }
+        CHECK(std::fabs(ball(row, "y") - y) < 1e-13);
+    }
+}
+
+TEST_CASE("two balls of Newton's cradle move at any time, and both like one pendulum") {
+    const Trajectory cradle("newtons_cradle");
+    for (std::size_t row = 0; row < cradle.size(); ++row) {
+        int moving = 0;
+        double sum = 0;
+        for (const char* q : {"q_1", "q_2", "q_3", "q_4", "q_5"}) {
+            moving += std::fabs(cradle(row, q)) > 1e-9 ? 1 : 0;
+            sum += std::fabs(cradle(row, q));
+        }
+        CHECK((moving == 2 || moving == 0));
+        const auto exact = pendulum_solution(9.81L / 0.15L, 0.5L, 0, static_cast<long double>(cradle(row, "t")));
+        CHECK(std::fabs(sum - 2 * std::fabs(static_cast<double>(exact.q))) < 1e-9);
+    }
+}
+
+TEST_CASE("Sinai's billiard goes in straight lines from mirror to mirror") {
+    const Trajectory billiard("sinai_billiard");
+    long double x = 0.7L, y = 0.1L, u = 0.6L, v = 0.8L, left = 12;
+    for (;;) {
+        // The first mirror on the way: walls at +-1, the disc of radius 0.4.
+        const long double to_x = u > 0 ? (1 - x) / u : (-1 - x) / u, to_y = v > 0 ? (1 - y) / v : (-1 - y) / v,
+                          b = x * u + y * v, c = x * x + y * y - 0.16L;
+        long double to_disc = 1e9L;
+        if (b < 0 && b * b > c && c > 1e-15L) to_disc = -b - std::sqrt(b * b - c);
+        const long double next = std::min({to_x, to_y, to_disc});
+        if (next > left) break;
+        left -= next;
+        x += next * u;
+        y += next * v;
+        if (next == to_disc) {
+            const long double normal = 2 * (x * u + y * v) / 0.16L;
+            u -= normal * x;
+            v -= normal * y;
+        } else {
+            (next == to_x ? u : v) *= -1;
+        }
+    }
+    CHECK(std::fabs(billiard(billiard.last(), "x") - static_cast<double>(x + left * u)) < 1e-11);
+    CHECK(std::fabs(billiard(billiard.last(), "y") - static_cast<double>(y + left * v)) < 1e-11);
+}
+
 TEST_CASE("the free body tips over, and keeps its energy and its angular momentum") {
     const Trajectory body("free_body");
     // Of space: 2 q x p by the quaternion from the left.
