@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "analysis/accuracy/tape.hpp"
+#include "analysis/tape.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/run/ensemble.hpp"
 

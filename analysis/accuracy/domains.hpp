@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/accuracy/tape.hpp"
+#include "analysis/tape.hpp"
 #include "generator/mechanics/system.hpp"
 #include "runtime/run/trajectory.hpp"
 

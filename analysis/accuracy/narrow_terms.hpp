@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/accuracy/pulses.hpp"
-#include "analysis/accuracy/tape.hpp"
+#include "analysis/tape.hpp"
 #include "generator/mechanics/system.hpp"
 
 namespace lobatto {

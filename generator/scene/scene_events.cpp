@@ -223,11 +223,11 @@ void SystemReader::read_kept(const Source& source, const Text& text) {
         const EventSyntax crossing = parse_crossing(source, inner, scope);
         const Operand value = evaluate(source, crossing.difference, scope);
         kept.crossing = {collapsed(inner.value), value.expression, crossing.direction, text.at.front()};
-        if (!value.moves && !value.velocities)
-            source.fail(inner.at.front(), "this event never happens: it holds neither a coordinate nor the time");
         for (const GiNaC::symbol& symbol : scene_.outputs.momenta_of_kept)
             if (value.expression.has(symbol)) source.fail(inner.at.front(), no_energy_here);
         if (value.expression.has(scene_.outputs.energy_of_kept)) source.fail(inner.at.front(), no_energy_here);
+        if (!value.moves && !value.velocities)
+            source.fail(inner.at.front(), "this event never happens: it holds neither a coordinate nor the time");
     } else {
         kept.value = evaluate(source, parse_formula(source, inner, scope), scope).expression;
     }

@@ -7,10 +7,7 @@
 //   linear       the second derivatives are constant, so that one correction solves a step
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
 //   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
-//                for falling, 0 for both. Where there are any: the last `impacts` of them are walls, the `stops` before
-//                these end the motion. impact(k, q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of
-//                each wall; where reset_of[] is not below 0, reset(k, q, velocity, q1, velocity1) gives the state after
-//                that one of the `resets`
+//                for falling, 0 for both. More of them: steppers/events.hpp
 // Form::linear_map and Form::separable: is_explicit; of splitting methods they have c, b and drift_length[s - 1], the
 //   way between nodes, and neither A nor E nor what orders unknowns.
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), minus_acceleration(k, q, W),
@@ -26,9 +23,7 @@
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
 //   multiplier_terms(k, q, velocity, r, s) what multipliers follow from; `constant_mass` that M is constant and forces
-//   hold no velocity. `angles`
-//   is how many arguments of sine and cosine `stage` holds; where there are any it takes one more argument, AnglesAnew
-//   by default, which gives their sines and cosines (base/angles.hpp).
+//   hold no velocity. `angles`: how many sines and cosines `stage` takes as a last argument (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 

@@ -6,8 +6,10 @@
 // not the polynomial, of lower order than the steps, but g at the end of a step of the same method from the same
 // start, shortened to theta h: the signs, and the root between them.
 //
-// The last functions may be those of walls (impacts.hpp): the motion is on their one side until it meets them, and
-// values that are rounding there are zero.
+// Of the K::events functions the last K::impacts are those of walls (impacts.hpp): the motion is on their one side
+// until it meets them, and values that are rounding there are zero. The K::stops before these end the motion. impact(k,
+// q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not below 0,
+// reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
 #ifndef LOBATTO_KERNEL_EVENTS_HPP
 #define LOBATTO_KERNEL_EVENTS_HPP
 

@@ -623,7 +623,7 @@ TEST_CASE("events have two sides and may have a direction") {
     const auto check = [](const std::string& events, int column, const std::string& message) {
         check_error(9, "until = 1\n[output]\nevents = " + events, {11, column}, message);
     };
-    check("\"q = 0\"", 10, "events must be a list such as [\"x = 0 rising\"], not a text");
+    check("3", 10, "events must be a list such as [\"x = 0 rising\"], not a whole number");
     check("[1]", 11, "an event must be a text such as \"x = 0 rising\", not a whole number");
     check("[\"q\"]", 13, "an event is written x = 0, x = 0 rising or x = y falling");
     check("[\"q = 0 rise\"]", 18, "missing operator: write 0*rise");

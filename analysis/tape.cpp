@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "analysis/accuracy/tape.hpp"
+#include "analysis/tape.hpp"
 
 #include <algorithm>
 #include <cmath>
