@@ -54,19 +54,22 @@ std::vector<Output> outputs_of(const Derivation& derivation, long operations) {
     for (const Event& stop : derivation.scene.run.stops) stops += (stops.empty() ? "" : ", ") + stop.text;
     for (const Impact& impact : derivation.scene.impacts) impacts += (impacts.empty() ? "" : ", ") + impact.when.text;
     for (const Event& event : asked.events) events += (events.empty() ? "" : ", ") + event.text;
-    return {{"energy", asked.energy, "H at every kept state",
-             cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
-            {"momenta", asked.momenta, "columns p_... of the trajectory", 0},
-            {"tangent", asked.tangent,
-             derivation.structure.is_explicit() ? "the derivative of a step, kick by kick and drift by drift"
-                                                : "the derivative of a step, from the matrix of its equations",
-             cost(asked.tangent, [](Outputs& outputs) { outputs.tangent = false; })},
-            {"dense", asked.dense > 0,
-             fmt::format("{} states between two steps, on the step's polynomial", asked.dense), 0},
-            {"events", !asked.events.empty(), events,
-             cost(!asked.events.empty(), [](Outputs& outputs) { outputs.events.clear(); })},
-            {"stops", !stops.empty(), stops, 0},
-            {"impacts", !impacts.empty(), impacts, 0}};
+    std::vector<Output> all{
+        {"energy", asked.energy, "H at every kept state",
+         cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
+        {"momenta", asked.momenta, "columns p_... of the trajectory", 0},
+        {"tangent", asked.tangent,
+         derivation.structure.is_explicit() ? "the derivative of a step, kick by kick and drift by drift"
+                                            : "the derivative of a step, from the matrix of its equations",
+         cost(asked.tangent, [](Outputs& outputs) { outputs.tangent = false; })},
+        {"dense", asked.dense > 0, fmt::format("{} states between two steps, on the step's polynomial", asked.dense),
+         0},
+        {"events", !asked.events.empty(), events,
+         cost(!asked.events.empty(), [](Outputs& outputs) { outputs.events.clear(); })},
+    };
+    if (!stops.empty()) all.push_back({"stops", true, stops, 0});
+    if (!impacts.empty()) all.push_back({"impacts", true, impacts, 0});
+    return all;
 }
 
 Checked check(const CheckCommand& options) {

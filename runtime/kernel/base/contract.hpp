@@ -90,9 +90,8 @@ struct Formulas {
 };
 #undef LOBATTO_WITH_TIME
 
-// How the steps of systems with constant mass are taken: the equations of inner nodes solved, round-off-clean
-// (steppers/clean.hpp), or kicks and drifts in turn (steppers/splitting.hpp).
-// The steps of any Lagrangian may be equally long in the time of a clock (steppers/clocked.hpp).
+// How steps are taken: the equations of inner nodes solved, round-off-clean (steppers/clean.hpp), kicks and drifts in
+// turn (steppers/splitting.hpp), equally long in the time of a clock (steppers/clocked.hpp).
 enum class Stepping { solved, clean, composition, clocked };
 template <class K>
 constexpr Stepping stepping_of() {
@@ -180,8 +179,7 @@ struct Motion {
 template <class K, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Stepper;
 
-// K for what a trajectory side by side with others rarely does alone: its steps by Newton's iteration, so that
-// iterations are compiled for lanes only.
+// K for a trajectory that leaves the lanes for a step: by Newton's iteration, so that no other is compiled.
 template <class K>
 struct NewtonOnly : K {
     static constexpr bool any_number = false;
@@ -191,8 +189,7 @@ using FallbackKernel = std::conditional_t<stepping_of<K>() == Stepping::composit
 template <class K>
 using ScalarFallback = Stepper<FallbackKernel<K>>;
 
-// The fixed-point iteration of one trajectory of a separable system: along its nodes (iteration/fixed_point.hpp), or
-// along its neighbouring coordinates (iteration/neighbours.hpp).
+// Fixed-point iteration along the nodes (iteration/fixed_point.hpp), or along coordinates (iteration/neighbours.hpp).
 template <class K, bool neighbours>
 struct FixedPointOf;
 

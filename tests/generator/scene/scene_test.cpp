@@ -232,7 +232,7 @@ TEST_CASE("mistakes of TOML come with their place") {
 TEST_CASE("unknown and missing keys are named") {
     check_error(8, "stpe = 0.1", {8, 1},
                 "unknown key 'stpe' in [run]; known: step, steps_per_period, period, until, error, beyond_horizon, "
-                "assemble. Did you mean 'step'?");
+                "assemble, stop. Did you mean 'step'?");
     check_error(3, "q = { position = 1, velocty = 0 }", {3, 21},
                 "unknown key 'velocty' in coordinate q; known: count, unit, position, velocity, momentum. "
                 "Did you mean 'velocity'?");
