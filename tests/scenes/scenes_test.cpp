@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -463,6 +464,18 @@ TEST_CASE("the four-bar linkage moves like the one whose only coordinate is its 
                                 "b = \"asin((k*sin(c) - r*sin(a))/l)\"\n" +
                                 parameters_of("four_bar") + "[method]\npoints = 8\n[run]\nstep = 0.01\nuntil = 10\n";
     CHECK(std::fabs(linkage(linkage.last(), "a") - end_of(minimal)[0]) < 1e-7);
+}
+
+TEST_CASE("the flipping pendulum stops where a rod turns over, and mirrored at the same time") {
+    const double energy = -3 * std::cos(1.0);
+    const Trajectory one("flips", {"--set", "a=2.5"}), other("flips", {"--set", "a=-2.5", "--set", "b=-1"});
+    const double a = one(one.last(), "a"), b = one(one.last(), "b");
+    CHECK(std::min(std::fabs(std::fabs(a) - std::numbers::pi), std::fabs(std::fabs(b) - std::numbers::pi)) < 1e-13);
+    CHECK(one(one.last(), "t") < 100);
+    CHECK(std::fabs(one(one.last(), "t") - other(other.last(), "t")) < 1e-12);
+    CHECK(std::fabs(other(other.last(), "a") + a) < 1e-12);
+    CHECK(std::fabs(one(one.last(), "H") - one(0, "H")) < 1e-5);
+    CHECK(std::fabs(one(0, "H") - (energy + 2 * std::cos(1.0) - 2 * std::cos(2.5))) < 1e-15);
 }
 
 TEST_CASE("the bouncing ball is where parabolas say") {
