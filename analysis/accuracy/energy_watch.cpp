@@ -84,7 +84,7 @@ std::string why(double step, bool too_coarse) {
 }  // namespace
 
 bool EnergyWatch::can_watch(const Derivation& derivation) {
-    return !derivation.scene.clock && derivation.conserves_energy() &&
+    return !derivation.scene.clock && derivation.scene.switches.empty() && derivation.conserves_energy() &&
            derivation.system.q.size() <= ExactEnergy::most_coordinates;
 }
 

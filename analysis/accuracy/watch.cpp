@@ -20,8 +20,11 @@ long double nearest(const Scene& scene, const GiNaC::ex& value, const char* what
 
 Watch::Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
              const std::vector<double>& velocity)
-    : between_(scene.outputs.dense), discrete_(discrete_energy(stepper)) {
-    if (scene.impacts.empty()) closed_ = structure.closed_solution;  // which knows no walls
+    : between_(scene.outputs.dense) {
+    if (!scene.is_cut()) {
+        closed_ = structure.closed_solution;
+        discrete_ = discrete_energy(stepper);
+    }
     if (!closed_) return;
     omega_squared_ = nearest(scene, closed_->omega_squared, "the squared frequency");
     q0_ = nearest(scene, scene.initial_position[0], "the initial position");

@@ -69,6 +69,11 @@ std::vector<Output> outputs_of(const Derivation& derivation, long operations) {
     };
     if (!stops.empty()) all.push_back({"stops", true, stops, 0});
     if (!impacts.empty()) all.push_back({"impacts", true, impacts, 0});
+    std::string switches;
+    for (const Switch& one : derivation.scene.switches) switches += (switches.empty() ? "" : ", ") + one.text;
+    if (!switches.empty())
+        all.push_back(
+            {"not smooth", true, switches + ": steps are cut where it changes, so that the order is kept", 0});
     return all;
 }
 

@@ -88,7 +88,7 @@ TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
     header.multipliers = 0;
     header.energy = false;
     header.columns.insert(header.columns.begin(), {"event", ""});
-    for (const Event& event : scene.watched()) header.events.push_back(event.text);
+    for (const Event& event : scene.reported()) header.events.push_back(event.text);
     return header;
 }
 
@@ -158,7 +158,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const Kernel&
 // `counts`: of the states, then of each kind of event.
 void print_events(const Scene& scene, const TrajectoryResult& result, const std::vector<double>& counts,
                   const std::string& path) {
-    const std::vector<Event> watched = scene.watched();
+    const std::vector<Event> watched = scene.reported();
     if (result.stop >= 0)
         print_row("stopped", fmt::format("by '{}' at t = {:.9g}", watched[static_cast<std::size_t>(result.stop)].text,
                                          result.time));
@@ -234,7 +234,7 @@ public:
           energy(run.derivation, run.plain),
           domains(run.scene, run.derivation.system),
           parameters(request.parameters),
-          counts(1 + run.scene.watched().size(), 0) {
+          counts(1 + run.scene.reported().size(), 0) {
         if (measures) companion.emplace(run.derivation, run.kernel, request);
     }
 
@@ -287,7 +287,7 @@ public:
           const std::optional<Checkpoint>& from)
         : path_(output_path(options.output, result_name(run.scene.path) + ".csv")),
           trajectory_(path_, header, from ? from->files[0] : Written()) {
-        if (!run.scene.watched().empty()) {
+        if (!run.scene.reported().empty()) {
             event_path_ = event_path(options, run.scene);
             events_.emplace(event_path_, event_header_of(run.scene, header), from ? from->files[1] : Written());
         }
@@ -328,7 +328,7 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
         files.write(records);
         observers.observe(records);
     };
-    if (!run.scene.watched().empty())
+    if (!run.scene.reported().empty())
         request.events = [&](const EventRecords& records) {
             files.write(records);
             observers.observe(records);
@@ -389,7 +389,7 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
             observers.domains.text(observers.parameters, row.data()));
     }
     const std::string departure = observers.energy.departure(run.derivation, run.plain, request);
-    if (run.scene.clock || !run.scene.impacts.empty()) return departure;
+    if (run.scene.clock || run.scene.is_cut()) return departure;
     return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
 }
 
@@ -426,7 +426,7 @@ void run(const RunOptions& options) {
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
     add_digits(request, scene, run.kernel);
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
-    const bool has_events = !scene.watched().empty();
+    const bool has_events = !scene.reported().empty();
     keep_scene(scene.path, path);
     keep_foreign(path);
     if (has_events) {
@@ -466,7 +466,7 @@ void run(const RunOptions& options) {
     if (departure.empty()) departure = loss_of(options, scene, request, error);
     std::vector<std::string> warnings;
     if (error && departure.empty()) warnings = warnings_of(*error, scene.run.error);
-    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && scene.impacts.empty())
+    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
             warnings.push_back(warning);

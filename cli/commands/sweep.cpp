@@ -437,7 +437,7 @@ void sweep(const SweepOptions& options) {
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
     // number of them changes what a trajectory becomes.
     // Stops, impacts and what is kept are of single trajectories.
-    const bool is_alone = !scene.outputs.kept.empty() || !scene.run.stops.empty() || !scene.impacts.empty();
+    const bool is_alone = !scene.outputs.kept.empty() || !scene.run.stops.empty() || scene.is_cut();
     const std::int64_t together = scene.coordinates.size() > 2 ? std::min<std::int64_t>(request.count, 8)
                                                                : request.count / thread_count(options.threads);
     const Kernel kernel =

@@ -332,6 +332,7 @@ void verify(const VerifyOptions& options) {
     Derivation derivation = with_walls;
     derivation.scene.impacts.clear();  // what is proved of steps is proved between impacts
     derivation.scene.run.stops.clear();
+    derivation.scene.switches.clear();  // their sides are those of the start
     EmitOptions emit_options;
     const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
     emit_options.precision = Precision::quadruple;
@@ -347,7 +348,7 @@ void verify(const VerifyOptions& options) {
     const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
     const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
     const std::size_t of_steps = rows.size();
-    if (!scene.impacts.empty()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
+    if (scene.is_cut()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
     taken_steps(rows, derivation, kernel, exact_kernel, start, exact);
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),

@@ -189,7 +189,9 @@ std::string watched_shapes(const Scene& scene) {
     int resets = 0;
     for (const Impact& impact : scene.impacts) reset_of.push_back(impact.reset_position.empty() ? -1 : resets++);
     line(text, fmt::format("int stops = {}", scene.run.stops.size()), "which end the motion");
-    line(text, fmt::format("int impacts = {}", scene.impacts.size()), "the last ones: walls that throw it back");
+    line(text, fmt::format("int impacts = {}", scene.impacts.size()), "walls that throw it back");
+    line(text, fmt::format("int switches = {}", scene.switches.size()),
+         "where formulas change; the last parameters are the sides");
     if (scene.impacts.empty()) return text;
     line(text, fmt::format("int resets = {}", resets), "walls with an outcome of their own");
     return text + integer_table("reset_of", reset_of);

@@ -165,6 +165,8 @@ private:
             }
             case Kind::series:
                 return series(formula, frame, arithmetic);
+            case Kind::pieced:
+                return pieced(formula, frame, arithmetic);
             case Kind::remainder:
                 break;
         }
@@ -172,6 +174,44 @@ private:
                    b = whole(formula.operands[1], frame, "what mod divides by");
         if (b <= 0) fail(formula.operands[1].at, frame, fmt::format("mod divides by {}; it must be positive", b));
         return operand_of((a % b + b) % b);
+    }
+
+    Operand pieced(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        std::vector<Operand> parts;
+        for (const Syntax& operand : formula.operands) parts.push_back(evaluate(operand, frame));
+        return computed(formula.at, frame, [&] {
+            const std::string_view name = formula.at.text;
+            const auto less = [&](const Operand& a, const Operand& b) {
+                return arithmetic.add(a, arithmetic.negate(b));
+            };
+            if (name == "hypot")
+                return arithmetic.call(*find_function("sqrt"), arithmetic.add(arithmetic.multiply(parts[0], parts[0]),
+                                                                              arithmetic.multiply(parts[1], parts[1])));
+            const bool is_of_one = name == "abs" || name == "sign";
+            const Operand side = side_of(is_of_one ? parts[0] : less(parts[0], parts[1]), formula, frame);
+            if (name == "sign") return side;
+            if (name == "abs") return arithmetic.multiply(side, parts[0]);
+            const Operand half = operand_of(numeric(1, 2)), one = operand_of(1);
+            const Operand above = arithmetic.multiply(half, arithmetic.add(one, side)),
+                          below = arithmetic.multiply(half, less(one, side));
+            const bool is_if = name == "if", is_min = name == "min";
+            const Operand &first = parts[is_if ? 2 : is_min ? 1 : 0], &second = parts[is_if ? 3 : is_min ? 0 : 1];
+            return arithmetic.add(arithmetic.multiply(above, first), arithmetic.multiply(below, second));
+        });
+    }
+
+    // 1 where u > 0, -1 where it is below: a number where that is known, else the side of a switch.
+    Operand side_of(const Operand& u, const Syntax& formula, const Frame& frame) {
+        if (u.value) return operand_of(u.value->is_negative() ? -1 : 1);
+        if (names_ == nullptr || !motion_allowed_)
+            fail(formula.at, frame,
+                 fmt::format("{} needs a number here: numbers, indices and parameters declared constant",
+                             formula.at.text));
+        for (const Switch& known : names_->switches)
+            if (known.value.is_equal(u.expression)) return operand_of(known.side);
+        names_->switches.push_back({u.expression, GiNaC::symbol(fmt::format("side_{}", names_->switches.size() + 1)),
+                                    fmt::format("{} in {}", formula.at.text, frame.formula), formula.at.at});
+        return operand_of(names_->switches.back().side);
     }
 
     // Of constants the arithmetic itself finds what has no value.

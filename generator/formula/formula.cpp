@@ -208,6 +208,7 @@ private:
             if (first.text == "sum") return follow(read_series(first));
             if (first.text == "mod") return follow(read_remainder(first));
             const Function* function = find_function(std::string(first.text));
+            if (function == nullptr && is_function_name(std::string(first.text))) return follow(read_pieced(first));
             return follow(function != nullptr ? read_call(first, *function) : read_name(first));
         }
         if (first.kind == Token::Kind::end && next_ > 0)
@@ -287,13 +288,37 @@ private:
         return remainder;
     }
 
+    // The order of a and b in if(a < b, c, d) is turned round.
+    Syntax read_pieced(const Token& name) {
+        const auto form = std::find_if(pieced_functions().begin(), pieced_functions().end(), [&](const auto& function) {
+                              return function.first == name.text;
+                          })->second;
+        refuse_without_parenthesis(name, form);
+        const Token open = tokens_[next_++];
+        Syntax pieced = node(Kind::pieced, name, read_sum());
+        if (name.text == "if") {
+            if (!token().is('<') && !token().is('>')) fail(token(), "a condition is written if(a > b, c, d)");
+            const bool is_less = tokens_[next_++].is('<');
+            pieced.operands.push_back(read_sum());
+            if (is_less) std::swap(pieced.operands[0], pieced.operands[1]);
+        }
+        const auto wanted =
+            static_cast<std::size_t>(std::count(form.begin(), form.end(), ',')) + (name.text == "if" ? 2 : 1);
+        while (pieced.operands.size() < wanted) {
+            if (!token().is(',')) fail(token(), fmt::format("{} is written {}", name.text, form));
+            ++next_;
+            pieced.operands.push_back(read_sum());
+        }
+        expect(')', open);
+        return pieced;
+    }
+
     // The index of a sum or a definition has no other meaning.
     void refuse_index(const Token& index) const {
         std::string meaning;
         if (const Name* name = find(index.text)) meaning = kind_of(*name);
         if (index.text == "pi") meaning = "the number 3.14159...";
-        if (index.text == "sum" || index.text == "mod" || find_function(std::string(index.text)) != nullptr)
-            meaning = "the name of a function";
+        if (is_function_name(std::string(index.text))) meaning = "the name of a function";
         if (std::find(indices_.begin(), indices_.end(), index.text) != indices_.end()) meaning = "an index already";
         if (!meaning.empty())
             fail(index, fmt::format("'{}' is {}; give the index another name", index.text.substr(0, 40), meaning));
@@ -391,6 +416,7 @@ private:
             std::vector<std::string> names;
             for (const Function& function : functions()) names.push_back(function.name);
             names.insert(names.end(), {"sum", "mod"});
+            for (const auto& [name, form] : pieced_functions()) names.push_back(name);
             const std::string near = name == "ln" ? " Write log." : suggestion(name, names);
             fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula,
                                  fmt::join(names, ", "), near));

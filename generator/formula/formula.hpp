@@ -26,8 +26,9 @@ struct Syntax {
         inverse,
         power,
         call,
-        series,    // sum(index = first .. last, term); operands: first, last, term
-        remainder  // mod(a, b)
+        series,     // sum(index = first .. last, term); operands: first, last, term
+        remainder,  // mod(a, b)
+        pieced      // abs(a), sign(a), min(a, b), max(a, b), hypot(a, b), if(a > b, c, d) by its operands a, b, c, d
     };
     Kind kind = Kind::number;
     Token at;  // a number, a name, an operator: what an error of it points at
@@ -49,8 +50,8 @@ struct Scope {
 };
 
 // Grammar: + - * / ^ (right-associative; -x^2 is -(x^2), 2^-1 is allowed), parentheses, numbers, pi, the functions
-// sqrt sin cos tan exp log sinh cosh tanh asin acos atan, x[i] and x[i]', sum(i = first .. last, formula), mod(a, b).
-// Throws InputError. Marks the names that occur as used. The tree refers to `text`.
+// sqrt sin cos tan exp log sinh cosh tanh asin acos atan, x[i] and x[i]', sum(i = first .. last, formula), mod(a, b),
+// and those of pieced_functions(). Throws InputError. Marks the names that occur as used. The tree refers to `text`.
 Syntax parse_formula(const Source& source, const Text& text, const Scope& scope);
 
 // "left = right", "left = right rising", "left = right falling".

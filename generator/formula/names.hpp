@@ -52,7 +52,16 @@ struct DomainCondition {
     bool of_motion = true;  // else of the step or the end time
 };
 
+// Where a formula goes from one smooth piece to another: u = 0. On either side its `side` is constant, 1 or -1.
+struct Switch {
+    GiNaC::ex value;  // u
+    GiNaC::symbol side;
+    std::string text;  // "abs in the Lagrangian"
+    Position at;
+};
+
 struct Names {
+    std::vector<Switch> switches;
     std::vector<DomainCondition> conditions;
     bool records = true;  // conditions
     std::map<std::string, Name, std::less<>> all;

@@ -91,6 +91,19 @@ const Function* find_function(const std::string& name) {
     return found == functions().end() ? nullptr : &*found;
 }
 
+const std::vector<std::pair<std::string, std::string>>& pieced_functions() {
+    static const std::vector<std::pair<std::string, std::string>> all = {
+        {"abs", "abs(a)"},    {"sign", "sign(a)"},      {"min", "min(a, b)"},
+        {"max", "max(a, b)"}, {"hypot", "hypot(a, b)"}, {"if", "if(a > b, c, d)"}};
+    return all;
+}
+
+bool is_function_name(const std::string& name) {
+    const auto is_named = [&](const auto& function) { return function.first == name; };
+    return name == "sum" || name == "mod" || find_function(name) != nullptr ||
+           std::any_of(pieced_functions().begin(), pieced_functions().end(), is_named);
+}
+
 numeric real_value(const numeric& exact) {
     return checked([&] { return exact.is_zero() ? exact : ex_to<numeric>(exact.evalf()); }, "the number");
 }

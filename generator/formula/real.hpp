@@ -24,6 +24,9 @@ struct Function {
 };
 const std::vector<Function>& functions();
 const Function* find_function(const std::string& name);  // nullptr: there is none of this name
+// Functions that are put together from smooth pieces, by their forms: abs(a), max(a, b) ...
+const std::vector<std::pair<std::string, std::string>>& pieced_functions();
+bool is_function_name(const std::string& name);  // also sum and mod
 
 // A number at 60 digits.
 GiNaC::numeric real_value(const GiNaC::numeric& exact);

@@ -82,7 +82,7 @@ private:
         const bool range = c == '.' && at(1) == '.';
         const bool prime = c == '\'' && next_ > 0 && value_[next_ - 1] == ']';
         if (c == '\'' && !prime) fail(next_, "a prime ' belongs directly after the name of a coordinate");
-        if (std::string_view("+-*/^()[],=").find(c) == std::string_view::npos && !range && !prime) refuse_character();
+        if (std::string_view("+-*/^()[],=<>").find(c) == std::string_view::npos && !range && !prime) refuse_character();
         next_ += range ? 2 : 1;
         if (prime && at(0) == '\'') fail_acceleration("x[...]''");
         return token(Token::Kind::sign);

@@ -29,8 +29,13 @@ void check_impacts(const Scene& scene, const System& system) {
 }
 
 void refuse_impacts(const Scene& scene, const std::string& what) {
-    if (scene.impacts.empty()) return;
-    scene.source.fail(scene.impacts.front().when.at, what + " knows no impacts; run, sweep, emit, derive, check and verify do");
+    if (!scene.impacts.empty())
+        scene.source.fail(scene.impacts.front().when.at,
+                          what + " knows no impacts; run, sweep, emit, derive, check and verify do");
+    if (!scene.switches.empty())
+        scene.source.fail(
+            scene.switches.front().at,
+            what + " knows smooth formulas only; run, sweep, emit, derive, check and verify know such as this");
 }
 
 }  // namespace lobatto

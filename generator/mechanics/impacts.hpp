@@ -10,7 +10,8 @@ namespace lobatto {
 // the scene starts on the right side of its walls.
 void check_impacts(const Scene& scene, const System& system);
 
-// InputError where a scene with impacts is given to what knows none: "lobatto stability".
+// InputError where a scene with impacts, or with formulas that are not smooth, is given to what knows none: "lobatto
+// stability".
 void refuse_impacts(const Scene& scene, const std::string& what);
 
 }  // namespace lobatto

@@ -25,7 +25,7 @@ void Declarations::declare(const std::string& name, Position at, const std::stri
                              name.substr(0, 40), what));
     if (name.size() > longest_name)
         fail(at, fmt::format("a name of {} letters; at most {}", name.size(), longest_name));
-    if (find_function(name) != nullptr || name == "sum" || name == "mod")
+    if (is_function_name(name))
         fail(at, fmt::format("'{}' is the name of a function; give the {} another name", name, what));
     for (const auto& [reserved, meaning] : reserved_names)
         if (name == reserved && !(what == "time" && name == "t"))

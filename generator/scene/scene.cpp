@@ -60,6 +60,7 @@ public:
         for (std::size_t i = of_motion; i < scene_.conditions.size(); ++i) scene_.conditions[i].of_motion = false;
         read_output();
         system_.read_kept(kept);
+        system_.add_switches();
         refuse_beside_impacts();
         system_.refuse_unused();
         return std::move(scene_);
@@ -269,12 +270,11 @@ private:
     }
 
     void refuse_beside_impacts() const {
-        if (scene_.impacts.empty()) return;
-        const auto refuse = [&](const std::string& why) {
-            fail(scene_.impacts.front().when.at, "impacts need " + why);
-        };
-        if (scene_.clock) refuse("equal steps in time; leave out the clock");
-        if (scene_.outputs.dense > 0) refuse("dense = 0: a step with an impact is no polynomial");
+        if (!scene_.is_cut()) return;
+        const Position at = scene_.impacts.empty() ? scene_.switches.front().at : scene_.impacts.front().when.at;
+        const std::string what = scene_.impacts.empty() ? "formulas that are not smooth" : "impacts";
+        if (scene_.clock) fail(at, what + " need equal steps in time; leave out the clock");
+        if (scene_.outputs.dense > 0) fail(at, what + " need dense = 0: a step that is cut is no polynomial");
     }
 
     const Source& source_;
@@ -294,10 +294,16 @@ void Outputs::watch_kept() {
     }
 }
 
-std::vector<Event> Scene::watched() const {
+std::vector<Event> Scene::reported() const {
     std::vector<Event> all = outputs.events;
     all.insert(all.end(), run.stops.begin(), run.stops.end());
     for (const Impact& impact : impacts) all.push_back(impact.when);
+    return all;
+}
+
+std::vector<Event> Scene::watched() const {
+    std::vector<Event> all = reported();
+    for (const Switch& one : switches) all.push_back({one.text, one.value, 0, one.at});
     return all;
 }
 

@@ -134,14 +134,17 @@ struct Scene {
     Start start = Start::velocity;
     std::vector<Constraint> constraints;
     std::vector<Impact> impacts;
+    std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
     std::optional<Clock> clock;
     Run run;
     Outputs outputs;
 
-    // All that a kernel looks for in each step: events, then stops, then impacts.
+    // All that a kernel looks for in each step: events, then stops, impacts, switches.
     std::vector<Event> watched() const;
+    std::vector<Event> reported() const;                                   // without switches, which are no events
+    bool is_cut() const { return !impacts.empty() || !switches.empty(); }  // whether steps may be
 
     // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
     // order: 60 decimal digits; throws InputError naming `what` when it is not a finite real number.

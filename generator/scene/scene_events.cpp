@@ -135,6 +135,27 @@ void SystemReader::read_reset(const Entry& entry, Impact& impact, const Scope& s
     }
 }
 
+// Their sides become parameters, beside which nothing of the scene is called the same.
+void SystemReader::add_switches() {
+    GiNaC::exmap start = parameter_values_;
+    for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
+        const bool is_known = scene_.start == Start::velocity;
+        start[scene_.coordinates[k].position] = scene_.initial_position[k].subs(parameter_values_);
+        start[scene_.coordinates[k].velocity] =
+            is_known ? scene_.initial_rate[k].subs(parameter_values_) : GiNaC::ex(0);
+    }
+    start[scene_.time] = 0;
+    for (Switch& one : names_.switches) {
+        const std::string name = one.side.get_name();
+        declarations_.declare(name, one.at, "side of " + one.text);
+        const GiNaC::numeric value = value_in_range(source_, one.at, one.value, one.text, start);
+        const int side = value.is_negative() ? -1 : 1;
+        start[one.side] = side;
+        scene_.parameters.push_back({name, "", side, one.side, name});
+        scene_.switches.push_back(one);
+    }
+}
+
 namespace {
 
 // Part of a text.

@@ -25,6 +25,7 @@ public:
     // All names before the formulas they occur in.
     void read();
     // After the last formula of the scene.
+    void add_switches();
     void refuse_unused() const;
 
     // How further formulas are read: those that may hold what moves, and those in parameters.

@@ -63,6 +63,8 @@ struct Export {
     static constexpr bool is_whole = E::lanes == 0;
     static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
     static constexpr int constraint_count = constraints_of<K>();
+    static constexpr bool has_switches = is_whole && switches_of<K>() > 0;
+    static constexpr bool has_walls = has_switches || (is_whole && impacts_of<K>() > 0);
     static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
     using S = std::conditional_t<(event_count > 0), WatchedStepper<K>, Stepper<K>>;
 
@@ -82,11 +84,36 @@ struct Export {
     }
 
     static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
+        if constexpr (has_switches) take_sides(*static_cast<S*>(stepper), *in(time), in(q), in(p));
         const Status status = static_cast<S*>(stepper)->start(*in(time), in(q), in(p));
-        if constexpr (is_whole && impacts_of<K>() > 0) {
+        if constexpr (has_walls) {
             if (status == Status::ok) return code(side_of_walls(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
         }
         return code(status);
+    }
+    // The side of each switch where a state is; a velocity is that of the sides so far.
+    static void take_sides(S& stepper, real time, const real* q, const real* p) {
+        real velocity[n];
+        if (stepper.velocity(time, q, p, velocity) == Status::ok) take_sides_at(stepper, time, q, velocity);
+    }
+    static void take_sides_at(S& stepper, real time, const real* q, const real* velocity) {
+        real values[K::events];
+        Formulas<K>::event(stepper.coefficients, time, q, velocity, +values);
+        for (int i = 0; i < switches_of<K>(); ++i)
+            stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
+        stepper.prepare(stepper.parameters, stepper.step_size);
+    }
+    // What `use` makes of the stepper as it is at a state.
+    template <class Use>
+    static auto at_state(const void* stepper, const void* time, const void* q, const void* p, const Use& use) {
+        if constexpr (has_switches) {
+            S local = of(stepper);
+            take_sides(local, *in(time), in(q), in(p));
+            return use(local);
+        } else {
+            (void)time, (void)q, (void)p;
+            return use(of(stepper));
+        }
     }
     // Whether a state is where the motion may be.
     static Status side_of_walls(S& stepper, real time, const real* q, const real* p) {
@@ -118,7 +145,7 @@ struct Export {
 
     static Status advance_in(S& stepper, lobatto_advance& call) {
         if constexpr (event_count > 0) {
-            if (call.events != nullptr || impacts_of<K>() > 0) {
+            if (call.events != nullptr || has_walls) {
                 Watch<K> watch(stepper);
                 return take_steps(stepper, call, &watch);
             }
@@ -306,13 +333,21 @@ struct Export {
     }
 
     static std::int32_t energy(const void* stepper, const void* time, const void* q, const void* p, void* energy) {
-        return code(of(stepper).energy(*in(time), in(q), in(p), out(energy)));
+        return at_state(stepper, time, q, p,
+                        [&](const S& s) { return code(s.energy(*in(time), in(q), in(p), out(energy))); });
     }
     static void momentum(const void* stepper, const void* time, const void* q, const void* velocity, void* p) {
-        of(stepper).momentum(*in(time), in(q), in(velocity), out(p));
+        if constexpr (has_switches) {
+            S local = of(stepper);
+            take_sides_at(local, *in(time), in(q), in(velocity));
+            local.momentum(*in(time), in(q), in(velocity), out(p));
+        } else {
+            of(stepper).momentum(*in(time), in(q), in(velocity), out(p));
+        }
     }
     static std::int32_t velocity(const void* stepper, const void* time, const void* q, const void* p, void* velocity) {
-        return code(of(stepper).velocity(*in(time), in(q), in(p), out(velocity)));
+        return at_state(stepper, time, q, p,
+                        [&](const S& s) { return code(s.velocity(*in(time), in(q), in(p), out(velocity))); });
     }
     static void slopes(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv, void* Lq) {
         of(stepper).slopes(*in(time), in(q), in(velocity), out(Lv), out(Lq));
@@ -421,7 +456,9 @@ struct Export {
 // With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster, and where
 // none ends before the others or meets a wall.
 #ifdef LOBATTO_ENSEMBLES
-template <class K, int lanes = (stops_of<K>() + impacts_of<K>() > 0) ? 0 : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+template <class K, int lanes = (stops_of<K>() + impacts_of<K>() + switches_of<K>() > 0)
+                                   ? 0
+                                   : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportEnsemble<K, lanes>>, Export<K>>;
 #else
 template <class K>

@@ -358,11 +358,10 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
         case LOBATTO_IMPACTS_ACCUMULATE:
             why =
                 "impacts accumulate within this step, more than 100 of them or nearer to one another than can be told "
-                "apart: the motion comes to rest on a wall, or slides along it, and walls throw back only";
-            advice =
-                "an end before that time, a stop under [run] where the motion has become slow, a larger restitution, "
-                "or " +
-                smaller + " where many impacts belong into a step";
+                "apart: the motion comes to rest on a wall, or slides along it, and walls throw back only; or friction "
+                "holds it fast, and formulas that are not smooth are known on their two sides only";
+            advice = "an end before that time, a stop under [run] where the motion has become slow, or " + smaller +
+                     " where many impacts belong into a step";
             break;
         case LOBATTO_TIME_STANDS_STILL:
             if (request.arrivals.interval != 0) {

@@ -264,6 +264,85 @@ TEST_CASE("stops and impacts work together") {
     CHECK(ended.events.size() == 2);
 }
 
+TEST_CASE("dry friction takes 2 mu from each half period, until it holds") {
+    // x'' = -x - mu sign(x'): half circles around -mu and mu in turn.
+    const std::string slide =
+        "lagrangian = \"x'^2/2 - x^2/2\"\n[parameters]\nmu = {}\n[coordinates]\nx = {{ position = 1, velocity = 0 }}\n"
+        "[forces]\nx = \"-mu*sign(x')\"\n";
+    for (const char* how : {"points = 8", "family = \"gauss\"\nstages = 7"}) {
+        const Ended ended = run(fmt::format(fmt::runtime(slide), 0.01) + method(how, 0.25, 40));
+        const int half_periods = static_cast<int>(40 / pi);
+        const double side = half_periods % 2 == 0 ? 1 : -1, turn = 1 - 0.02 * half_periods,
+                     exact = side * (0.01 + (turn - 0.01) * std::cos(40 - pi * half_periods));
+        CHECK(std::fabs(ended.result.q[0] - exact) < 1e-12);
+        CHECK(ended.events.empty());
+    }
+    const Ended held = run(fmt::format(fmt::runtime(slide), 0.3) + method("points = 8", 0.25, 40));
+    CHECK(held.result.status == LOBATTO_IMPACTS_ACCUMULATE);  // at x = -0.4 + 0.6, below 0.3, after two half periods
+    CHECK(held.result.time == 6.25);
+}
+
+TEST_CASE("steps are cut where a formula is not smooth: whole numbers of abs, max and if, to rounding") {
+    // A mass in the potential |x| falls like a stone: period 4 sqrt(2).
+    const Ended valley = run("lagrangian = \"x'^2/2 - abs(x)\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n" +
+                             method("points = 3", 0.1, 100));
+    const double phase = 100 - 17 * 4 * std::sqrt(2.0), risen = phase - 2 * std::sqrt(2.0);  // from -1 on
+    CHECK(std::fabs(valley.result.q[0] - (risen * risen / 2 - 1)) < 1e-12);
+    CHECK(valley.result.energy_error_largest < 1e-13);
+
+    const Ended heavier =
+        run("time = \"t\"\nlagrangian = \"y'^2/2 - y*if(t < 1.23, 1, 2)\"\n[coordinates]\ny = { position = 1, velocity "
+            "= 0 }\n" +
+            method("points = 3", 0.1, 2));
+    CHECK(std::fabs(heavier.result.q[0] - (1 - 1.23 * 1.23 / 2 - 1.23 * 0.77 - 0.77 * 0.77)) < 1e-14);
+
+    // Of sides that are known when the kernel is written nothing is left.
+    const Scene known = scene_of(
+        "lagrangian = \"x'^2/2 - max(2, 1)*x^2/2 + min(1, 2)*hypot(3, 4) + if(1 > 2, 7, 0)\"\n"
+        "[coordinates]\nx = { position = 1, velocity = 0 }\n" +
+        method("points = 3", 0.1, 1));
+    CHECK(known.switches.empty());
+    CHECK(
+        known.lagrangian.subs(known.coordinates[0].position == 1).subs(known.coordinates[0].velocity == 0).is_equal(4));
+}
+
+TEST_CASE("a contact of one side keeps the order of the method") {
+    // A mass that meets a spring at x = 0: nonlinear on both sides.
+    const auto end = [&](const std::string& how, double step) {
+        return run("lagrangian = \"x'^2/2 - cosh(x) - 20*max(-x, 0)^3\"\n[coordinates]\nx = { position = 1, velocity = "
+                   "0 }\n" +
+                   method(how, step, 6))
+            .result.q[0];
+    };
+    const double exact = end("points = 8", 0.05);
+    for (const auto& [how, order, step] : {std::tuple{"points = 3", 4, 0.1}, {"points = 4", 6, 0.2}}) {
+        CAPTURE(how);
+        const double coarse = std::fabs(end(how, step) - exact), fine = std::fabs(end(how, step / 2) - exact);
+        CHECK(std::log2(coarse / fine) > order - 0.7);
+        CHECK(coarse > 1e-9);
+    }
+}
+
+TEST_CASE("formulas of pieces are written with their operands") {
+    const auto wrong = [&](const std::string& formula) {
+        return refusal("lagrangian = \"x'^2/2 - " + formula +
+                       "\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n" + method("points = 4", 0.1, 1));
+    };
+    CHECK(contains(wrong("max(x)"), "1:29: max is written max(a, b)"));
+    CHECK(contains(wrong("if(x, 1, 2)"), "a condition is written if(a > b, c, d)"));
+    CHECK(contains(wrong("abs x"), "abs needs parentheses: write abs(a)"));
+    CHECK(contains(wrong("x^2*sig(x)"), "unknown function 'sig'"));
+    CHECK(contains(
+        refusal("lagrangian = \"x'^2/2\"\n[parameters]\nabs = 1\n[coordinates]\nx = { position = 1, velocity = "
+                "0 }\n" +
+                method("points = 4", 0.1, 1)),
+        "abs"));
+    CHECK(contains(refusal("lagrangian = \"x'^2/2\"\n[parameters]\na = 1\n[coordinates]\nx = { position = \"abs(a)\", "
+                           "velocity = 0 }\n" +
+                           method("points = 4", 0.1, 1)),
+                   "abs needs a number here"));
+}
+
 TEST_CASE("the emitted impacts are what the scene says, to 50 digits") {
     const Scene scene = scene_of(
         "time = \"t\"\nlagrangian = \"(1 + x^2)*x'^2/2 + y'^2/2 - x*y\"\n[parameters]\ne = 0.7\n[coordinates]\n"

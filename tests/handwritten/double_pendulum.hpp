@@ -19,7 +19,7 @@ struct HandwrittenDoublePendulum : HandwrittenKernel, Tables {
     static constexpr Form form = Form::general;
     static constexpr bool clocked = false;
     static constexpr bool autonomous = true, linear = false;
-    static constexpr int events = 2, stops = 0, impacts = 0;
+    static constexpr int events = 2, stops = 0, impacts = 0, switches = 0;
     static constexpr int event_direction[2] = {1, 0};
     static constexpr int active = 2, cyclic = 0;
     static constexpr int active_index[2] = {0, 1}, cyclic_index[1] = {0};

@@ -6,8 +6,9 @@
 // not the polynomial, of lower order than the steps, but g at the end of a step of the same method from the same
 // start, shortened to theta h: the signs, and the root between them.
 //
-// Of the K::events functions the last K::impacts are those of walls (impacts.hpp): the motion is on their one side
-// until it meets them, and values that are rounding there are zero. The K::stops before these end the motion. impact(k,
+// Of the K::events functions the last are walls (impacts.hpp), on one side of which the motion is until it meets them;
+// values that are rounding there are zero. Of these K::impacts throw it back, and K::switches, the very last, change
+// its formulas: their sides, 1 or -1, are the last parameters. The K::stops before the walls end the motion. impact(k,
 // q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not below 0,
 // reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
 #ifndef LOBATTO_KERNEL_EVENTS_HPP
@@ -59,13 +60,24 @@ constexpr int stops_of() {
         return 0;
 }
 
+template <class K>
+constexpr int switches_of() {
+    if constexpr (K::events > 0)
+        return K::switches;
+    else
+        return 0;
+}
+
 // A stepper that knows its parameters, for steps of other lengths.
 template <class K>
 struct WatchedStepper : Stepper<K> {
     using real = typename K::real;
     typename K::Parameters parameters{};
-    real
-        wall_scale[impacts_of<K>() > 0 ? impacts_of<K>() : 1]{};  // the most that went into each wall's function so far
+    static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
+    real wall_scale[wall_room]{};  // the most that went into each wall's function so far
+
+    // The side of a switch: 1 or -1.
+    real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
 };
 
 template <class K>
@@ -77,7 +89,7 @@ struct Events {
     static constexpr int room = grid_size + pieces;  // samples of one function
     static constexpr int columns = 1 + Between<K>::columns;
     static constexpr int most = K::events * room;  // rows of one step
-    static constexpr int walls = impacts_of<K>(), first_wall = K::events - walls;
+    static constexpr int walls = S::walls, first_wall = K::events - walls;
     static constexpr real rounding = real(2) * Limits<real>::epsilon;
 
     struct Sample {
@@ -123,10 +135,11 @@ struct Events {
         return status;
     }
 
-    int found{};                          // places of the last find:
-    real thetas[most]{};                  // where
-    int numbers[most]{};                  // of which function
-    real slack[walls > 0 ? walls : 1]{};  // of each wall: up to here its function is zero, but for rounding
+    int found{};                 // places of the last find:
+    real thetas[most]{};         // where
+    int numbers[most]{};         // of which function
+    real slack[S::wall_room]{};  // of each wall: up to here its function is zero, but for rounding
+    real sides[S::wall_room]{};  // and the sign that it has where the motion is
 
 private:
     S* step{};
@@ -228,8 +241,7 @@ private:
     }
 
     static constexpr bool is_wall(int e) { return e >= first_wall; }
-    // The sign of a wall's function where the motion may be.
-    static real side(int e) { return real(-K::event_direction[e]); }
+    real side(int e) const { return sides[e - first_wall]; }
 
     void find_events(int e, real until) {
         sample_count = grid_size;

@@ -5,6 +5,7 @@
 // of the same method; the momentum jumps along dg/dq (D52), and a step of the rest of h leads back to the times of the
 // run. So a step with impacts is one from t to t + h like any other, and of the method's order. (R. C. Fetecau, J. E.
 // Marsden, M. Ortiz, M. West 2003.)
+// A switch is a wall that lets the motion through, and changes the formulas beyond it.
 #ifndef LOBATTO_KERNEL_IMPACTS_HPP
 #define LOBATTO_KERNEL_IMPACTS_HPP
 
@@ -19,15 +20,16 @@ template <class K>
 struct Walls {
     using real = typename K::real;
     using S = WatchedStepper<K>;
-    static constexpr int n = K::coordinates, count = K::impacts, first = K::events - count;
+    static constexpr int n = K::coordinates, impacts = K::impacts, count = S::walls, first = K::events - count;
+    static constexpr int room = impacts > 0 ? impacts : 1;
     static constexpr real few = real(64) * Limits<real>::epsilon;
 
     real time{}, q[n]{}, p[n]{}, velocity[n]{};
-    real value[K::events]{};                    // of all that is watched
-    real gradient[count * n]{}, rate[count]{};  // dg/dq, and dg/dt at fixed q
-    real restitution[count]{};
-    real slack[count]{};     // g as small as this is zero
-    real approach[count]{};  // dg/dt along the motion, where it is above rounding; below 0: towards the wall
+    real value[K::events]{};                  // of all that is watched
+    real gradient[room * n]{}, rate[room]{};  // of impacts: dg/dq, and dg/dt at fixed q
+    real restitution[room]{};
+    real slack[count]{};    // g as small as this is zero
+    real approach[room]{};  // dg/dt along the motion, where it is above rounding; below 0: towards the wall
 
     // Everything at (t, q, p) of a stepper.
     Status look(S& stepper, real t, const real* position, const real* momentum) {
@@ -40,25 +42,20 @@ struct Walls {
         if (status != Status::ok) return status;
         const auto& k = stepper.coefficients;
         Formulas<K>::event(k, time, static_cast<const real*>(q), static_cast<const real*>(velocity), +value);
-        Formulas<K>::impact(k, time, static_cast<const real*>(q), +gradient, +rate, +restitution);
+        if constexpr (impacts > 0) look_at_impacts(stepper);
         for (int w = 0; w < count; ++w) {
-            real along = rate[w], speed = fabs(rate[w]), moved = fabs(rate[w] * stepper.step_size);
-            for (int c = 0; c < n; ++c) {
-                const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
-                along += slope * velocity[c];
-                speed += fabs(slope * velocity[c]);
-                moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
-            }
-            if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
-            slack[w] = few * stepper.wall_scale[w];
-            approach[w] = fabs(along) <= few * speed ? real(0) : along * side(w);
+            real& scale = stepper.wall_scale[w];
+            if (w >= impacts && fabs(value[first + w]) > scale) scale = fabs(value[first + w]);
+            slack[w] = few * scale;
         }
         return Status::ok;
     }
 
-    // The sign of g where the motion may be.
-    static real side(int w) { return real(-K::event_direction[first + w]); }
-    bool is_behind(int w) const { return value[first + w] * side(w) < -slack[w]; }
+    // The sign of g where the motion is.
+    static real side(S& stepper, int w) {
+        return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
+    }
+    bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
     bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
 
     // (D52) What wall w does to the momentum.
@@ -73,7 +70,7 @@ struct Walls {
         if (status != Status::ok) return status;
         real mobility = real(0);
         for (int c = 0; c < n; ++c) mobility += G[c] * (with[c] - without[c]);
-        const real impulse = -(real(1) + restitution[w]) * approach[w] * side(w) / mobility;
+        const real impulse = -(real(1) + restitution[w]) * approach[w] * side(stepper, w) / mobility;
         if (!is_finite(impulse)) return Status::not_finite;
         if constexpr (constraints_of<K>() > 0) {
             for (int c = 0; c < n; ++c) velocity[c] += impulse * (with[c] - without[c]);
@@ -96,6 +93,22 @@ struct Walls {
         (void)stepper, (void)r;
         return Status::unsupported;
     }
+
+private:
+    void look_at_impacts(S& stepper) {
+        Formulas<K>::impact(stepper.coefficients, time, static_cast<const real*>(q), +gradient, +rate, +restitution);
+        for (int w = 0; w < impacts; ++w) {
+            real along = rate[w], speed = fabs(rate[w]), moved = fabs(rate[w] * stepper.step_size);
+            for (int c = 0; c < n; ++c) {
+                const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
+                along += slope * velocity[c];
+                speed += fabs(slope * velocity[c]);
+                moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+            }
+            if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
+            approach[w] = fabs(along) <= few * speed ? real(0) : along * side(stepper, w);
+        }
+    }
 };
 
 // Looks at each step of one stepper: keep before it, look after it.
@@ -105,7 +118,7 @@ public:
     using real = typename K::real;
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, columns = Events<K>::columns;
-    static constexpr int walls = impacts_of<K>(), first_wall = K::events - walls, stops = stops_of<K>();
+    static constexpr int walls = S::walls, first_wall = K::events - walls, stops = stops_of<K>();
     static constexpr int most_impacts = walls > 0 ? 100 : 0;                             // in one step
     static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
 
@@ -118,6 +131,7 @@ public:
         events.keep(stepper);
         if constexpr (walls > 0) {
             time = stepper.time();
+            parameters = stepper.parameters;
             for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
             stepper.momentum(p);
         }
@@ -140,6 +154,7 @@ private:
     Events<K> events;
     S* rest;  // the steps from an impact to the end
     real time{}, q[n]{}, p[n]{};
+    typename K::Parameters parameters{};
     int impacts{};  // of this step
 
     // Events and stops until theta.
@@ -156,10 +171,14 @@ private:
         return status;
     }
 
-    void go_back(S& stepper) { put(stepper, q, p, stepper.steps - 1); }
-    // A state at one of the stepper's own times.
+    void go_back(S& stepper) {
+        stepper.parameters = parameters;
+        put(stepper, q, p, stepper.steps - 1);
+    }
+    // A state at one of the stepper's own times, with its parameters.
     static void put(S& stepper, const real* position, const real* momentum, std::int64_t steps) {
         const real start = stepper.start_time;
+        if constexpr (switches_of<K>() > 0) stepper.prepare(stepper.parameters, stepper.step_size);
         stepper.steps = steps;
         stepper.start(stepper.time(), position, momentum);
         stepper.start_time = start;
@@ -173,7 +192,10 @@ private:
         S* step = &stepper;
         impacts = 0;
         while (status == Status::ok) {
-            for (int w = 0; w < walls; ++w) events.slack[w] = wall.slack[w];
+            for (int w = 0; w < walls; ++w) {
+                events.slack[w] = wall.slack[w];
+                events.sides[w] = Walls<K>::side(stepper, w);
+            }
             status = events.find(*step, first_wall, K::events, real(1));
             if (status != Status::ok) break;
             const bool is_hit = events.found > 0;
@@ -187,7 +209,7 @@ private:
             real row[1 + 2 * n];
             status = events.state(theta, row);
             if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
-            if (status == Status::ok) status = meet(stepper, wall, number - first_wall, rows, count);
+            if (status == Status::ok) status = pass(stepper, wall, number - first_wall, rows, count);
             if (status != Status::ok) break;
             const real left = end - wall.time;
             step = rest;
@@ -201,11 +223,23 @@ private:
         return status;
     }
 
+    // Through a switch, or back from walls.
+    Status pass(S& stepper, Walls<K>& wall, int number, real* rows, std::int64_t& count) {
+        if constexpr (impacts_of<K>() > 0) {
+            if (number < impacts_of<K>()) return meet(stepper, wall, number, rows, count);
+        }
+        (void)wall, (void)rows, (void)count;
+        if (++impacts > most_impacts) return Status::impacts_accumulate;
+        real& side = stepper.side(number - impacts_of<K>());
+        side = -side;
+        return Status::ok;
+    }
+
     // All walls that are met there, one after another, until none is.
     Status meet(S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
         for (bool is_first = true;; is_first = false) {
             int met = is_first && K::reset_of[first] >= 0 ? first : -1;
-            for (int w = 0; w < walls && met < 0; ++w)
+            for (int w = 0; w < impacts_of<K>() && met < 0; ++w)
                 if (wall.is_met(w) || (is_first && w == first && wall.approach[w] < real(0))) met = w;
             if (met < 0) return is_first ? Status::impacts_accumulate : Status::ok;
             if (++impacts > most_impacts) return Status::impacts_accumulate;

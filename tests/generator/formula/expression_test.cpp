@@ -183,10 +183,10 @@ TEST_CASE("unknown names come with the declared ones and the nearest") {
     check_error("xyz", 1, "unknown name 'xyz' in the Lagrangian; declared: m, omega, q, q'.");
     check_error("ln(q)", 1,
                 "unknown function 'ln' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, tanh, "
-                "asin, acos, atan, sum, mod. Write log.");
+                "asin, acos, atan, sum, mod, abs, sign, min, max, hypot, if. Write log.");
     check_error("coss(q)", 1,
                 "unknown function 'coss' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, "
-                "tanh, asin, acos, atan, sum, mod. Did you mean 'cos'?");
+                "tanh, asin, acos, atan, sum, mod, abs, sign, min, max, hypot, if. Did you mean 'cos'?");
 }
 
 TEST_CASE("primes belong to coordinates, one each") {

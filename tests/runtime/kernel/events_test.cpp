@@ -16,7 +16,7 @@ namespace {
 
 // The pendulum of generated kernels with events: q = 0 rising, q' = 0 falling, and q^2 = 1 either way.
 struct Swing : HandwrittenPendulum {
-    static constexpr int events = 3, stops = 0, impacts = 0;
+    static constexpr int events = 3, stops = 0, impacts = 0, switches = 0;
     static constexpr int event_direction[3] = {1, -1, 0};
     static void event(const Coefficients&, const real* q, const real* velocity, real* value) {
         value[0] = q[0];
@@ -27,7 +27,7 @@ struct Swing : HandwrittenPendulum {
 
 // Events that change their sign through infinity: 1/q = 0, and q'/q = 0, which has roots as well.
 struct Poles : HandwrittenPendulum {
-    static constexpr int events = 2, stops = 0, impacts = 0;
+    static constexpr int events = 2, stops = 0, impacts = 0, switches = 0;
     static constexpr int event_direction[2] = {0, 0};
     static void event(const Coefficients&, const real* q, const real* velocity, real* value) {
         value[0] = 1 / q[0];
