@@ -27,6 +27,7 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
+#include "generator/mechanics/automatic_clock.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -349,6 +350,8 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
 std::string loss_of(const RunOptions& options, const Scene& scene, const TrajectoryRequest& request,
                     const std::optional<MeasuredError>& error) {
     if (!error || !error->is_lost() || options.beyond_horizon || scene.run.beyond_horizon) return "";
+    const std::string clock =
+        !scene.clock && has_automatic_clock(scene) ? ", or clock = \"auto\" under [method], for close encounters" : "";
     const char* const why = error->companion_stopped
                                 ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
                                 : "from there on the error is as large as the motion itself, and nothing of it is left";
@@ -356,8 +359,8 @@ std::string loss_of(const RunOptions& options, const Scene& scene, const Traject
         error->doubling ? fmt::format(", an earlier end (errors double every {:.3g})", *error->doubling) : "";
     return fmt::format(
         "the run left its motion by t = {:.6g}, q = {}, p = {}: {}. Try a smaller step, such as h = {:.6g}, more "
-        "points{}, or --beyond-horizon where the statistics of the motion are what counts.",
-        *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, chaos);
+        "points{}{}, or --beyond-horizon where the statistics of the motion are what counts.",
+        *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, clock, chaos);
 }
 
 constexpr double missed = 2;  // times the error wanted

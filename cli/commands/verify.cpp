@@ -317,8 +317,9 @@ void symplecticity_on_constraints(std::vector<Row>& rows, const Kernel& exact_ke
 }
 
 void verify(const VerifyOptions& options) {
-    Scene scene = read_scene(options.scene);
-    refuse_clock(scene, "lobatto verify");
+    const Scene written = read_scene(options.scene);
+    Scene scene = in_clock_time(written);  // a clock is another Lagrangian, whose steps are equal
+    scene.clock.reset();
     options.method.apply(scene);
     MethodOption::require_double(scene, "verify");
     const bool with_tangent = scene.coordinates.size() <= tangent_limit;
@@ -348,6 +349,8 @@ void verify(const VerifyOptions& options) {
     const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
     const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
     const std::size_t of_steps = rows.size();
+    if (written.clock)
+        rows.push_back({"steps, from here on", "of the clock " + written.clock->text, "equal in its time", true, ""});
     if (scene.is_cut()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
     taken_steps(rows, derivation, kernel, exact_kernel, start, exact);
     const auto states = states_along(kernel, start);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "generator/mechanics/automatic_clock.hpp"
 #include "generator/mechanics/system.hpp"
 
 namespace lobatto {
@@ -21,7 +22,8 @@ constexpr std::size_t longest_term = 2000;
 
 class Transformation {
 public:
-    explicit Transformation(const Scene& scene) : scene_(scene), g_(scene.clock->rate) {
+    explicit Transformation(const Scene& scene)
+        : scene_(scene), g_(scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate) {
         for (const Coordinate& coordinate : scene.coordinates) {
             q_.push_back(coordinate.position);
             v_.push_back(coordinate.velocity);
@@ -38,6 +40,7 @@ public:
         Scene result = scene_;
         Clock& clock = *result.clock;
         clock.is_applied = true;
+        clock.rate = g_;
         ex action = clock.rate * clock.energy;
         clock.lagrangian = 0;
         for (const ex& term : terms_of(scene_.lagrangian, motion_)) {
@@ -127,7 +130,7 @@ Scene in_clock_time(const Scene& scene) {
 void refuse_clock(const Scene& scene, const std::string& what) {
     if (scene.clock)
         scene.source.fail(scene.clock->at,
-                          what + " knows no clock yet; remove it, or use lobatto run and lobatto sweep");
+                          what + " knows no clock yet; remove it, or use lobatto run, sweep, emit or verify");
 }
 
 }  // namespace lobatto

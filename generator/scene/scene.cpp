@@ -161,6 +161,11 @@ private:
         Clock clock;
         clock.at = entry.value.at;
         if (entry.value.kind == Value::Kind::text) clock.text = collapsed(entry.value.text.value);
+        clock.is_automatic = clock.text == "auto";
+        if (clock.is_automatic) {
+            scene_.clock = clock;
+            return;
+        }
         const Operand rate = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
         if (rate.velocities || rate.expression.has(scene_.time))
             fail(clock.at, "a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");

@@ -86,6 +86,7 @@ struct Clock {
     GiNaC::ex rate;    // g, in positions and parameters
     Position at = {};
     GiNaC::symbol energy{"energy_of_start"};  // E
+    bool is_automatic = false;                // "auto": g follows from L (generator/mechanics/automatic_clock.hpp)
     bool is_applied = false;                  // the scene is one in tau
     GiNaC::ex lagrangian;                     // then: L(q, w / g), with w = dq/dtau
 };

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A clock from the terms of a Lagrangian that grow without bound, as 1/r does in close encounters.
+#pragma once
+
+#include "generator/scene/scene.hpp"
+
+namespace lobatto {
+
+// g = (U(0) / U)^(1/k + 1/2) for U the sum of those terms, each with the sign that makes it positive at the start, and
+// k the least degree of their poles: near a pole r^-k a motion of that energy turns in a time r / sqrt(r^-k). 1 at the
+// start. InputError where no term has a pole.
+GiNaC::ex automatic_clock(const Scene& scene);
+
+// Whether there is one, of a motion that keeps its energy.
+bool has_automatic_clock(const Scene& scene);
+
+}  // namespace lobatto
