@@ -346,12 +346,17 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
     return result;
 }
 
+// Of a motion that may come near a pole.
+std::string clock_advice(const Scene& scene) {
+    const bool helps = !scene.clock && has_automatic_clock(scene);
+    return helps ? ", or clock = \"auto\" under [method], whose steps follow close encounters" : "";
+}
+
 // That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
 std::string loss_of(const RunOptions& options, const Scene& scene, const TrajectoryRequest& request,
                     const std::optional<MeasuredError>& error) {
     if (!error || !error->is_lost() || options.beyond_horizon || scene.run.beyond_horizon) return "";
-    const std::string clock =
-        !scene.clock && has_automatic_clock(scene) ? ", or clock = \"auto\" under [method], for close encounters" : "";
+    const std::string clock = clock_advice(scene);
     const char* const why = error->companion_stopped
                                 ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
                                 : "from there on the error is as large as the motion itself, and nothing of it is left";
@@ -400,9 +405,9 @@ std::string departure_of(const Prepared& run, const TrajectoryRequest& request, 
 void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, const TrajectoryResult& result,
                           const std::string& departure, const Files& files, const Kernel& kernel) {
     if (result.status != LOBATTO_OK)
-        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path,
-                                           explain_stop(result, request, passing_step(kernel, request, result)),
-                                           files.path()));
+        throw ComputationError(fmt::format(
+            "{}: {} What was computed is in {}.", scene.path,
+            explain_stop(result, request, passing_step(kernel, request, result), clock_advice(scene)), files.path()));
     if (!departure.empty())
         throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, files.path()));
     if (scene.outputs.energy && !std::isfinite(result.energy_error_largest))

@@ -209,7 +209,7 @@ struct Export {
     static Status look(S& stepper, lobatto_advance& call, AnyWatch& watch, real end) {
         const std::int64_t first = call.events_written;
         real* const rows = out(call.events);
-        const Status status = watch.look(stepper, rows + first * AnyWatch::columns, call.events_written);
+        const Status status = watch.look(stepper, rows, call.events_written);
         const auto is_beyond = [&] {
             return (rows[(call.events_written - 1) * AnyWatch::columns + 1] - end) * stepper.step_size > real(0);
         };

@@ -296,7 +296,8 @@ double passing_step(const Kernel& kernel, const TrajectoryRequest& request, cons
     return 0;
 }
 
-std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request, double passing) {
+std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request, double passing,
+                         const std::string& more) {
     const std::string smaller =
         passing != 0 ? fmt::format("a smaller step, such as h = {:.6g}, with which the motion goes on there", passing)
                      : fmt::format("a smaller step, such as h = {:.6g}", request.step / 2);
@@ -313,7 +314,7 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
                 "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
                 "of the potential",
                 result.increment_failed);
-            advice = smaller + ", or start elsewhere";
+            advice = smaller + more + ", or start elsewhere";
             break;
         case LOBATTO_NOT_FINITE:
             if (!result.started) {
@@ -327,7 +328,7 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
                 "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
                 "potential or away to infinity, or the "
                 "step is too long for the method to be stable";
-            advice = smaller + ", an earlier end, or start elsewhere";
+            advice = smaller + more + ", an earlier end, or start elsewhere";
             break;
         case LOBATTO_SINGULAR_JACOBIAN:
             why =

@@ -114,7 +114,8 @@ std::string list_text(const std::vector<double>& values);
 double passing_step(const Kernel& kernel, const TrajectoryRequest& request, const TrajectoryResult& result);
 
 // What to tell a person when a run stopped: step, time, state, residual, why, and what to try. One paragraph.
-// `passing`: passing_step, where it was looked for.
-std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request, double passing = 0);
+// `passing`: passing_step, where it was looked for; `more`: further advice.
+std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request, double passing = 0,
+                         const std::string& more = "");
 
 }  // namespace lobatto
