@@ -259,6 +259,10 @@ private:
                                  fmt::join(indices, ","), k == 0 ? "first" : "second", definition.sizes[k]));
         Definition::Value& entry = definition.values[indices];
         if (!entry.complete) {
+            if (definition.given)
+                fail(formula.at, frame,
+                     fmt::format("{} moves, so that {} cannot hold it: write it with numbers and parameters",
+                                 definition.label, frame.formula));
             if (entry.needed)
                 fail(formula.at, frame,
                      fmt::format("{} needs its own value: definitions must not refer to one another in a circle",

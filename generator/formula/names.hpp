@@ -18,7 +18,8 @@ struct Definition {
     std::string label;  // "the definition r"
     std::vector<std::string> indices;
     Syntax formula;
-    std::vector<long> sizes = {};  // of what a body brings: its values are given, for indices up to these
+    bool given = false;            // by a body: its values are known before they are asked for
+    std::vector<long> sizes = {};  // then: the largest indices
     struct Value {
         bool needed = false, complete = false;  // needed and not complete: being computed
         Operand value;

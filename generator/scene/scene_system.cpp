@@ -54,9 +54,7 @@ void SystemReader::read() {
     read_time();
     read_parameters();
     read_coordinates();
-    read_bodies();
-    refuse_names_of_momenta();
-    read_definitions();
+    read_bodies_and_definitions();
     read_lagrangian();
     read_forces();
     read_constraints();

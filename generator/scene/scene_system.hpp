@@ -61,7 +61,7 @@ private:
     void read_coordinate(const Entry& entry);
     void read_initial_entries(Group& group, const Table& table);
     void read_count(Group& group, const Entry* count);
-    void read_bodies();
+    void read_bodies_and_definitions();
     void refuse_names_of_momenta() const;
     void read_definitions();
     void read_lagrangian();
