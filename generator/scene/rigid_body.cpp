@@ -113,6 +113,7 @@ Relative relative(const RigidBody& body, const RigidBody* parent, const Vector& 
     return {parent == nullptr ? in_space : transposed(parent->drawn_rotation) * in_space, 0};
 }
 
+// R and omega of (D55), without the joint's own turn.
 void turn_with(RigidBody& body, const RigidBody* parent, const Relative& relative) {
     body.angle = relative.angle + (parent == nullptr ? ex(0) : parent->angle);
     body.R = body.plane          ? rotation_in_plane(body.angle)
@@ -198,6 +199,7 @@ void hang_on_slider(RigidBody& body, const Joint& joint, const RigidBody* parent
     body.v_in_space = false;
 }
 
+// (D56)
 std::vector<ex> equations_of(const Joint& joint, const RigidBody* first, const RigidBody& second, std::size_t upright) {
     const Vector start = point_of(first, point_in(first, joint.point));
     const auto on_second = [&](const Vector& point) { return point_of(&second, point_in(&second, point)); };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Where a rigid body is, how it moves and its kinetic energy: free, or hung on another one by a joint (D53 to D56).
+// Where a rigid body is, how it moves and its kinetic energy: free, or hung on another one by a joint (D53).
 #pragma once
 
 #include <ginac/ginac.h>
