@@ -140,6 +140,8 @@ private:
                 return operand_of(frame.indices[formula.index].second);
             case Kind::name:
                 return formula.name->definition ? defined(formula, frame) : declared(formula, frame);
+            case Kind::point:
+                return point(formula, frame, arithmetic);
             case Kind::sum:
                 return folded(formula, frame, arithmetic, &Arithmetic::add);
             case Kind::product:
@@ -273,13 +275,34 @@ private:
         return elements[static_cast<std::size_t>(k - 1)];
     }
 
+    // x + R[1,1] a + R[1,2] b + R[1,3] c
+    Operand point(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        const Name& name = *formula.name;
+        Operand sum = name.definition ? name.definition->values.at({}).value : name.values.front();
+        for (std::size_t k = 0; k < name.row.size(); ++k) {
+            const Operand part = evaluate(formula.operands[k], frame);
+            sum = computed(formula.at, frame,
+                           [&] { return arithmetic.add(sum, arithmetic.multiply(name.row[k], part)); });
+        }
+        return sum;
+    }
+
     Operand defined(const Syntax& formula, Frame& frame) {
         Definition& definition = *formula.name->definition;
         std::vector<long> indices;
         for (const Syntax& subscript : formula.operands)
             indices.push_back(whole(subscript, frame, fmt::format("an index of {}", formula.at.name())));
+        for (std::size_t k = 0; k < definition.sizes.size(); ++k)
+            if (indices[k] < 1 || indices[k] > definition.sizes[k])
+                fail(formula.at, frame,
+                     fmt::format("there is no {0}[{1}]: its {2} index goes from 1 to {3}", definition.label,
+                                 fmt::join(indices, ","), k == 0 ? "first" : "second", definition.sizes[k]));
         Definition::Value& entry = definition.values[indices];
         if (!entry.complete) {
+            if (definition.given)
+                fail(formula.at, frame,
+                     fmt::format("{} moves, so that {} cannot hold it: write it with numbers and parameters",
+                                 definition.label, frame.formula));
             if (entry.needed)
                 fail(formula.at, frame,
                      fmt::format("{} needs its own value: definitions must not refer to one another in a circle",

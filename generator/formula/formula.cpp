@@ -5,6 +5,7 @@
 //     signed  = { + | - } power
 //     power   = primary [ ^ signed ]
 //     primary = number | name [ '[' sum { , sum } ']' ] [ ' ] | function ( sum ) | ( sum )
+//             | name ( sum { , sum } )  of a body
 //             | sum ( name = sum .. sum , sum ) | mod ( sum , sum )
 #include "generator/formula/formula.hpp"
 
@@ -362,7 +363,10 @@ private:
         Syntax formula = node(Kind::name, at);
         formula.name = meaning;
         formula.primed = at.primed;
-        read_subscripts(formula, base);
+        if (token().is('(') && !meaning->row.empty())
+            read_point(formula, base);
+        else
+            read_subscripts(formula, base);
         refuse_by_role(formula, base);
         scope_.names->all.find(base)->second.used = true;
         return formula;
@@ -393,6 +397,21 @@ private:
             formula.primed = true;
             ++next_;
         }
+    }
+
+    // top.x(a, b, c): where a point of a body is.
+    void read_point(Syntax& formula, std::string_view base) {
+        const Token open = token();
+        const std::size_t expected = formula.name->row.size();
+        const std::string form = fmt::format("{}({})", base, expected == 2 ? "a, b" : "a, b, c");
+        if (formula.primed) fail(formula.at, fmt::format("{} is a place; points have no velocity in formulas", form));
+        formula.kind = Kind::point;
+        do {
+            ++next_;
+            formula.operands.push_back(read_sum());
+        } while (token().is(','));
+        expect(')', open);
+        if (formula.operands.size() != expected) fail(open, fmt::format("a point of a body is written {}", form));
     }
 
     void refuse_by_role(const Syntax& formula, std::string_view base) const {

@@ -20,6 +20,7 @@ struct Syntax {
         pi,
         index,    // of an enclosing sum, array or definition
         name,     // coordinate, parameter, time, definition; operands: the subscripts
+        point,    // a coordinate of a point of a body, top.z(0, 0, l); operands: its place in the body
         sum,      // of its operands
         product,  // of its operands
         negation,

@@ -18,6 +18,8 @@ struct Definition {
     std::string label;  // "the definition r"
     std::vector<std::string> indices;
     Syntax formula;
+    bool given = false;            // by a body: its values are known before they are asked for
+    std::vector<long> sizes = {};  // then: the largest indices
     struct Value {
         bool needed = false, complete = false;  // needed and not complete: being computed
         Operand value;
@@ -33,6 +35,7 @@ struct Name {
     std::vector<Operand> values;             // one, or one an element; a constant parameter's is its exact value
     std::vector<Operand> velocities;         // coordinates only
     std::shared_ptr<Definition> definition;  // definitions only
+    std::vector<Operand> row;  // of the x, y or z of a body: of its rotation, for points such as x(a, b, c)
     bool used = false;
 };
 

@@ -113,7 +113,7 @@ private:
     }
 
     Token read_name() {
-        while (is_name_part(at(0))) ++next_;
+        while (is_name_part(at(0)) || (at(0) == '.' && is_letter(at(1)))) ++next_;  // top.x too
         if (at(0) != '\'') return token(Token::Kind::name);
         ++next_;
         Token name = token(Token::Kind::name);

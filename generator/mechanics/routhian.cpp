@@ -19,9 +19,17 @@ bool contains(const std::vector<int>& list, int value) {
     return std::find(list.begin(), list.end(), value) != list.end();
 }
 
+// What does not change with the cyclic coordinates may still hold them, as in cos(q)^2 + sin(q)^2: it is that at 0.
+ex at_origin(const ex& value, const System& system, const std::vector<int>& cyclic) {
+    GiNaC::exmap origin;
+    for (const int k : cyclic) origin[system.q[static_cast<std::size_t>(k)]] = 0;
+    return value.subs(origin, GiNaC::subs_options::no_pattern);
+}
+
 ex at_rest(const ex& value, const System& system, const std::vector<int>& cyclic) {
     GiNaC::exmap rest;
-    for (const int k : cyclic) rest[system.v[static_cast<std::size_t>(k)]] = 0;
+    for (const int k : cyclic)
+        rest[system.v[static_cast<std::size_t>(k)]] = rest[system.q[static_cast<std::size_t>(k)]] = 0;
     return value.subs(rest, GiNaC::subs_options::no_pattern);
 }
 
@@ -29,6 +37,9 @@ bool has_value_at_rest(const System& system, const std::vector<int>& cyclic) {
     try {
         for (const ex& term : system.terms) at_rest(term, system, cyclic);
         for (const ex& momentum : system.momentum) at_rest(momentum, system, cyclic);
+        for (const int i : cyclic)
+            for (const int j : cyclic) at_origin(system.momentum_v(i, j), system, cyclic);
+        for (const ex& force : system.outer_force) at_origin(force, system, cyclic);
         return true;
     } catch (const std::domain_error&) {  // however small, a term that is infinite there, or 0^0
         return false;
@@ -144,7 +155,8 @@ Routhian reduce(const System& system, const std::vector<int>& cyclic) {
         const auto index = [&](unsigned i) { return static_cast<std::size_t>(cyclic[i]); };
         for (unsigned i = 0; i < c; ++i) {
             rest(i, 0) = routhian.P[i] - at_rest(system.momentum[index(i)], system, cyclic);
-            for (unsigned j = 0; j < c; ++j) inertia(i, j) = system.momentum_v(index(i), index(j));
+            for (unsigned j = 0; j < c; ++j)
+                inertia(i, j) = at_origin(system.momentum_v(index(i), index(j)), system, cyclic);
         }
         const GiNaC::matrix velocity = inertia.inverse().mul(rest);
         for (ex& term : terms) term = at_rest(term, system, cyclic);
@@ -161,7 +173,8 @@ Routhian reduce(const System& system, const std::vector<int>& cyclic) {
         routhian.active.push_back(k);
         v.push_back(system.v[at]);
         q.push_back(system.q[at]);
-        forces.push_back(system.outer_force[at].subs(velocities, GiNaC::subs_options::no_pattern));
+        forces.push_back(
+            at_origin(system.outer_force[at], system, cyclic).subs(velocities, GiNaC::subs_options::no_pattern));
     }
     routhian.z = v;
     routhian.z.insert(routhian.z.end(), q.begin(), q.end());

@@ -43,7 +43,7 @@ public:
           document_(read_document(source)),
           root_(source, document_.entries, {1, 1}, "a scene",
                 {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "constraints",
-                 "impacts", "method", "run", "output"}),
+                 "bodies", "joints", "impacts", "method", "run", "output"}),
           system_(source, root_, scene_) {}
 
     Scene run(const std::vector<std::string>& kept) {

@@ -54,7 +54,7 @@ void SystemReader::read() {
     read_time();
     read_parameters();
     read_coordinates();
-    read_definitions();
+    read_bodies_and_definitions();
     read_lagrangian();
     read_forces();
     read_constraints();
@@ -137,12 +137,12 @@ std::vector<Parameter> SystemReader::read_elements(const Entry& entry, const Ent
 
 void SystemReader::read_coordinates() {
     const std::string example = "[coordinates] with lines such as q = { position = 1, velocity = 0 }";
+    if (root_.find("coordinates") == nullptr && root_.find("bodies") != nullptr) return;
     const Entry& section = root_.get("coordinates", example);
     const std::vector<Entry>& entries = table_of(source_, section, example);
     if (entries.empty())
         fail(section.at, "a scene needs a coordinate; add a line such as q = { position = 1, velocity = 0 }");
     for (const Entry& entry : entries) read_coordinate(entry);
-    refuse_names_of_momenta();
 }
 
 void SystemReader::read_coordinate(const Entry& entry) {
@@ -260,14 +260,21 @@ void SystemReader::read_definitions() {
                                                 {&names_, definitions[k]->label, true, definitions[k]->indices});
 }
 
+// Bodies bring their kinetic energy.
 void SystemReader::read_lagrangian() {
+    scene_.lagrangian = kinetic_energy_;
+    scene_.lagrangian_text = kinetic_text_;
+    if (root_.find("lagrangian") == nullptr && !kinetic_text_.empty()) {
+        scene_.lagrangian_at = root_.find("bodies")->at;
+        return;
+    }
     const Entry& entry = root_.get("lagrangian", "lagrangian = \"...\", the kinetic minus the potential energy");
     if (entry.value.kind != Value::Kind::text)
         fail(entry.value.at,
              fmt::format("the Lagrangian must be a formula in quotes, not {}", entry.value.kind_name()));
     scene_.lagrangian_at = entry.value.text.at.front();
-    scene_.lagrangian = parse_expression(source_, entry.value.text, {&names_, "the Lagrangian", true, {}});
-    scene_.lagrangian_text = collapsed(entry.value.text.value);
+    scene_.lagrangian += parse_expression(source_, entry.value.text, {&names_, "the Lagrangian", true, {}});
+    scene_.lagrangian_text += (kinetic_text_.empty() ? "" : " + ") + collapsed(entry.value.text.value);
     const GiNaC::exset symbols = symbols_of(scene_.lagrangian);
     for (const Coordinate& coordinate : scene_.coordinates)
         if (symbols.count(coordinate.velocity) == 0)
@@ -435,6 +442,12 @@ void SystemReader::read_places() {
 void SystemReader::read_initial_values() {
     const std::string rate = scene_.start == Start::velocity ? "velocity" : "momentum";
     for (const Group& group : groups_) {
+        for (std::size_t k = 0; k < group.starts.size(); ++k) {
+            scene_.initial_position.push_back(group.starts[k].first);
+            scene_.initial_rate.push_back(group.starts[k].second);
+            scene_.coordinates[group.first + k].rate_at = group.entry->at;
+        }
+        if (!group.starts.empty()) continue;
         read_values(group, *group.position, "position", scene_.initial_position);
         read_values(group, *group.rate, rate, scene_.initial_rate);
         for (std::size_t k = 0; k < group.count; ++k) {

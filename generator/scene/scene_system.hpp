@@ -48,7 +48,9 @@ private:
         bool array;
         const Entry* position;
         const Entry* rate;
+        std::vector<std::pair<GiNaC::ex, GiNaC::ex>> starts = {};  // of a body: instead of these
     };
+    class Bodies;
 
     [[noreturn]] void fail(Position at, const std::string& message) const { source_.fail(at, message); }
 
@@ -60,6 +62,7 @@ private:
     void read_coordinate(const Entry& entry);
     void read_initial_entries(Group& group, const Table& table);
     void read_count(Group& group, const Entry* count);
+    void read_bodies_and_definitions();
     void refuse_names_of_momenta() const;
     void read_definitions();
     void read_lagrangian();
@@ -93,6 +96,9 @@ private:
     std::vector<std::pair<const Name*, const Entry*>> definition_lines_;
     GiNaC::exmap parameter_values_;
     std::vector<Group> groups_;
+    std::deque<Entry> parts_;  // of bodies: the lines of their coordinates
+    GiNaC::ex kinetic_energy_ = 0;
+    std::string kinetic_text_;  // "T(top) + T(arm)"
 };
 
 // On one line, without comments.

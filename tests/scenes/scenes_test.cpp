@@ -581,6 +581,118 @@ TEST_CASE("the top in a quaternion points where the one in Euler's angles should
     CHECK(std::fabs(q(0) * q(0) - q(1) * q(1) - q(2) * q(2) + q(3) * q(3) - std::cos(theta)) < 1e-11);
 }
 
+// The quaternion of a body and the momenta along it, in a row.
+struct Orientation {
+    std::array<double, 4> q, p;
+    Orientation(const Trajectory& trajectory, std::size_t row, const std::string& body) {
+        for (int k = 0; k < 4; ++k) {
+            q[static_cast<std::size_t>(k)] = trajectory(row, element(body + "_q", k + 1));
+            p[static_cast<std::size_t>(k)] = trajectory(row, "p_" + element(body + "_q", k + 1));
+        }
+    }
+    double length() const { return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]; }
+    // The third axis of the body in space.
+    std::array<double, 3> axis() const {
+        return {2 * (q[1] * q[3] + q[0] * q[2]) / length(), 2 * (q[2] * q[3] - q[0] * q[1]) / length(),
+                (q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]) / length()};
+    }
+    // Angular momentum in the body's frame (side = -1), in that of space (side = 1).
+    std::array<double, 3> momentum(int side) const {
+        return {(q[0] * p[1] - q[1] * p[0] + side * (q[2] * p[3] - q[3] * p[2])) / 2,
+                (q[0] * p[2] - q[2] * p[0] + side * (q[3] * p[1] - q[1] * p[3])) / 2,
+                (q[0] * p[3] - q[3] * p[0] + side * (q[1] * p[2] - q[2] * p[1])) / 2};
+    }
+};
+
+TEST_CASE("the top on a ball joint points where the one in Euler's angles should") {
+    const auto& angles = test::scene_reference("lagrange_top").state;
+    const double theta = angles[0].second, phi = angles[1].second;
+    const Trajectory top("rigid_top");
+    const Orientation end(top, top.last(), "top");
+    const std::array<double, 3> axis = end.axis();
+    CHECK(std::fabs(axis[0] - std::sin(theta) * std::sin(phi)) < 1e-12);
+    CHECK(std::fabs(axis[1] + std::sin(theta) * std::cos(phi)) < 1e-12);
+    CHECK(std::fabs(axis[2] - std::cos(theta)) < 1e-12);
+    CHECK(top.drift("H") < 1e-13);
+    CHECK(top.drift([&](std::size_t row) { return Orientation(top, row, "top").momentum(1)[2]; }) < 1e-13);
+}
+
+namespace {
+
+// sn, cn, dn by the arithmetic-geometric mean (M. Abramowitz and I. A. Stegun, 16.4).
+std::array<long double, 3> elliptic(long double u, long double k2) {
+    std::vector<long double> a{1}, c{std::sqrt(k2)};
+    long double b = std::sqrt(1 - k2);
+    while (std::fabs(c.back()) > 1e-19L) {
+        c.push_back((a.back() - b) / 2);
+        const long double mean = (a.back() + b) / 2;
+        b = std::sqrt(a.back() * b);
+        a.push_back(mean);
+    }
+    const std::size_t n = a.size() - 1;
+    long double phi = std::ldexp(a[n] * u, static_cast<int>(n));
+    for (std::size_t i = n; i > 0; --i) phi = (phi + std::asin(c[i] / a[i] * std::sin(phi))) / 2;
+    const long double sn = std::sin(phi);
+    return {sn, std::cos(phi), std::sqrt(1 - k2 * sn * sn)};
+}
+
+}  // namespace
+
+TEST_CASE("the wing nut tips over as Jacobi's elliptic functions say, and keeps its angular momentum") {
+    const Trajectory nut("wing_nut");
+    const long double A = 1, B = 2, C = 3, w1 = 1.73L, w3 = 1;
+    const long double k2 = (B - A) * A * (C - A) * w1 * w1 / ((C - B) * C * (C - A) * w3 * w3),
+                      rate = w3 * std::sqrt((C - B) * (C - A) / (A * B));
+    double off = 0, lowest = 1;
+    for (std::size_t row = 0; row < nut.size(); ++row) {
+        const auto [sn, cn, dn] = elliptic(rate * static_cast<long double>(nut(row, "t")), k2);
+        const std::array<double, 3> L = Orientation(nut, row, "nut").momentum(-1);
+        const long double w2 = w1 * std::sqrt(A * (C - A) / (B * (C - B))) * sn;
+        off = std::fmax(off, std::fabs(L[0] / 1 - static_cast<double>(w1 * cn)));
+        off = std::fmax(off, std::fabs(L[1] / 2 - static_cast<double>(w2)));
+        off = std::fmax(off, std::fabs(L[2] / 3 - static_cast<double>(w3 * dn)));
+        lowest = std::fmin(lowest, L[1]);
+        CHECK(std::fabs(nut(row, "nut_x") - 0.1 * nut(row, "t")) < 1e-12);
+        CHECK(std::fabs(Orientation(nut, row, "nut").length() - 1) < 1e-9);
+    }
+    CHECK(off < 1e-11);
+    CHECK(lowest < -2.9);  // it has tipped over
+    CHECK(nut.drift("H") < 1e-13);
+    for (const std::size_t k : {0U, 1U, 2U})
+        CHECK(nut.drift([&](std::size_t row) { return Orientation(nut, row, "nut").momentum(1)[k]; }) < 1e-13);
+}
+
+TEST_CASE("the gyroscopic pendulum goes round like a top in Euler's angles with two bodies that spin") {
+    const Trajectory pendulum("gyroscopic_pendulum");
+    // I = a + A + M l^2/4 + m l^2; from the upright: cos(theta) = -4/5; the arm does not spin at the start.
+    const std::vector<double> end = end_of(
+        "lagrangian = \"(0.1 + 0.05 + 0.25 + 2)*(theta'^2 + sin(theta)^2*phi'^2)/2 + 0.01*(psi' + cos(theta)*phi')^2/2"
+        " + 0.1*(chi' + cos(theta)*phi')^2/2 - 9.80665*2.5*cos(theta)\"\n[coordinates]\n"
+        "theta = { position = \"acos(-4/5)\", velocity = 0 }\nphi = { position = 0, velocity = 0 }\n"
+        "psi = { position = 0, velocity = 0 }\nchi = { position = 0, velocity = 50 }\n[method]\npoints = 8\n[run]\n"
+        "step = 0.01\nuntil = 10\n");
+    const std::array<double, 3> up = Orientation(pendulum, pendulum.last(), "arm").axis();  // towards the pivot
+    CHECK(std::fabs(-up[0] - std::sin(end[0]) * std::cos(end[1])) < 1e-10);
+    CHECK(std::fabs(-up[1] - std::sin(end[0]) * std::sin(end[1])) < 1e-10);
+    CHECK(std::fabs(-up[2] - std::cos(end[0])) < 1e-10);
+    CHECK(pendulum.drift("H") < 1e-12);
+}
+
+TEST_CASE("the four-bar linkage of plane bodies moves like the one in angles") {
+    std::string text = test::read_file(Trajectory::scene_file("four_bar"));
+    const auto replace = [&](const std::string& from, const std::string& to) {
+        REQUIRE(text.find(from) != std::string::npos);
+        text.replace(text.find(from), from.size(), to);
+    };
+    replace("position = \"pi/2\", velocity = 3", "position = \"pi\", velocity = 0");
+    replace("position = 0.4,", "position = \"acos((16 + 9 - 6.25)/24)\",");
+    replace("position = 1.6,", "position = \"pi - acos((16 - 9 + 6.25)/20)\",");
+    replace("points = 5", "points = 8");
+    const std::vector<double> angles = end_of(text);
+    const Trajectory bodies("four_bar_bodies");
+    CHECK(std::fabs(bodies(bodies.last(), "a_angle") - (angles[0] - std::acos(-1))) < 1e-11);
+}
+
 TEST_CASE("Andrews' squeezing mechanism is where the test set has it at t = 0.03") {
     const Trajectory mechanism("andrews_squeezer");
     // Nine digits of the published ones are reached; ours do not change with step and method.

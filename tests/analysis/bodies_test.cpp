@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Motions of rigid bodies on joints against the same systems written by hand.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/run/trajectory.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const std::string run = "[method]\npoints = 8\n[run]\nstep = 0.05\nuntil = 3\n";
+
+std::vector<double> end_of(const std::string& text) {
+    const Scene scene = read_scene(Source("bodies.toml", text + run));
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    const TrajectoryResult result = integrate(kernel, request_of(scene, steps_of(scene, {}).count, stepper));
+    REQUIRE(result.status == LOBATTO_OK);
+    return result.q;
+}
+
+// The column j of the rotation of a quaternion, of any length.
+std::vector<double> column(const std::vector<double>& q, int j) {
+    const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    const double R[3][3] = {{q[0] * q[0] + q[1] * q[1] - q[2] * q[2] - q[3] * q[3], 2 * (q[1] * q[2] - q[0] * q[3]),
+                             2 * (q[1] * q[3] + q[0] * q[2])},
+                            {2 * (q[1] * q[2] + q[0] * q[3]), q[0] * q[0] - q[1] * q[1] + q[2] * q[2] - q[3] * q[3],
+                             2 * (q[2] * q[3] - q[0] * q[1])},
+                            {2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1]),
+                             q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]}};
+    return {R[0][j] / n, R[1][j] / n, R[2][j] / n};
+}
+
+}  // namespace
+
+TEST_CASE("plane bodies on hinges are the double pendulum in angles, those on a slider a pendulum on a cart") {
+    const std::vector<double> joints = end_of(
+        "lagrangian = \"-upper.y - 2*lower.y\"\n[bodies]\nupper = { mass = 1, inertia = 0.3, position = [0, -1] }\n"
+        "lower = { mass = 2, inertia = 0.2, position = [0, -3] }\n[joints]\n"
+        "shoulder = { type = \"hinge\", bodies = [\"ground\", \"upper\"], point = [0, 0], angle = 1 }\n"
+        "elbow = { type = \"hinge\", bodies = [\"upper\", \"lower\"], point = [0, -2], angle = 0.5, velocity = 0.3 "
+        "}\n");
+    const std::vector<double> angles = end_of(
+        "lagrangian = \"(x1'^2 + y1'^2)/2 + 0.15*a'^2 + x2'^2 + y2'^2 + 0.1*b'^2 - y1 - 2*y2\"\n[definitions]\n"
+        "x1 = \"sin(a)\"\ny1 = \"-cos(a)\"\nx2 = \"2*x1 + sin(b)\"\ny2 = \"2*y1 - cos(b)\"\n[coordinates]\n"
+        "a = { position = 1, velocity = 0 }\nb = { position = 1.5, velocity = 0.3 }\n");
+    CHECK(std::fabs(joints[0] - angles[0]) < 1e-12);
+    CHECK(std::fabs(joints[0] + joints[1] - angles[1]) < 1e-12);
+
+    const std::vector<double> cart = end_of(
+        "lagrangian = \"-bob.y - cart.y\"\n[bodies]\ncart = { mass = 3, inertia = 1 }\n"
+        "bob = { mass = 1, inertia = 0.2, position = [0, -1] }\n[joints]\n"
+        "rail = { type = \"slider\", bodies = [\"ground\", \"cart\"], axis = [3, 4], velocity = 0.5 }\n"
+        "swing = { type = \"hinge\", bodies = [\"cart\", \"bob\"], point = [0, 0], angle = 1 }\n");
+    const std::vector<double> by_hand = end_of(
+        "lagrangian = \"1.5*s'^2 + (x'^2 + y'^2)/2 + 0.1*a'^2 - y - 0.8*s\"\n[definitions]\nx = \"0.6*s + sin(a)\"\n"
+        "y = \"0.8*s - cos(a)\"\n[coordinates]\ns = { position = 0, velocity = 0.5 }\na = { position = 1, velocity = 0 "
+        "}\n");
+    CHECK(std::fabs(cart[0] - by_hand[0]) < 1e-12);
+    CHECK(std::fabs(cart[1] - by_hand[1]) < 1e-12);
+}
+
+TEST_CASE("a hinge in space leaves one angle, with the moment of inertia about its axis") {
+    // About (0, 3, 4)/5 through the origin: J = e I e + m d^2, d the distance of (1, 0, 0).
+    const std::vector<double> hinge = end_of(
+        "lagrangian = \"-2*door.z\"\n[bodies]\ndoor = { mass = 2, inertia = [1, 2, 2.5, 0.1, 0.2, 0.3], position = "
+        "[1, 0, 0] }\n[joints]\n"
+        "a = { type = \"hinge\", bodies = [\"ground\", \"door\"], point = [0, 0, 0], axis = [0, 3, 4], velocity = 1 "
+        "}\n");
+    const std::vector<double> angle = end_of(
+        "lagrangian = \"((2*9 + 2.5*16 + 2*0.3*12)/25 + 2)*a'^2/2 + 2*0.6*sin(a)\"\n[coordinates]\n"
+        "a = { position = 0, velocity = 1 }\n");
+    CHECK(std::fabs(hinge[0] - angle[0]) < 1e-12);
+}
+
+TEST_CASE("a body on a joint moves like a free one that constraints hold") {
+    const std::string body =
+        "[bodies]\narm = { mass = 2, inertia = [1, 1.5, 0.8], position = [1, 0, 0], orientation = [2, 0, 1, 0], ";
+    const std::string potential = "lagrangian = \"-2*arm.z\"\n";
+    const std::vector<double> ball =
+        end_of(potential + body +
+               "angular_velocity = [1, 2, 3] }\n[joints]\n"
+               "a = { type = \"ball\", bodies = [\"ground\", \"arm\"], point = [0, 0, 0] }\n");
+    // The origin is at -R^T (1, 0, 0) = (-3, 0, -4)/5 in the body; its velocity is R (w x (3, 0, 4)/5).
+    const std::vector<double> held = end_of(
+        potential + body +
+        "angular_velocity = [1, 2, 3], velocity = [0, 1, -2] }\n[constraints]\n"
+        "x = \"arm.x(-3/5, 0, -4/5) = 0\"\ny = \"arm.y(-3/5, 0, -4/5) = 0\"\nz = \"arm.z(-3/5, 0, -4/5) = 0\"\n");
+    for (int j = 0; j < 3; ++j)
+        for (std::size_t i = 0; i < 3; ++i)
+            CHECK(std::fabs(column(ball, j)[i] - column({held.begin() + 3, held.end()}, j)[i]) < 1e-11);
+}
+
+TEST_CASE("a distance is a rod, and two hinges and one more close a loop") {
+    // A point on a rod, as a body that does not turn.
+    const std::vector<double> rod = end_of(
+        "lagrangian = \"-bob.y\"\n[bodies]\nbob = { mass = 1, inertia = 1, position = [0.6, -0.8] }\n[joints]\n"
+        "rod = { type = \"distance\", bodies = [\"ground\", \"bob\"], from = [0, 0], to = [0.6, -0.8] }\n");
+    const std::vector<double> angle =
+        end_of("lagrangian = \"a'^2/2 + cos(a)\"\n[coordinates]\na = { position = \"asin(0.6)\", velocity = 0 }\n");
+    CHECK(std::fabs(rod[0] - std::sin(angle[0])) < 1e-12);
+    CHECK(std::fabs(rod[1] + std::cos(angle[0])) < 1e-12);
+
+    // A parallelogram: the coupler does not turn, so that all is one pendulum.
+    const std::vector<double> loop = end_of(
+        "lagrangian = \"-a.y - b.y - c.y\"\n[bodies]\na = { mass = 1, inertia = 0.1, position = [0, -0.5] }\n"
+        "b = { mass = 1, inertia = 0.1, position = [1, -1] }\nc = { mass = 1, inertia = 0.1, position = [2, -0.5] }\n"
+        "[joints]\np = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0], angle = 1 }\n"
+        "q = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [0, -1], angle = -1 }\n"
+        "r = { type = \"hinge\", bodies = [\"ground\", \"c\"], point = [2, 0], angle = 1 }\n"
+        "s = { type = \"hinge\", bodies = [\"c\", \"b\"], point = [2, -1] }\n");
+    const std::vector<double> one = end_of(
+        "lagrangian = \"(0.2 + 0.5 + 1)*a'^2/2 + 2*cos(a)\"\n[coordinates]\na = { position = 1, velocity = 0 }\n");
+    CHECK(std::fabs(loop[0] - one[0]) < 1e-12);
+    CHECK(std::fabs(loop[1] + one[0]) < 1e-12);
+}
