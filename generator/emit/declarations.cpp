@@ -199,6 +199,7 @@ const std::set<std::string>& member_names() {
                                                 "stops",
                                                 "impacts",
                                                 "resets",
+                                                "switches",
                                                 "reset_of",
                                                 "parameter",
                                                 "prepare",

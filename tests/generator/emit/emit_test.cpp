@@ -399,6 +399,15 @@ TEST_CASE("the names that a scene may not take are those that kernels declare") 
                                                                                   {"fput_beta", lobatto_4}}) {
         Scene scene = read_scene(std::string(LOBATTO_SOURCE_DIR) + "/scenes/" + name + ".toml");
         scene.method = method;
+        if (name == "double_pendulum") {  // and one with all that a wall may have
+            Impact wall{"wall"};
+            wall.when = {"wall", scene.coordinates[0].position - 10, 1};
+            for (const Coordinate& coordinate : scene.coordinates) {
+                wall.reset_position.push_back(coordinate.position);
+                wall.reset_velocity.push_back(-coordinate.velocity);
+            }
+            scene.impacts.push_back(wall);
+        }
         const std::string header = emit(derive(scene)).header;
         const std::regex declaration(
             R"(\n    (?:static constexpr [\w:* ]*?|using |struct |static [\w:]+&? )(\w+)(?:\[| =| \{|\())");

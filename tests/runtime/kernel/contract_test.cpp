@@ -40,7 +40,7 @@ struct WithWrongCount : HandwrittenPendulum {
     static constexpr int unknowns = 3;
 };
 struct WithoutEvents : HandwrittenPendulum {
-    static constexpr int events = 1, stops = 0, impacts = 0, switches = 0;
+    static constexpr int events = 1;
 };
 static_assert(!Kernel<WithoutNode> && !Kernel<WithoutTable> && !Kernel<WithTimeThatIsNotThere> &&
               !Kernel<WithWrongCount> && !Kernel<WithoutEvents>);
