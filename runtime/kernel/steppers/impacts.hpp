@@ -232,7 +232,7 @@ private:
         if (++impacts > most_impacts) return Status::impacts_accumulate;
         real& side = stepper.side(number - impacts_of<K>());
         side = -side;
-        return Status::ok;
+        return K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
     }
 
     // All walls that are met there, one after another, until none is.
