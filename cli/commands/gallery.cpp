@@ -87,7 +87,8 @@ Picture picture_of_scene(Scene& scene) {
     const TrajectoryRequest request = request_of(scene, steps.count, stepper);
     const States states = run(scene.path, kernel, request);
     const auto& forces = derivation.system.outer_force;
-    const bool nested = shape_of(scene) == Shape::phase && derivation.system.autonomous && forces.front().is_zero();
+    const bool nested =
+        !scene.is_cut() && shape_of(scene) == Shape::phase && derivation.system.autonomous && forces.front().is_zero();
     return picture_of(scene, states,
                       nested ? smaller_motions(scene.path, kernel, request, states) : std::vector<States>{});
 }
