@@ -40,7 +40,8 @@ const Kernel& eventful_pendulum() {
         source.header =
             test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
             "namespace lobatto::kernels {\nstruct eventful_pendulum : HandwrittenPendulum {\n"
-            "    static constexpr int events = 2, stops = 0, impacts = 0, switches = 0;\n    static constexpr int event_direction[2] = {1, 0};\n"
+            "    static constexpr int events = 2, stops = 0, impacts = 0, switches = 0;\n    static constexpr int "
+            "event_direction[2] = {1, 0};\n"
             "    static void event(const Coefficients&, const real* q, const real* velocity, real* value) {\n"
             "        value[0] = q[0];\n        value[1] = velocity[0];\n    }\n};\n}\n";
         return kernel_of(source, Precision::double_);
