@@ -2,21 +2,12 @@
 // lobatto run: a scene from text to trajectory, and what there is to say about it.
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <thread>
 
-#include "analysis/accuracy/companion.hpp"
-#include "analysis/accuracy/domains.hpp"
-#include "analysis/accuracy/energy_watch.hpp"
-#include "analysis/accuracy/step_judge.hpp"
-#include "analysis/accuracy/watch.hpp"
+#include "analysis/accuracy/judged_run.hpp"
 #include "analysis/exact_start.hpp"
-#include "analysis/kernel_of.hpp"
-#include "analysis/motion.hpp"
-#include "analysis/stability/linear_departure.hpp"
 #include "analysis/tradeoff/candidate.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
@@ -27,9 +18,6 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/mechanics/automatic_clock.hpp"
-#include "generator/mechanics/start.hpp"
-#include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/run/decimal.hpp"
@@ -91,10 +79,6 @@ TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
     header.columns.insert(header.columns.begin(), {"event", ""});
     for (const Event& event : scene.reported()) header.events.push_back(event.text);
     return header;
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult& result, std::int64_t steps) {
@@ -187,104 +171,10 @@ std::string event_path(const RunOptions& options, const Scene& scene) {
     return path + ".events.csv";
 }
 
-// A scene, ready to run: its kernel compiled, its start in numbers.
-struct Prepared {
-    Scene scene;
-    Derivation derivation;
-    KernelSource source;
-    Compiled compiled;
-    Kernel kernel;  // in the scene's numbers
-    Kernel plain;   // the same in double, for what looks at states in doubles
-    Steps steps;
-    double derivation_seconds;
-};
-
-Prepared prepare(const RunOptions& options) {
-    const auto start = std::chrono::steady_clock::now();
-    Scene scene = read_scene(options.scene);
-    options.method.apply(scene);
-    if (scene.clock && scene.method.numbers != Precision::double_)
-        scene.source.fail(scene.clock->at, "with a clock `lobatto run` computes in double, but numbers are \"" +
-                                               precision_name(scene.method.numbers) +
-                                               "\"; remove the clock, or give --numbers double");
-    Derivation derivation = derive(scene, options.general);
-    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
-    const Precision numbers = scene.method.numbers;
-    const KernelSource source = emit(derivation, {numbers, {}});
-    const double derivation_seconds = seconds_since(start);
-    apply(options.overrides, scene);  // after the derivation: one kernel serves all values
-    if (!options.overrides.set.empty()) check_domains(scene, derivation.system);
-    const Steps steps = steps_of(scene, options.overrides);
-    Compiled compiled;
-    const Kernel kernel = kernel_of(source, numbers, &compiled);
-    const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(emit(derivation), Precision::double_);
-    return {scene, derivation, source, compiled, kernel, plain, steps, derivation_seconds};
-}
-
-// All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
-class Observers {
-public:
-    static inline const std::vector<std::string> names = {"counts",       "watch",     "step judge",
-                                                          "energy watch", "companion", "left domain"};
-
-    // `measures`: whether a companion runs beside it.
-    Observers(const Prepared& run, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
-              const std::vector<double>& velocity, bool measures)
-        : watch(run.scene, run.derivation.structure, stepper, velocity),
-          judge(run.scene),
-          energy(run.derivation, run.plain),
-          domains(run.scene, run.derivation.system),
-          parameters(request.parameters),
-          counts(1 + run.scene.reported().size(), 0) {
-        if (measures) companion.emplace(run.derivation, run.kernel, request);
-    }
-
-    void observe(const Records& records) {
-        watch.observe(records);
-        judge.observe(records);
-        energy.observe(records);
-        if (companion) companion->observe(records);
-        if (left_domain.empty())
-            if (const std::int64_t i = domains.left_at(parameters, records); i >= 0)
-                left_domain.assign(records.rows + i * records.columns, records.rows + (i + 1) * records.columns);
-        counts[0] += static_cast<double>(records.count);
-    }
-    void observe(const EventRecords& records) {
-        for (std::int64_t i = 0; i < records.count; ++i)
-            ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
-    }
-
-    std::map<std::string, std::vector<double>> save() const {
-        return {{"counts", counts},
-                {"watch", watch.save()},
-                {"step judge", judge.save()},
-                {"energy watch", energy.save()},
-                {"companion", companion ? companion->save() : std::vector<double>()},
-                {"left domain", left_domain}};
-    }
-    void restore(const std::map<std::string, std::vector<double>>& saved) {
-        counts = saved.at("counts");
-        watch.restore(saved.at("watch"));
-        judge.restore(saved.at("step judge"));
-        energy.restore(saved.at("energy watch"));
-        if (companion) companion->restore(saved.at("companion"));
-        left_domain = saved.at("left domain");
-    }
-
-    Watch watch;
-    StepJudge judge;
-    EnergyWatch energy;
-    std::optional<Companion> companion;
-    Domains domains;
-    std::vector<double> parameters;
-    std::vector<double> left_domain;  // t, q, p: the first state where a formula has no value
-    std::vector<double> counts;       // of the states, and of each kind of event
-};
-
 // The files of a run: its trajectory, its events, and while it goes on its checkpoint.
 class Files {
 public:
-    Files(const RunOptions& options, const Prepared& run, const TrajectoryHeader& header,
+    Files(const RunOptions& options, const PreparedRun& run, const TrajectoryHeader& header,
           const std::optional<Checkpoint>& from)
         : path_(output_path(options.output, result_name(run.scene.path) + ".csv")),
           trajectory_(path_, header, from ? from->files[0] : Written()) {
@@ -301,7 +191,7 @@ public:
 
     void write(const Records& records) { trajectory_.write(records); }
     void write(const EventRecords& records) { events_->write(records); }
-    void checkpoint(const std::string& run, const Halfway& halfway, const Observers& observers) {
+    void checkpoint(const std::string& run, const Halfway& halfway, const RunObservers& observers) {
         Checkpoint checkpoint{run, halfway, {trajectory_.written()}, observers.save()};
         trajectory_.sync();
         if (events_) {
@@ -323,8 +213,8 @@ private:
 };
 
 // Takes the steps: records go to the files and the observers.
-TrajectoryResult integrate_into(Files& files, Observers& observers, const std::string& identity, const Prepared& run,
-                                TrajectoryRequest& request, bool quiet) {
+TrajectoryResult integrate_into(Files& files, RunObservers& observers, const std::string& identity,
+                                const PreparedRun& run, TrajectoryRequest& request, bool quiet) {
     request.sink = [&](const Records& records) {
         files.write(records);
         observers.observe(records);
@@ -346,80 +236,12 @@ TrajectoryResult integrate_into(Files& files, Observers& observers, const std::s
     return result;
 }
 
-// Of a motion that may come near a pole.
-std::string clock_advice(const Scene& scene) {
-    const bool helps = !scene.clock && has_automatic_clock(scene);
-    return helps ? ", or clock = \"auto\" under [method], whose steps follow close encounters" : "";
-}
-
-// That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
-std::string loss_of(const RunOptions& options, const Scene& scene, const TrajectoryRequest& request,
-                    const std::optional<MeasuredError>& error) {
-    if (!error || !error->is_lost() || options.beyond_horizon || scene.run.beyond_horizon) return "";
-    const std::string clock = clock_advice(scene);
-    const char* const why = error->companion_stopped
-                                ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
-                                : "from there on the error is as large as the motion itself, and nothing of it is left";
-    const std::string chaos =
-        error->doubling ? fmt::format(", an earlier end (errors double every {:.3g})", *error->doubling) : "";
-    return fmt::format(
-        "the run left its motion by t = {:.6g}, q = {}, p = {}: {}. Try a smaller step, such as h = {:.6g}, more "
-        "points{}{}, or --beyond-horizon where the statistics of the motion are what counts.",
-        *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, clock, chaos);
-}
-
-constexpr double missed = 2;  // times the error wanted
-
-std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) {
-    if (error.is_lost()) return {};
-    std::vector<std::string> texts;
-    if (error.worst() > large_error)
-        texts.push_back(
-            fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points", error.worst()));
-    else if (wanted > 0 && error.at_end > missed * wanted)
-        texts.push_back(
-            fmt::format("the scene asks for an error of {:.2g}, and it is {:.2g}; `lobatto tune` chooses a step",
-                        wanted, error.at_end));
-    return texts;
-}
-
-// That a run which went to its end has left the motion of its Lagrangian. Empty: it has not.
-std::string departure_of(const Prepared& run, const TrajectoryRequest& request, const TrajectoryResult& result,
-                         const Observers& observers) {
-    if (result.status != LOBATTO_OK || result.interrupted) return "";
-    if (const std::vector<double>& row = observers.left_domain; !row.empty()) {
-        const auto middle = row.begin() + 1 + std::ssize(result.q);
-        return fmt::format(
-            "the run left its Lagrangian by t = {:.6g}, q = {}, p = {}: {}, and has no value there. Try an earlier "
-            "end, "
-            "or start elsewhere, or write the formula without it.",
-            row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
-            observers.domains.text(observers.parameters, row.data()));
-    }
-    const std::string departure = observers.energy.departure(run.derivation, run.plain, request);
-    if (run.scene.clock || run.scene.is_cut()) return departure;
-    return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
-}
-
 // Ends the command with the error that the run deserves, if any.
-void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, const TrajectoryResult& result,
-                          const std::string& departure, const Files& files, const Kernel& kernel) {
-    if (result.status != LOBATTO_OK)
-        throw ComputationError(fmt::format(
-            "{}: {} What was computed is in {}.", scene.path,
-            explain_stop(result, request, passing_step(kernel, request, result), clock_advice(scene)), files.path()));
-    if (!departure.empty())
-        throw ComputationError(fmt::format("{}: {} What was computed is in {}.", scene.path, departure, files.path()));
-    if (scene.outputs.energy && !std::isfinite(result.energy_error_largest))
+void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, const RunVerdict& verdict,
+                          const Files& files) {
+    if (!verdict.failure.empty())
         throw ComputationError(
-            std::isfinite(result.energy_start)
-                ? fmt::format("{}: the energy became infinite or not a number: the motion grows without bound, or has "
-                              "gone where the Lagrangian is not real. Try a smaller step, such as h = {:.6g}, an "
-                              "earlier end, or start elsewhere. What was computed is in {}.",
-                              scene.path, request.step / 2, files.path())
-                : fmt::format("{}: the energy of the start is too large for a number, though the motion is not. Try "
-                              "other units, or energy = false under [output]. What was computed is in {}.",
-                              scene.path, files.path()));
+            fmt::format("{}: {} What was computed is in {}.", scene.path, verdict.failure, files.path()));
     if (result.interrupted) {
         tell("lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, files.path(),
              files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");
@@ -428,7 +250,9 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryRequest& request, 
 }
 
 void run(const RunOptions& options) {
-    const Prepared run = prepare(options);
+    Scene read = read_scene(options.scene);
+    options.method.apply(read);
+    const PreparedRun run = prepare_run(std::move(read), options.overrides, options.general);
     const Scene& scene = run.scene;
     LoadedStepper<double> stepper(run.plain);
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
@@ -451,10 +275,10 @@ void run(const RunOptions& options) {
     const std::string identity = identity_of(request, header, run.compiled.object);
     std::vector<double> velocity;
     stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
-    Observers observers(run, stepper, request, velocity, !options.unmeasured);
+    RunObservers observers(run, stepper, request, velocity, !options.unmeasured);
     std::optional<Checkpoint> from;
     if (options.resume) {
-        from = checkpoint_of(path, identity, run.kernel, has_events ? 2 : 1, Observers::names);
+        from = checkpoint_of(path, identity, run.kernel, has_events ? 2 : 1, RunObservers::names);
         if (from) {
             observers.restore(from->observers);
             request.from = &from->halfway;
@@ -467,28 +291,18 @@ void run(const RunOptions& options) {
     Files files(options, run, header, from);
     if (observers.companion && std::thread::hardware_concurrency() > 1) observers.companion->start();
     const TrajectoryResult result = integrate_into(files, observers, identity, run, request, options.quiet);
-    std::optional<MeasuredError> error;
-    if (observers.companion) error = observers.companion->finish(result);
-
-    std::string departure = departure_of(run, request, result, observers);
-    if (departure.empty()) departure = loss_of(options, scene, request, error);
-    std::vector<std::string> warnings;
-    if (error && departure.empty()) warnings = warnings_of(*error, scene.run.error);
-    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
-        for (const std::string& warning :
-             StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
-            warnings.push_back(warning);
-    for (const std::string& warning : warnings) tell("lobatto: warning: {}.\n", warning);
+    const RunVerdict verdict = verdict_of(run, request, result, observers, options.beyond_horizon);
+    for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (!options.quiet) {
         print_table(run.derivation, scene, run.kernel, request, result, observers.watch);
-        if (error) print_row("measured error", text_of(*error, scene));
+        if (verdict.error) print_row("measured error", text_of(*verdict.error, scene));
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
         if (!run.steps.reaches_end)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
-    fail_where_it_failed(scene, request, result, departure, files, run.plain);
+    fail_where_it_failed(scene, result, verdict, files);
 }
 
 }  // namespace

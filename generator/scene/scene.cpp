@@ -344,8 +344,8 @@ Scene read_scene(const std::string& path, const std::vector<std::string>& kept) 
     return Reader(Source::read(path)).run(kept);
 }
 
-Scene read_scene(const Source& source) {
-    return Reader(source).run({});
+Scene read_scene(const Source& source, const std::vector<std::string>& kept) {
+    return Reader(source).run(kept);
 }
 
 }  // namespace lobatto

@@ -160,6 +160,6 @@ Names parameter_names(const Scene& scene);
 // Throws InputError: what, where, why, how to mend.
 // `kept`: instead of [output] keep; an error names the option --keep.
 Scene read_scene(const std::string& path, const std::vector<std::string>& kept = {});
-Scene read_scene(const Source& source);
+Scene read_scene(const Source& source, const std::vector<std::string>& kept = {});
 
 }  // namespace lobatto

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/judged_run.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "analysis/stability/linear_departure.hpp"
+#include "generator/mechanics/automatic_clock.hpp"
+#include "generator/mechanics/start.hpp"
+#include "generator/pipeline.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// Of a motion that may come near a pole.
+std::string clock_advice(const Scene& scene) {
+    const bool helps = !scene.clock && has_automatic_clock(scene);
+    return helps ? ", or clock = \"auto\" under [method], whose steps follow close encounters" : "";
+}
+
+// That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
+std::string loss_of(const Scene& scene, const TrajectoryRequest& request, const std::optional<MeasuredError>& error) {
+    if (!error || !error->is_lost()) return "";
+    const std::string clock = clock_advice(scene);
+    const char* const why = error->companion_stopped
+                                ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
+                                : "from there on the error is as large as the motion itself, and nothing of it is left";
+    const std::string chaos =
+        error->doubling ? fmt::format(", an earlier end (errors double every {:.3g})", *error->doubling) : "";
+    return fmt::format(
+        "the run left its motion by t = {:.6g}, q = {}, p = {}: {}. Try a smaller step, such as h = {:.6g}, more "
+        "points{}{}, or --beyond-horizon where the statistics of the motion are what counts.",
+        *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, clock, chaos);
+}
+
+constexpr double missed = 2;  // times the error wanted
+
+std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) {
+    if (error.is_lost()) return {};
+    std::vector<std::string> texts;
+    if (error.worst() > large_error)
+        texts.push_back(
+            fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points", error.worst()));
+    else if (wanted > 0 && error.at_end > missed * wanted)
+        texts.push_back(
+            fmt::format("the scene asks for an error of {:.2g}, and it is {:.2g}; `lobatto tune` chooses a step",
+                        wanted, error.at_end));
+    return texts;
+}
+
+// That a run which went to its end has left the motion of its Lagrangian. Empty: it has not.
+std::string departure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                         const RunObservers& observers) {
+    if (result.status != LOBATTO_OK || result.interrupted) return "";
+    if (const std::vector<double>& row = observers.left_domain; !row.empty()) {
+        const auto middle = row.begin() + 1 + std::ssize(result.q);
+        return fmt::format(
+            "the run left its Lagrangian by t = {:.6g}, q = {}, p = {}: {}, and has no value there. Try an earlier "
+            "end, "
+            "or start elsewhere, or write the formula without it.",
+            row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
+            observers.domains.text(observers.parameters, row.data()));
+    }
+    const std::string departure = observers.energy.departure(run.derivation, run.plain, request);
+    if (run.scene.clock || run.scene.is_cut()) return departure;
+    return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
+}
+
+// Of a run whose steps failed, that left its motion or lost it, or whose energy is no number. Empty: of none.
+std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                       const std::string& departure) {
+    const Scene& scene = run.scene;
+    if (result.status != LOBATTO_OK)
+        return explain_stop(result, request, passing_step(run.plain, request, result), clock_advice(scene));
+    if (!departure.empty()) return departure;
+    if (!scene.outputs.energy || std::isfinite(result.energy_error_largest)) return "";
+    if (std::isfinite(result.energy_start))
+        return fmt::format(
+            "the energy became infinite or not a number: the motion grows without bound, or has gone where the "
+            "Lagrangian is not real. Try a smaller step, such as h = {:.6g}, an earlier end, or start elsewhere.",
+            request.step / 2);
+    return "the energy of the start is too large for a number, though the motion is not. Try other units, or energy = "
+           "false under [output].";
+}
+
+}  // namespace
+
+PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
+    const auto start = std::chrono::steady_clock::now();
+    if (scene.clock && scene.method.numbers != Precision::double_)
+        scene.source.fail(scene.clock->at, "with a clock `lobatto run` computes in double, but numbers are \"" +
+                                               precision_name(scene.method.numbers) +
+                                               "\"; remove the clock, or give --numbers double");
+    Derivation derivation = derive(scene, general);
+    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
+    const Precision numbers = scene.method.numbers;
+    const KernelSource source = emit(derivation, {numbers, {}});
+    const std::chrono::duration<double> derivation_time = std::chrono::steady_clock::now() - start;
+    apply(overrides, scene);  // after the derivation: one kernel serves all values
+    if (!overrides.set.empty()) check_domains(scene, derivation.system);
+    const Steps steps = steps_of(scene, overrides);
+    Compiled compiled;
+    const Kernel kernel = kernel_of(source, numbers, &compiled);
+    const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(emit(derivation), Precision::double_);
+    return {scene, derivation, source, compiled, kernel, plain, steps, derivation_time.count()};
+}
+
+RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                      RunObservers& observers, bool accepts_lost) {
+    const Scene& scene = run.scene;
+    RunVerdict verdict;
+    if (observers.companion) verdict.error = observers.companion->finish(result);
+    std::string departure = departure_of(run, request, result, observers);
+    if (departure.empty() && !accepts_lost && !scene.run.beyond_horizon)
+        departure = loss_of(scene, request, verdict.error);
+    if (verdict.error && departure.empty()) verdict.warnings = warnings_of(*verdict.error, scene.run.error);
+    if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
+        for (const std::string& warning :
+             StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
+            verdict.warnings.push_back(warning);
+    verdict.failure = failure_of(run, request, result, departure);
+    return verdict;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A run that knows what it is worth: its kernel, what looks at its states, its measured error, whether it left its
+// motion.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/domains.hpp"
+#include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/accuracy/step_judge.hpp"
+#include "analysis/accuracy/watch.hpp"
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "generator/mechanics/derivation.hpp"
+
+namespace lobatto {
+
+// A scene, ready to run: its kernel compiled, its start in numbers.
+struct PreparedRun {
+    Scene scene;
+    Derivation derivation;
+    KernelSource source;
+    Compiled compiled;
+    Kernel kernel;  // in the scene's numbers
+    Kernel plain;   // the same in double, for what looks at states in doubles
+    Steps steps;
+    double derivation_seconds;
+};
+
+// The overrides are applied after the derivation: one kernel serves all values. `general`: with no shortcut.
+// Throws InputError, ComputationError, MachineError.
+PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general = false);
+
+// All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
+class RunObservers {
+public:
+    static inline const std::vector<std::string> names = {"counts",       "watch",     "step judge",
+                                                          "energy watch", "companion", "left domain"};
+
+    // `measures`: whether a companion runs beside it.
+    RunObservers(const PreparedRun& run, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
+                 const std::vector<double>& velocity, bool measures)
+        : watch(run.scene, run.derivation.structure, stepper, velocity),
+          judge(run.scene),
+          energy(run.derivation, run.plain),
+          domains(run.scene, run.derivation.system),
+          parameters(request.parameters),
+          counts(1 + run.scene.reported().size(), 0) {
+        if (measures) companion.emplace(run.derivation, run.kernel, request);
+    }
+
+    void observe(const Records& records) {
+        watch.observe(records);
+        judge.observe(records);
+        energy.observe(records);
+        if (companion) companion->observe(records);
+        if (left_domain.empty())
+            if (const std::int64_t i = domains.left_at(parameters, records); i >= 0)
+                left_domain.assign(records.rows + i * records.columns, records.rows + (i + 1) * records.columns);
+        counts[0] += static_cast<double>(records.count);
+    }
+    void observe(const EventRecords& records) {
+        for (std::int64_t i = 0; i < records.count; ++i)
+            ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
+    }
+
+    std::map<std::string, std::vector<double>> save() const {
+        return {{"counts", counts},
+                {"watch", watch.save()},
+                {"step judge", judge.save()},
+                {"energy watch", energy.save()},
+                {"companion", companion ? companion->save() : std::vector<double>()},
+                {"left domain", left_domain}};
+    }
+    void restore(const std::map<std::string, std::vector<double>>& saved) {
+        counts = saved.at("counts");
+        watch.restore(saved.at("watch"));
+        judge.restore(saved.at("step judge"));
+        energy.restore(saved.at("energy watch"));
+        if (companion) companion->restore(saved.at("companion"));
+        left_domain = saved.at("left domain");
+    }
+
+    Watch watch;
+    StepJudge judge;
+    EnergyWatch energy;
+    std::optional<Companion> companion;
+    Domains domains;
+    std::vector<double> parameters;
+    std::vector<double> left_domain;  // t, q, p: the first state where a formula has no value
+    std::vector<double> counts;       // of the states, and of each kind of event
+};
+
+// What is to be said of a run that has ended.
+struct RunVerdict {
+    std::optional<MeasuredError> error;  // where a companion ran beside it
+    std::vector<std::string> warnings;   // without full stops
+    std::string failure;                 // what went wrong, and what to try; empty: nothing. The scene stands before it
+};
+// `accepts_lost`: that nothing of the motion is left is no failure.
+RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                      RunObservers& observers, bool accepts_lost);
+
+}  // namespace lobatto

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A method that stands in for the scene's; the words are those of the command line.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "generator/scene/scene.hpp"
+
+namespace lobatto {
+
+struct MethodChoice {
+    std::optional<int> points, stages, splitting;  // one of them at most
+    std::optional<double> tolerance;
+    std::optional<std::string> arithmetic, numbers;
+
+    void apply(Scene& scene) const;
+    // InputError where the scene asks for other numbers than double, in which alone `command` computes.
+    static void require_double(const Scene& scene, const std::string& command);
+    std::optional<Method> member() const;  // nothing where none is named
+};
+
+}  // namespace lobatto
