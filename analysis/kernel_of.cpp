@@ -27,9 +27,7 @@ std::string support_of(const KernelSource& source, bool is_ensemble) {
     if (source.support.empty()) return support_text();
     std::vector<std::string> names = source.support;
     names.push_back("steppers/impacts.hpp");
-    if (is_ensemble) names.push_back("steppers/ensemble.hpp");
-    if (is_ensemble && source.form == Form::separable) names.push_back("iteration/ensemble_fixed_point.hpp");
-    return support_text(names);
+    return support_text(is_ensemble ? with_ensemble(names) : names);
 }
 
 Kernel built(const KernelSource& source, const Translation& translation, Compiled* compiled) {

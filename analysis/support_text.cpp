@@ -48,6 +48,15 @@ std::string support_text(const std::vector<std::string>& names) {
     return whole;
 }
 
+std::vector<std::string> with_ensemble(std::vector<std::string> names) {
+    std::set<std::string> needed;
+    for (const std::string& name : names) need(name, needed);
+    names.push_back("steppers/ensemble.hpp");
+    if (needed.contains("steppers/separable.hpp") || needed.contains("steppers/splitting.hpp"))
+        names.push_back("iteration/ensemble_fixed_point.hpp");
+    return names;
+}
+
 std::string support_text() {
     std::vector<std::string> names;
     for (const SupportPart& part : support_parts) names.emplace_back(part.name);

@@ -19,6 +19,8 @@ extern const std::string_view kernel_export_hpp_text;  // runtime/kernel/export.
 
 // The named parts and those that they include, as one file. Throws std::logic_error for a name that is none.
 std::string support_text(const std::vector<std::string>& names);
+// The parts with those that trajectories side by side stand on too.
+std::vector<std::string> with_ensemble(std::vector<std::string> names);
 // All parts as one file: runtime/kernel/kernel.hpp.
 std::string support_text();
 

@@ -33,6 +33,7 @@ struct EmitCommand {
     bool general = false;
     bool standalone = false;
     bool no_support = false;
+    bool ensemble = false;
     bool plain = false;
 };
 
@@ -120,13 +121,18 @@ void write_plain(const PlainSource& source, const EmitCommand& options) {
 void emit_scene(const EmitCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    if (options.ensemble && !options.standalone)
+        throw InputError(
+            "--ensemble: kernel.hpp carries ensembles anyway; leave --ensemble out, or add --standalone for one file");
     if (options.plain) {
         write_plain(emit_plain(scene, scene.method.numbers), options);
         return;
     }
     EmitOptions emit_options{scene.method.numbers, {}};
     if (options.standalone)
-        emit_options.support_text = [](const std::vector<std::string>& parts) { return support_text(parts); };
+        emit_options.support_text = [&](const std::vector<std::string>& parts) {
+            return support_text(options.ensemble ? with_ensemble(parts) : parts);
+        };
     const KernelSource source = emit(derive(scene, options.general), emit_options);
 
     const fs::path path = path_for(options, source.name);
@@ -167,6 +173,9 @@ void add_emit(CommandLine& program) {
     const Option no_support =
         command.flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
             .excludes(standalone);
+    command
+        .flag("--ensemble", options->ensemble, "with --standalone: also lobatto::Ensemble, trajectories side by side")
+        .excludes(no_support);
     command
         .flag("--plain", options->plain,
               "the integrator as a textbook prints it: one short C++17 header, to read and to copy; slower")

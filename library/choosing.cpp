@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The cheapest method and step that keep a promise, for run() and compile().
+#include <fmt/format.h>
+
+#include "analysis/tradeoff/choice.hpp"
+#include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
+#include "generator/pipeline.hpp"
+#include "library/parts.hpp"
+
+namespace lobatto::api {
+
+namespace {
+
+Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
+    Settings settings = given;
+    const Candidate& candidate = choice.measurement.candidate;
+    const int points = candidate.member.points;
+    settings.points.reset();
+    settings.stages.reset();
+    settings.splitting.reset();
+    switch (candidate.member.family) {
+        case Family::lobatto:
+            settings.points = points;
+            break;
+        case Family::gauss:
+            settings.stages = points;
+            break;
+        case Family::splitting:
+            settings.splitting = points;
+            break;
+    }
+    if (candidate.tolerance > 0) settings.tolerance = candidate.tolerance;
+    settings.arithmetic = candidate.member.arithmetic == StepArithmetic::clean ? "clean" : "plain";
+    settings.numbers = precision_name(candidate.member.precision);
+    settings.step = fmt::format("{}", choice.step());
+    settings.until = fmt::format("{}", choice.until);
+    return settings;
+}
+
+}  // namespace
+
+Choice tune(const Scene& scene, double error, const Settings& settings, double budget) {
+    return in_algebra([&] {
+        if (!(error >= Run::least_error && error <= Run::largest_error))
+            throw InputError(
+                fmt::format("an error of {:.3g} cannot be promised; it is relative to the amplitude of the motion, at "
+                            "most {} and at "
+                            "least {:.0e}",
+                            error, Run::largest_error, Run::least_error));
+        const lobatto::Scene written = scene.parts().scene;
+        refuse_clock(written, "tune");
+        refuse_constraints(written, "tune");
+        refuse_impacts(written, "tune");
+        lobatto::Scene changed = written;
+        apply(overrides_of(settings), changed);
+        ChoiceRequest request;
+        request.error = error;
+        request.seconds = budget;
+        const lobatto::Choice found = choose(derive(written), changed, request);
+        Choice choice;
+        choice.settings = settings_of(found, settings);
+        choice.method = found.measurement.candidate.member.method().name();
+        choice.step = found.step();
+        choice.until = found.until;
+        choice.predicted_error = found.measurement.error;
+        choice.seconds = found.measurement.seconds;
+        choice.complete = found.complete;
+        return choice;
+    });
+}
+
+}  // namespace lobatto::api

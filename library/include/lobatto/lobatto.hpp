@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/// Lobatto as a library: a scene, its compiled kernel, a stepper; runs, sweeps, and what is known of a scene.
+///
+///     namespace lob = lobatto::api;
+///     const lob::Scene scene("pendulum.toml");
+///     lob::Stepper stepper(lob::compile(scene));
+///     stepper.advance(100);
+///
+/// Units are those of the scene. Arrays of several states are row-major: state i, coordinate k is [i * n + k].
+/// Every function throws Error when it cannot do what it promises; the texts are those of the command line.
+/// Reading and deriving scenes takes a lock of the whole process; objects of different threads are free otherwise. One
+/// object must not be used by two threads at a time, unless all that is called is const.
+///
+/// This header, and the library, are GPL-2.0-or-later, because GiNaC is. The C++ that `lobatto emit` writes is MIT, and
+/// needs neither.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#if defined(__GNUC__)
+#define LOBATTO_API __attribute__((visibility("default")))
+#else
+#define LOBATTO_API
+#endif
+
+namespace lobatto::api {
+
+// --- Errors ----------------------------------------------------------------------------------------------------------
+
+/// What went wrong, where, why, and what to try. The exit code is that of the command line.
+class LOBATTO_API Error : public std::runtime_error {
+public:
+    Error(const std::string& text, int exit_code) : std::runtime_error(text), exit_code_(exit_code) {}
+    int exit_code() const noexcept { return exit_code_; }
+
+private:
+    int exit_code_;
+};
+class LOBATTO_API InputError : public Error {  ///< a wrong scene, name or value
+public:
+    explicit InputError(const std::string& text) : Error(text, 2) {}
+};
+class LOBATTO_API ComputationError : public Error {  ///< steps that are not solved, motions that are not followed
+public:
+    explicit ComputationError(const std::string& text) : Error(text, 3) {}
+};
+class LOBATTO_API MachineError : public Error {  ///< the compiler, a disk, memory
+public:
+    explicit MachineError(const std::string& text) : Error(text, 4) {}
+};
+
+LOBATTO_API std::string version();
+
+// --- Scenes ----------------------------------------------------------------------------------------------------------
+
+struct Variable {
+    std::string name;  ///< element 3 of an array x is x_3
+    std::string unit;  ///< "" when the scene names none
+    double value;      ///< a coordinate's initial position; a parameter's value
+};
+
+/// What stands in for the scene's own; what is empty is as the scene has it. The words are those of the command line.
+struct Settings {
+    std::optional<int> points, stages, splitting;          ///< of Lobatto, Gauss, a splitting method; one at most
+    std::optional<double> tolerance;                       ///< of the iteration of a step, relative
+    std::string arithmetic;                                ///< "plain", "clean"
+    std::string numbers;                                   ///< "float", "double", "long double", "double-double", ...
+    std::vector<std::pair<std::string, std::string>> set;  ///< parameters: {"omega", "2*pi"}
+    std::string step, until;                               ///< formulas in the parameters: "2*pi/omega/50"
+    std::optional<std::int64_t> every;                     ///< keep every such state
+};
+
+/// A mechanical system, read and checked. Copies share it.
+class LOBATTO_API Scene {
+public:
+    explicit Scene(const std::string& path);
+    /// The text of a scene file. `path` stands in errors, and its stem is the name of the scene.
+    static Scene from_text(const std::string& text, const std::string& path = "scene.toml");
+
+    const std::string& path() const;
+    const std::string& name() const;
+    const std::string& title() const;
+    const std::string& text() const;        ///< of the file
+    const std::string& lagrangian() const;  ///< as written
+    const std::vector<Variable>& coordinates() const;
+    const std::vector<Variable>& parameters() const;
+    const std::vector<std::string>& events() const;  ///< as written: events, then stops, then impacts
+    std::string method() const;                      ///< "Lobatto, 4 points"
+    double step() const;
+    double until() const;
+    bool starts_with_momenta() const;  ///< else with velocities
+
+    /// The derivation of its integrator: plain text, a LaTeX document, or JSON (docs/derivation.md).
+    std::string derivation(const Settings& settings = {}) const;
+    std::string derivation_latex(const Settings& settings = {}) const;
+    std::string derivation_json(const Settings& settings = {}) const;
+    /// The integrator as C++: a header that needs nothing else, or as a textbook prints it. {file name, text}
+    std::pair<std::string, std::string> emit(const Settings& settings = {}) const;
+    std::pair<std::string, std::string> emit_plain(const Settings& settings = {}) const;
+
+    struct Parts;
+    explicit Scene(std::shared_ptr<const Parts> parts);
+    const Parts& parts() const { return *parts_; }
+
+private:
+    std::shared_ptr<const Parts> parts_;
+};
+
+// --- One trajectory, step by step ------------------------------------------------------------------------------------
+
+/// The kernel of a scene, compiled and loaded. Copies share it.
+class LOBATTO_API Kernel {
+public:
+    const std::string& digest() const;  ///< of its text
+    std::string method() const;
+    int order() const;
+    double step() const;  ///< h; with a clock in its time
+    const std::vector<Variable>& coordinates() const;
+    const std::vector<Variable>& parameters() const;  ///< with the values of the settings
+    const std::vector<std::string>& events() const;
+
+    struct Parts;
+    explicit Kernel(std::shared_ptr<const Parts> parts);
+    const Parts& parts() const { return *parts_; }
+
+private:
+    std::shared_ptr<const Parts> parts_;
+};
+
+/// In double. A kernel that was compiled before, by any program of this user, comes from a cache.
+LOBATTO_API Kernel compile(const Scene& scene, const Settings& settings = {});
+
+struct EventHit {
+    int kind;  ///< number in events()
+    double t;
+    std::vector<double> q, p;
+};
+
+/// A trajectory that the caller takes forward: for control loops, games, couplings.
+class LOBATTO_API Stepper {
+public:
+    explicit Stepper(const Kernel& kernel);  ///< at the start of the scene
+    Stepper(const Stepper& other);           ///< a second trajectory from here
+    Stepper& operator=(const Stepper& other);
+    Stepper(Stepper&&) noexcept;
+    Stepper& operator=(Stepper&&) noexcept;
+    ~Stepper();
+
+    std::size_t coordinates() const;
+    double step_size() const;
+    /// Another place to go on from. n positions; n momenta, or n velocities.
+    void start(double t, const double* q, const double* p);
+    void start_from_velocity(double t, const double* q, const double* v);
+
+    /// Takes steps; with a clock, they are arrivals at the scene's times (`[output] every`). A step that fails leaves
+    /// the state where it was and throws ComputationError. Returns false where a stop of the scene ended the motion:
+    /// the state is that of the stop.
+    bool step() { return advance(1); }
+    bool advance(std::int64_t steps);
+    /// Equal steps while they fit, then a shorter one that ends at t exactly. That one is no step of the sequence of
+    /// equal ones: where energy counts over many steps, take step() and look in between with at().
+    bool advance_to(double t);
+
+    double t() const;
+    const double* q() const;  ///< n; until the next step
+    const double* p() const;
+    std::vector<double> velocity() const;
+    double energy() const;                    ///< H(t, q, p); not a number where the kernel has none
+    std::vector<double> multipliers() const;  ///< of the constraints, here
+    /// Position and velocity inside the last step, on its own polynomial: t - step_size() <= t <= t().
+    std::pair<std::vector<double>, std::vector<double>> at(double t) const;
+    /// One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The trajectory stays where it is.
+    std::vector<double> tangent() const;
+
+    /// A parameter, from the next step on. What controls a motion changes between steps.
+    double parameter(const std::string& name) const;
+    void set(const std::string& name, double value);
+
+    std::vector<EventHit> take_events();  ///< since the last call
+
+private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
+
+// --- Runs ------------------------------------------------------------------------------------------------------------
+
+struct Trajectory {
+    std::vector<Variable> coordinates;
+    std::vector<std::string> event_names;
+    /// count rows. energy is empty where the scene keeps none.
+    std::size_t count = 0;
+    std::vector<double> t, q, p, energy;
+    std::vector<EventHit> events;
+    std::int64_t steps = 0;
+    double seconds = 0;          ///< of processor time in the kernel
+    std::string stopped_by;      ///< the stop that ended it; "" when it went to its end
+    bool interrupted = false;    ///< by `progress`
+    std::string method, digest;  ///< of the kernel
+    double step = 0;
+    /// Relative to the amplitude of the motion: at the end, and the largest. Empty: not measured.
+    std::optional<double> error, largest_error;
+    std::optional<double> doubling;  ///< of errors that grow exponentially: the time in which they double
+    std::vector<std::string> warnings;
+};
+
+/// A run that failed on its way, with what was computed.
+class LOBATTO_API RunFailure : public ComputationError {
+public:
+    RunFailure(const std::string& text, Trajectory trajectory)
+        : ComputationError(text), trajectory_(std::make_shared<const Trajectory>(std::move(trajectory))) {}
+    const Trajectory& trajectory() const noexcept { return *trajectory_; }
+
+private:
+    std::shared_ptr<const Trajectory> trajectory_;
+};
+
+struct RunOptions : Settings {
+    bool measure = true;          ///< the error, by a companion on another processor
+    bool beyond_horizon = false;  ///< go on where nothing of the motion is left
+    /// About ten times a second, from 0 to 1; false ends the run, and what was computed is returned.
+    std::function<bool(double)> progress;
+};
+LOBATTO_API Trajectory run(const Scene& scene, const RunOptions& options = {});
+
+// --- Sweeps ----------------------------------------------------------------------------------------------------------
+
+/// Many starts: columns of `count` numbers by name: positions q, velocities q' or momenta p_q, parameters. What has no
+/// column is as the scene has it; so are formulas of the scene that hold a parameter, with its value there.
+struct Starts {
+    std::size_t count = 0;
+    std::map<std::string, std::vector<double>> columns;
+};
+
+struct SweepOptions : Settings {
+    std::vector<std::string> keep;  ///< "first(b = pi)", "max(H)": instead of the last states
+    int threads = 0;                ///< 0: as many as the machine runs
+    bool measure = false;           ///< errors by companions, which take 3/2 of the sweep's time
+    std::function<bool(double)> progress;
+};
+
+struct Sweep {
+    std::vector<Variable> coordinates;
+    std::vector<std::string> kept_names;
+    std::size_t count = 0;              ///< trajectories; fewer than asked for where `progress` ended it
+    std::vector<int> status;            ///< 0: reached the end, or a stop
+    std::vector<std::int64_t> steps;    ///< taken
+    std::vector<int> stop;              ///< number of the stop from 1 on; 0: none
+    std::vector<double> t, q, p;        ///< the last state; count, count x n, count x n
+    std::vector<double> energy_error;   ///< H - H(0); not numbers where the scene keeps no energy
+    std::vector<double> error;          ///< measured, relative to the amplitude; empty when not asked for
+    std::vector<double> kept;           ///< count x kept_names
+    std::vector<std::string> statuses;  ///< in words, by number
+    bool interrupted = false;
+};
+LOBATTO_API Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options = {});
+
+// --- Choosing --------------------------------------------------------------------------------------------------------
+
+struct Choice {
+    Settings settings;  ///< method and step: for run(), compile()
+    std::string method;
+    double step = 0, until = 0;
+    double predicted_error = 0;  ///< relative to the amplitude
+    double seconds = 0;          ///< what the motion costs with it
+    bool complete = false;       ///< no member that was not tried can be expected to win
+};
+/// The cheapest member of the family, and its step, that keep an error to the end. `budget`: seconds to search.
+LOBATTO_API Choice tune(const Scene& scene, double error, const Settings& settings = {}, double budget = 20);
+
+}  // namespace lobatto::api

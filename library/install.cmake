@@ -1,0 +1,37 @@
+# What `cmake --install` writes, and the Debian package made of it.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(LOBATTO_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Lobatto)
+install(TARGETS lobatto liblobatto lobatto_kernel_flags EXPORT LobattoTargets)
+set_target_properties(lobatto PROPERTIES EXPORT_NAME program)
+install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/include/lobatto DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(EXPORT LobattoTargets NAMESPACE Lobatto:: DESTINATION ${LOBATTO_CMAKE_DIR})
+configure_package_config_file(${CMAKE_CURRENT_SOURCE_DIR}/cmake/LobattoConfig.cmake.in ${PROJECT_BINARY_DIR}/LobattoConfig.cmake
+    INSTALL_DESTINATION ${LOBATTO_CMAKE_DIR} PATH_VARS CMAKE_INSTALL_BINDIR)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/LobattoConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/LobattoConfig.cmake ${PROJECT_BINARY_DIR}/LobattoConfigVersion.cmake
+    ${CMAKE_CURRENT_SOURCE_DIR}/cmake/LobattoAddKernel.cmake DESTINATION ${LOBATTO_CMAKE_DIR})
+
+# A folder that was moved finds itself again.
+file(RELATIVE_PATH PKGCONFIG_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" PKGCONFIG_TO_PREFIX "${PKGCONFIG_TO_PREFIX}")
+configure_file(${CMAKE_CURRENT_SOURCE_DIR}/cmake/lobatto.pc.in ${PROJECT_BINARY_DIR}/lobatto.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/lobatto.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
+install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE.md DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME lobatto)
+set(CPACK_PACKAGE_CONTACT "The Lobatto authors <lobatto@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "compiler for mechanics: from a Lagrangian to its variational integrator")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "g++ | clang")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS gnuplot-nox)
+include(CPack)

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// One trajectory that the caller takes forward.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "generator/formula/suggest.hpp"
+#include "generator/mechanics/start.hpp"
+#include "generator/pipeline.hpp"
+#include "library/parts.hpp"
+
+namespace lobatto::api {
+
+Kernel::Kernel(std::shared_ptr<const Parts> parts) : parts_(std::move(parts)) {}
+
+const std::string& Kernel::digest() const {
+    return parts_->digest;
+}
+std::string Kernel::method() const {
+    return parts_->kernel->method;
+}
+int Kernel::order() const {
+    return parts_->kernel->order;
+}
+double Kernel::step() const {
+    return parts_->start.step;
+}
+const std::vector<Variable>& Kernel::coordinates() const {
+    return parts_->coordinates;
+}
+const std::vector<Variable>& Kernel::parameters() const {
+    return parts_->parameters;
+}
+const std::vector<std::string>& Kernel::events() const {
+    return parts_->events;
+}
+
+Kernel compile(const Scene& scene, const Settings& settings) {
+    return in_algebra([&] {
+        lobatto::Scene changed = with_method(scene, settings);
+        if (changed.method.numbers != Precision::double_)
+            throw InputError(fmt::format(
+                "{}: steps that a caller takes are computed in double, but numbers are \"{}\"; leave them out, or use "
+                "run(), which computes in all numbers",
+                changed.path, precision_name(changed.method.numbers)));
+        changed.outputs.energy = true;
+        const Derivation derivation = derive(changed);
+        const KernelSource source = lobatto::emit(derivation);
+        const Overrides overrides = overrides_of(settings);
+        apply(overrides, changed);
+        if (!overrides.set.empty()) check_domains(changed, derivation.system);
+        const Steps steps = steps_of(changed, overrides);
+        const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
+        LoadedStepper<double> stepper(kernel);
+        const TrajectoryRequest start = request_of(changed, steps.count, stepper);
+        return Kernel(std::make_shared<const Kernel::Parts>(Kernel::Parts{changed, kernel, source.digest, start,
+                                                                          coordinates_of(changed),
+                                                                          parameters_of(changed), events_of(changed)}));
+    });
+}
+
+struct Stepper::Parts {
+    Kernel kernel;
+    LoadedStepper<double> stepper;
+    std::vector<double> parameters;
+    double step, time = 0;
+    std::vector<double> q, p;
+    double last_step = 0;  // of the last step taken; 0: none yet
+    std::vector<double> event_rows;
+    std::vector<EventHit> found;
+
+    explicit Parts(const Kernel& of) : kernel(of), stepper(of.parts().kernel) {
+        const TrajectoryRequest& start = kernel.parts().start;
+        parameters = start.parameters;
+        step = start.step;
+        if (const lobatto_kernel& table = stepper.kernel().table(); table.events > 0)
+            event_rows.resize(static_cast<std::size_t>(2 * table.events_of_step) * columns());
+        go_on_from(start.time, start.q, start.p);
+    }
+
+    std::size_t n() const { return q.size(); }
+    std::size_t columns() const { return 2 + 2 * static_cast<std::size_t>(stepper.kernel()->coordinates); }
+
+    // What to say of a step or a start that failed.
+    [[noreturn]] void fail(lobatto_status status, const lobatto_advance& call) const {
+        TrajectoryRequest request = kernel.parts().start;
+        request.parameters = parameters;
+        request.step = step;
+        request.q = q;
+        request.p = p;
+        TrajectoryResult result;
+        result.status = status;
+        result.started = last_step != 0;
+        result.time = time;
+        result.q = q;
+        result.p = p;
+        result.increment_failed = call.increment_failed;
+        throw ComputationError(kernel.parts().scene.path + ": " + explain_stop(result, request));
+    }
+
+    void go_on_from(double t, std::vector<double> position, std::vector<double> momentum) {
+        time = t;
+        q = std::move(position);
+        p = std::move(momentum);
+        last_step = 0;
+        restart();
+    }
+    void restart() {
+        lobatto_status status = stepper.prepare(parameters, step);
+        if (status == LOBATTO_OK) status = stepper.start(time, q, p);
+        if (status != LOBATTO_OK) fail(status, {});
+    }
+
+    // Of steps of equal length; with a clock, of arrivals after `interval` each, at most at `end`.
+    bool advance(std::int64_t steps, double interval, double end) {
+        const TrajectoryRequest& start = kernel.parts().start;
+        lobatto_advance call{};
+        call.tolerance = start.tolerance;
+        call.interval = interval;
+        call.end = end;
+        lobatto_status status = LOBATTO_OK;
+        for (std::int64_t done = 0; done < steps && status == LOBATTO_OK; done += call.steps_done) {
+            call.steps = steps - done;
+            if (!event_rows.empty()) {
+                call.events = event_rows.data();
+                call.event_capacity = static_cast<std::int64_t>(event_rows.size() / columns());
+            }
+            status = stepper.advance(call);
+            keep_events(call.events_written);
+        }
+        if (status == LOBATTO_STOPPED) {
+            const double* const row = event_rows.data() + static_cast<std::size_t>(call.events_written - 1) * columns();
+            go_on_from(row[1], {row + 2, row + 2 + n()}, {row + 2 + n(), row + 2 + 2 * n()});
+            return false;
+        }
+        stepper.state(time, q, p);
+        last_step = step;
+        if (status != LOBATTO_OK) fail(status, call);
+        return true;
+    }
+
+    void keep_events(std::int64_t count) {
+        for (std::int64_t i = 0; i < count; ++i) {
+            const double* const row = event_rows.data() + static_cast<std::size_t>(i) * columns();
+            found.push_back(
+                {static_cast<int>(row[0]), row[1], {row + 2, row + 2 + n()}, {row + 2 + n(), row + 2 + 2 * n()}});
+        }
+    }
+
+    bool is_clocked() const { return stepper.kernel()->clocked != 0; }
+
+    bool advance_to(double t) {
+        if (!std::isfinite(t)) throw InputError(fmt::format("advance_to: {} is no time", t));
+        if ((t - time) * (is_clocked() ? 1 : step) < 0)
+            throw InputError(fmt::format(
+                "advance_to: the motion is at t = {:.17g} already, beyond {:.17g}; start() goes to another place", time,
+                t));
+        if (t == time) return true;
+        if (is_clocked()) return advance(1, t - time, t);
+        const double ratio = (t - time) / step, nearest = std::round(ratio);
+        if (ratio > 9e15) throw InputError(fmt::format("advance_to: {:.3g} steps are too many to count", ratio));
+        const bool fits = std::fabs(ratio - nearest) <= 1e-9 * std::fmax(1, nearest);
+        const auto whole = static_cast<std::int64_t>(fits ? nearest : std::floor(ratio));
+        if (!advance(whole, 0, 0)) return false;
+        if (fits) return true;
+        // The rest, as one step of its own length.
+        const double usual = step;
+        step = t - time;
+        const double rest = step;
+        bool goes_on = false;
+        try {
+            restart();
+            goes_on = advance(1, 0, 0);
+        } catch (...) {
+            step = usual;
+            restart();
+            throw;
+        }
+        time = goes_on ? t : time;
+        inside = stepper;
+        step = usual;
+        restart();
+        last_step = goes_on ? rest : 0;
+        return goes_on;
+    }
+
+    std::optional<LoadedStepper<double>> inside;  // of the last step, where it was one of another length
+};
+
+Stepper::Stepper(const Kernel& kernel) : parts_(guarded([&] { return std::make_unique<Parts>(kernel); })) {}
+Stepper::Stepper(const Stepper& other) : parts_(std::make_unique<Parts>(*other.parts_)) {}
+Stepper& Stepper::operator=(const Stepper& other) {
+    parts_ = std::make_unique<Parts>(*other.parts_);
+    return *this;
+}
+Stepper::Stepper(Stepper&&) noexcept = default;
+Stepper& Stepper::operator=(Stepper&&) noexcept = default;
+Stepper::~Stepper() = default;
+
+std::size_t Stepper::coordinates() const {
+    return parts_->n();
+}
+double Stepper::step_size() const {
+    return parts_->step;
+}
+
+void Stepper::start(double t, const double* q, const double* p) {
+    const std::size_t n = parts_->n();
+    guarded([&] { parts_->go_on_from(t, {q, q + n}, {p, p + n}); });
+}
+void Stepper::start_from_velocity(double t, const double* q, const double* v) {
+    const std::size_t n = parts_->n();
+    guarded([&] { parts_->go_on_from(t, {q, q + n}, parts_->stepper.momentum(t, {q, q + n}, {v, v + n})); });
+}
+
+bool Stepper::advance(std::int64_t steps) {
+    return guarded([&] {
+        if (steps < 0) throw InputError(fmt::format("advance: {} is no number of steps", steps));
+        parts_->inside.reset();
+        if (!parts_->is_clocked()) return parts_->advance(steps, 0, 0);
+        const Arrivals& arrivals = parts_->kernel.parts().start.arrivals;
+        return parts_->advance(steps, arrivals.interval, std::numeric_limits<double>::max());
+    });
+}
+bool Stepper::advance_to(double t) {
+    return guarded([&] {
+        parts_->inside.reset();
+        return parts_->advance_to(t);
+    });
+}
+
+double Stepper::t() const {
+    return parts_->time;
+}
+const double* Stepper::q() const {
+    return parts_->q.data();
+}
+const double* Stepper::p() const {
+    return parts_->p.data();
+}
+
+std::vector<double> Stepper::velocity() const {
+    return guarded([&] {
+        std::vector<double> velocity;
+        const Parts& parts = *parts_;
+        if (const auto status = parts.stepper.velocity(parts.time, parts.q, parts.p, velocity); status != LOBATTO_OK)
+            parts.fail(status, {});
+        return velocity;
+    });
+}
+double Stepper::energy() const {
+    double energy = 0;
+    const bool has_one = parts_->stepper.kernel()->has_energy != 0 &&
+                         parts_->stepper.energy(parts_->time, parts_->q, parts_->p, energy) == LOBATTO_OK;
+    return has_one ? energy : std::nan("");
+}
+std::vector<double> Stepper::multipliers() const {
+    return guarded([&] {
+        std::vector<double> lambda;
+        const Parts& parts = *parts_;
+        if (parts.stepper.kernel()->constraints == 0) return lambda;
+        if (const auto status = parts.stepper.multipliers(parts.time, parts.q, parts.p, lambda); status != LOBATTO_OK)
+            parts.fail(status, {});
+        return lambda;
+    });
+}
+
+std::pair<std::vector<double>, std::vector<double>> Stepper::at(double t) const {
+    return guarded([&] {
+        const Parts& parts = *parts_;
+        if (parts.last_step == 0)
+            throw InputError("at: no step was taken yet, or a stop or another start came after it; take one first");
+        const double theta = 1 + (t - parts.time) / parts.last_step;
+        if (!(theta >= -1e-9 && theta <= 1 + 1e-9) || parts.is_clocked())
+            throw InputError(
+                parts.is_clocked()
+                    ? "at: with a clock the last step is not known here; use advance_to"
+                    : fmt::format("at: t = {:.17g} is not inside the last step, which leads from {:.17g} to "
+                                  "{:.17g}",
+                                  t, parts.time - parts.last_step, parts.time));
+        std::pair<std::vector<double>, std::vector<double>> state;
+        const LoadedStepper<double>& stepper = parts.inside ? *parts.inside : parts.stepper;
+        if (stepper.dense(std::clamp(theta, 0.0, 1.0), state.first, state.second) != LOBATTO_OK)
+            throw InputError("at: this kernel has no polynomial in a step; splitting methods have none");
+        return state;
+    });
+}
+
+std::vector<double> Stepper::tangent() const {
+    return guarded([&] {
+        const Parts& parts = *parts_;
+        std::vector<double> q, p, T;
+        if (parts.stepper.kernel()->has_tangent == 0)
+            throw InputError(
+                "tangent: this kernel has no derivative of a step: the scene leaves it out, or has "
+                "constraints");
+        if (const auto status = parts.stepper.tangent(parts.time, parts.q, parts.p, q, p, T); status != LOBATTO_OK)
+            parts.fail(status, {});
+        return T;
+    });
+}
+
+namespace {
+
+std::size_t parameter_index(const Kernel& kernel, const std::string& name) {
+    std::vector<std::string> names;
+    for (const Variable& parameter : kernel.parameters()) names.push_back(parameter.name);
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+        throw InputError(
+            fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
+    return static_cast<std::size_t>(found - names.begin());
+}
+
+}  // namespace
+
+double Stepper::parameter(const std::string& name) const {
+    return guarded([&] { return parts_->parameters[parameter_index(parts_->kernel, name)]; });
+}
+void Stepper::set(const std::string& name, double value) {
+    guarded([&] {
+        double& parameter = parts_->parameters[parameter_index(parts_->kernel, name)];
+        if (parameter == value) return;
+        const double before = parameter;
+        parameter = value;
+        try {
+            parts_->restart();
+        } catch (...) {
+            parameter = before;
+            parts_->restart();
+            throw;
+        }
+    });
+}
+
+std::vector<EventHit> Stepper::take_events() {
+    return std::exchange(parts_->found, {});
+}
+
+}  // namespace lobatto::api

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The library as another program uses it: through lobatto.hpp and the shared object alone.
+#include <doctest/doctest.h>
+
+#include <lobatto/lobatto.hpp>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "tests/support.hpp"
+
+namespace {
+
+namespace lob = lobatto::api;
+
+const std::string scenes = LOBATTO_SOURCE_DIR "/scenes/";
+
+// The rows of a file that `lobatto run` wrote.
+std::vector<std::vector<double>> rows_of(const std::string& path) {
+    std::ifstream file(path);
+    std::vector<std::vector<double>> rows;
+    for (std::string line; std::getline(file, line);) {
+        if (line.empty() || line[0] == '#' || std::isalpha(static_cast<unsigned char>(line[0])) != 0) continue;
+        std::vector<double> row;
+        std::istringstream values(line);
+        for (std::string value; std::getline(values, value, ',');) row.push_back(std::stod(value));
+        rows.push_back(row);
+    }
+    return rows;
+}
+
+template <class Error, class Work>
+std::string message_of(const Work& work) {
+    try {
+        work();
+    } catch (const Error& error) {
+        return error.what();
+    }
+    return "nothing was thrown";
+}
+
+}  // namespace
+
+TEST_CASE("a run of the library is that of the command line, bit for bit, with its error") {
+    const lobatto::test::TemporaryFolder folder;
+    const std::string file = folder / "run.csv";
+    for (const char* name : {"double_pendulum", "kepler", "bouncing_ball"}) {
+        CAPTURE(name);
+        const lob::Scene scene(scenes + name + ".toml");
+        lob::RunOptions options;
+        options.until = "3";
+        const lob::Trajectory run = lob::run(scene, options);
+        REQUIRE(lobatto::test::run({LOBATTO_PROGRAM, "run", scene.path(), "--until", "3", "-o", file, "--quiet"})
+                    .exit_code == 0);
+        const auto rows = rows_of(file);
+        REQUIRE(rows.size() == run.count);
+        const std::size_t n = run.coordinates.size();
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            CHECK(rows[i][0] == run.t[i]);
+            for (std::size_t k = 0; k < n; ++k) CHECK(rows[i][1 + k] == run.q[i * n + k]);
+        }
+        CHECK(run.error.has_value());
+        CHECK(run.steps > 0);
+    }
+}
+
+TEST_CASE("a stepper takes the same steps as a run, and looks inside the last one") {
+    const lob::Scene scene(scenes + "pendulum.toml");
+    CHECK(scene.coordinates().front().unit == "rad");
+    CHECK(scene.parameters().back().name == "omega");
+    lob::Stepper stepper(lob::compile(scene));
+    lob::RunOptions options;
+    options.until = "1";
+    const lob::Trajectory run = lob::run(scene, options);
+    stepper.advance(19);
+    lob::Stepper before = stepper;
+    stepper.step();
+    CHECK(stepper.q()[0] == run.q[20]);
+    CHECK(stepper.p()[0] == run.p[20]);
+    CHECK(stepper.energy() == run.energy[20]);
+    // The polynomial inside a step of 4 points: 1e-6 of the motion, measured 2.2e-7 with half the step.
+    before.advance_to(19 * 0.05 + 0.02);
+    const auto [q, v] = stepper.at(19 * 0.05 + 0.02);
+    CHECK(std::fabs(q[0] - before.q()[0]) < 1e-6);
+    CHECK(std::fabs(v[0] - before.velocity()[0]) < 1e-4);
+    CHECK(q[0] != run.q[20]);
+    CHECK(
+        message_of<lob::InputError>([&] { static_cast<void>(stepper.at(5)); }).starts_with("at: t = 5 is not inside"));
+}
+
+TEST_CASE("advance_to ends at its time exactly, also between steps, and goes on with steps of the usual length") {
+    lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
+    stepper.advance_to(0.33);
+    CHECK(stepper.t() == 0.33);
+    const double q = stepper.q()[0];
+    stepper.step();
+    CHECK(stepper.t() == doctest::Approx(0.38));
+    lob::Stepper other(lob::compile(lob::Scene(scenes + "pendulum.toml"), [] {
+        lob::Settings settings;
+        settings.step = "0.033";
+        return settings;
+    }()));
+    other.advance(10);
+    CHECK(std::fabs(other.q()[0] - q) < 1e-7);  // both of order 6
+    CHECK(message_of<lob::InputError>([&] { stepper.advance_to(0.1); }).find("is at t = 0.38") != std::string::npos);
+}
+
+TEST_CASE("a parameter set between steps acts from the next step on, as a fresh start with it would") {
+    const lob::Scene scene(scenes + "pendulum.toml");
+    lob::Stepper stepper(lob::compile(scene));
+    stepper.advance(7);
+    lob::Settings settings;
+    settings.set = {{"omega", "5"}};
+    lob::Stepper fresh(lob::compile(scene, settings));
+    fresh.start(stepper.t(), stepper.q(), stepper.p());
+    stepper.set("omega", 5);
+    stepper.advance(3);
+    fresh.advance(3);
+    CHECK(stepper.q()[0] == doctest::Approx(fresh.q()[0]).epsilon(1e-14));
+    CHECK(stepper.parameter("omega") == 5);
+    CHECK(message_of<lob::InputError>([&] { stepper.set("omga", 1); }) ==
+          "unknown parameter 'omga'; declared: m, omega. Did you mean 'omega'?");
+}
+
+TEST_CASE("the tangent of a step is symplectic") {
+    lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
+    const std::vector<double> T = stepper.tangent();
+    REQUIRE(T.size() == 4);
+    CHECK(std::fabs(T[0] * T[3] - T[1] * T[2] - 1) < 1e-14);
+}
+
+TEST_CASE("errors of the library have the command line's texts and exit codes") {
+    const std::string wrong = "lagrangian = \"m*q'^2/2 - k*q\"\n[coordinates]\nq = 1\n[parameters]\nm = 1\n";
+    const std::string text = message_of<lob::InputError>([&] { lob::Scene::from_text(wrong, "wrong.toml"); });
+    CHECK(text.starts_with("wrong.toml:1:"));
+    CHECK(text.find("unknown name 'k'") != std::string::npos);
+    CHECK(message_of<lob::InputError>([] { lob::Scene("/nowhere.toml"); }).find("/nowhere.toml") != std::string::npos);
+    lob::RunOptions options;
+    options.step = "2.9";
+    options.until = "100";
+    try {
+        lob::run(lob::Scene(scenes + "pendulum.toml"), options);
+        FAIL("the step is too long");
+    } catch (const lob::RunFailure& failure) {
+        CHECK(failure.exit_code() == 3);
+        CHECK(std::string(failure.what()).find("did not converge") != std::string::npos);
+        CHECK(failure.trajectory().count >= 2);  // what was computed is there
+    }
+}
+
+TEST_CASE("a stepper whose step fails stays where it was") {
+    lob::Settings settings;
+    settings.step = "2.9";
+    lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml"), settings));
+    double q = 0, t = 0;
+    const std::string text = message_of<lob::ComputationError>([&] {
+        for (int i = 0; i < 50; ++i) {
+            q = stepper.q()[0];
+            t = stepper.t();
+            stepper.step();
+        }
+    });
+    CHECK(text.find("did not converge") != std::string::npos);
+    CHECK(stepper.q()[0] == q);
+    CHECK(stepper.t() == t);
+}
+
+TEST_CASE("events, stops and impacts come out of a stepper") {
+    lob::Stepper ball(lob::compile(lob::Scene(scenes + "bouncing_ball.toml")));
+    ball.advance(40);
+    const auto hits = ball.take_events();
+    CHECK(!hits.empty());
+    CHECK(ball.take_events().empty());
+    const std::string stopping =
+        "lagrangian = \"q'^2/2 - q^2/2\"\n[coordinates]\nq = 1\n[run]\nstep = 0.1\nuntil = 9\nstop = \"q = 0\"\n";
+    lob::Stepper stopped(lob::compile(lob::Scene::from_text(stopping)));
+    CHECK_FALSE(stopped.advance(30));
+    CHECK(std::fabs(stopped.t() - std::acos(-1.0) / 2) < 1e-6);
+    CHECK(std::fabs(stopped.q()[0]) < 1e-12);
+    const lob::Trajectory run = lob::run(lob::Scene::from_text(stopping));
+    CHECK(run.stopped_by == "q = 0");
+    CHECK(run.t.back() == stopped.t());
+}
+
+TEST_CASE("a sweep of the library gives the states that runs give, whatever the number of threads") {
+    const lob::Scene scene(scenes + "double_pendulum.toml");
+    lob::Starts starts;
+    starts.count = 37;
+    const std::string name = scene.coordinates().front().name;
+    for (std::size_t i = 0; i < starts.count; ++i) starts.columns[name].push_back(0.1 + 0.02 * static_cast<double>(i));
+    lob::SweepOptions options;
+    options.until = "2";
+    options.threads = 1;
+    const lob::Sweep one = lob::sweep(scene, starts, options);
+    options.threads = 2;
+    const lob::Sweep two = lob::sweep(scene, starts, options);
+    REQUIRE(one.count == 37);
+    CHECK(one.q == two.q);
+    CHECK(one.p == two.p);
+    CHECK(one.status == std::vector<int>(37, 0));
+    lob::Stepper stepper(lob::compile(scene));
+    std::vector<double> q = {starts.columns[name][5], stepper.q()[1]}, v = stepper.velocity();
+    stepper.start_from_velocity(0, q.data(), v.data());
+    stepper.advance(one.steps[5]);
+    CHECK(one.q[10] == doctest::Approx(stepper.q()[0]).epsilon(1e-11));
+    starts.columns["tetha"] = starts.columns[name];
+    CHECK(
+        message_of<lob::InputError>([&] { lob::sweep(scene, starts, options); }).starts_with("unknown column 'tetha'"));
+}
+
+TEST_CASE("a sweep keeps what it is asked for in place of states") {
+    const lob::Scene scene(scenes + "pendulum.toml");
+    lob::Starts starts{3, {{"q", {0.5, 1, 1.5}}}};
+    lob::SweepOptions options;
+    options.until = "3";
+    options.keep = {"max(q)", "count(q = 0 rising)"};
+    options.measure = true;
+    const lob::Sweep sweep = lob::sweep(scene, starts, options);
+    REQUIRE(sweep.kept.size() == 6);
+    for (std::size_t i = 0; i < 3; ++i) CHECK(std::fabs(sweep.kept[2 * i] - starts.columns["q"][i]) < 0.05);
+    CHECK(sweep.kept[1] >= 2);
+    REQUIRE(sweep.error.size() == 3);
+    CHECK(sweep.error[0] < 1e-4);
+}
+
+TEST_CASE("progress may end a run, and what was computed is there") {
+    lob::RunOptions options;
+    options.until = "1e6";
+    options.measure = false;
+    int calls = 0;
+    options.progress = [&](double share) {
+        CHECK(share <= 1);
+        return ++calls < 2;
+    };
+    options.every = 1000;
+    const lob::Trajectory run = lob::run(lob::Scene(scenes + "pendulum.toml"), options);
+    CHECK(run.interrupted);
+    CHECK(calls == 2);
+    CHECK(run.count > 1);
+}
+
+TEST_CASE("tune returns settings with which a run keeps the error that was asked for") {
+    const lob::Scene scene(scenes + "pendulum.toml");
+    lob::Settings settings;
+    settings.until = "20";
+    const lob::Choice choice = lob::tune(scene, 1e-8, settings, 5);
+    CHECK(choice.predicted_error <= 1e-8);
+    lob::RunOptions options;
+    static_cast<lob::Settings&>(options) = choice.settings;
+    const lob::Trajectory run = lob::run(scene, options);
+    REQUIRE(run.error.has_value());
+    CHECK(*run.error < 3e-8);
+}
+
+TEST_CASE("threads derive, compile and step at once") {
+    std::vector<double> ends(4);
+    std::vector<std::thread> threads;
+    for (std::size_t i = 0; i < ends.size(); ++i)
+        threads.emplace_back([&ends, i] {
+            lob::Stepper stepper(lob::compile(lob::Scene(scenes + (i % 2 == 0 ? "pendulum.toml" : "kepler.toml"))));
+            stepper.advance(100);
+            ends[i] = stepper.q()[0];
+        });
+    for (std::thread& thread : threads) thread.join();
+    CHECK(ends[0] == ends[2]);
+    CHECK(ends[1] == ends[3]);
+}
+
+TEST_CASE("a scene tells its derivation and writes its integrator") {
+    const lob::Scene scene(scenes + "pendulum.toml");
+    CHECK(scene.derivation().find("D4") != std::string::npos);
+    CHECK(scene.derivation_latex().starts_with("\\documentclass"));
+    CHECK(scene.emit().first == "pendulum.hpp");
+    CHECK(scene.emit_plain().second.find("namespace pendulum") != std::string::npos);
+}

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What `cmake --install` writes, used by a project outside: examples/cmake, built with Ninja and with Make.
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tests/support.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace lobatto;
+
+const std::string build_folder = LOBATTO_BUILD_DIR;
+
+void install(const std::string& prefix) {
+    const test::Finished installed = test::run({"cmake", "--install", build_folder, "--prefix", prefix});
+    INFO(installed.err);
+    REQUIRE(installed.exit_code == 0);
+}
+
+// The standard output of a command that must succeed.
+std::string output_of(const std::vector<std::string>& command) {
+    const test::Finished finished = test::run(command);
+    INFO(command.front() << ": " << finished.out << finished.err);
+    REQUIRE(finished.exit_code == 0);
+    return finished.out;
+}
+
+std::string last_line(const std::string& path) {
+    std::ifstream file(path);
+    std::string last;
+    for (std::string line; std::getline(file, line);) last = line;
+    return last;
+}
+
+}  // namespace
+
+TEST_SUITE("slow") {
+    TEST_CASE("an outside project finds the installed package, also after it was moved, and computes the bits of run") {
+        const test::TemporaryFolder folder;
+        install(folder / "first");
+        fs::rename(folder / "first", folder / "moved");
+        const std::string prefix = folder / "moved";
+        fs::copy(LOBATTO_SOURCE_DIR "/examples/cmake", folder / "project");
+        output_of({prefix + "/bin/lobatto", "run", folder / "project/arm.toml", "--points", "6", "--quiet", "-o",
+                   folder / "arm.csv"});
+        const std::string wanted = last_line(folder / "arm.csv");
+        for (const char* generator : {"Ninja", "Unix Makefiles"}) {
+            CAPTURE(generator);
+            const std::string build = folder / (std::string("build ") + generator);
+            output_of(
+                {"cmake", "-S", folder / "project", "-B", build, "-G", generator, "-DCMAKE_PREFIX_PATH=" + prefix});
+            output_of({"cmake", "--build", build});
+            std::string computed = output_of({build + "/kernel"});
+            computed.pop_back();
+            CHECK(wanted.starts_with(computed + ","));
+            CHECK(output_of({build + "/control", folder / "project/arm.toml"}).starts_with("t = 4.00 s: a = -0.01924"));
+            CHECK(output_of({build + "/swing", folder / "project/arm.toml"}).find("1000 of 1000") != std::string::npos);
+            // Nothing is made again, until the scene changes.
+            CHECK(output_of({"cmake", "--build", build}).find("Deriving") == std::string::npos);
+            std::ofstream(folder / "project/arm.toml", std::ios::app) << "# changed\n";
+            CHECK(output_of({"cmake", "--build", build}).find("Deriving") != std::string::npos);
+        }
+    }
+
+    TEST_CASE("pkg-config finds the library in the folder where it lies") {
+        const test::TemporaryFolder folder;
+        install(folder / "prefix");
+        const std::string prefix = folder / "prefix", program = folder / "version";
+        std::ofstream(folder / "version.c") << "#include <lobatto/lobatto.h>\n#include <stdio.h>\n"
+                                               "int main(void) { puts(lobatto_version()); return 0; }\n";
+        const std::string libraries =
+            fs::exists(prefix + "/lib/pkgconfig") ? prefix + "/lib" : prefix + "/lib/x86_64-linux-gnu";
+        const test::EnvironmentVariable path("PKG_CONFIG_PATH", libraries + "/pkgconfig");
+        const std::string flags = output_of({"pkg-config", "--cflags", "--libs", "lobatto"});
+        const std::string line = "gcc -std=c99 -pedantic -Wall -Werror " + (folder / "version.c").string() + " -o " +
+                                 program + " " + flags.substr(0, flags.find('\n')) + " -Wl,-rpath," + libraries;
+        output_of({"sh", "-c", line});
+        CHECK(output_of({program}).starts_with("0.1"));
+    }
+
+    TEST_CASE("lobatto_add_kernel says what is wrong with its arguments") {
+        const test::TemporaryFolder folder;
+        install(folder / "prefix");
+        const auto configure = [&](const std::string& call) {
+            std::ofstream(folder / "CMakeLists.txt")
+                << "cmake_minimum_required(VERSION 3.25)\nproject(p LANGUAGES CXX)\nfind_package(Lobatto REQUIRED)\n"
+                << "file(WRITE ${CMAKE_BINARY_DIR}/a.cpp \"int main() {}\")\nadd_executable(a "
+                   "${CMAKE_BINARY_DIR}/a.cpp)\n"
+                << call << '\n';
+            return test::run({"cmake", "-S", folder.string(), "-B", folder / "build",
+                              "-DCMAKE_PREFIX_PATH=" + (folder / "prefix").string()})
+                .err;
+        };
+        CHECK(configure("lobatto_add_kernel(a SCENE none.toml)").find("there is no scene file") != std::string::npos);
+        CHECK(configure("lobatto_add_kernel(a)").find("SCENE is missing") != std::string::npos);
+        CHECK(configure("lobatto_add_kernel(b SCENE x.toml)").find("there is no target b") != std::string::npos);
+        CHECK(configure("lobatto_add_kernel(a SCEN x.toml)").find("unknown argument") != std::string::npos);
+    }
+}
