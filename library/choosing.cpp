@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The cheapest method and step that keep a promise, for run() and compile().
+// The cheapest method and step that keep a promise, for run() and compile(); and what is proved of a scene.
 #include <fmt/format.h>
 
+#include "analysis/proof/proof.hpp"
 #include "analysis/tradeoff/choice.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constraints.hpp"
@@ -39,9 +40,18 @@ Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
     return settings;
 }
 
+lobatto::Choice chosen(Derivation derivation, const lobatto::Scene& scene, const ChoiceRequest& request) {
+    try {
+        return choose(std::move(derivation), scene, request);
+    } catch (const Interrupted&) {
+        throw ComputationError(scene.path + ": the search was ended; nothing was chosen");
+    }
+}
+
 }  // namespace
 
-Choice tune(const Scene& scene, double error, const Settings& settings, double budget) {
+Choice tune(const Scene& scene, double error, const Settings& settings, double budget,
+            const std::function<bool(const std::string&)>& progress) {
     return in_algebra([&] {
         if (!(error >= Run::least_error && error <= Run::largest_error))
             throw InputError(
@@ -58,7 +68,13 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
         ChoiceRequest request;
         request.error = error;
         request.seconds = budget;
-        const lobatto::Choice found = choose(derive(written), changed, request);
+        volatile int is_interrupted = 0;
+        request.interrupted = &is_interrupted;
+        if (progress)
+            request.say = [&](const std::string& what) {
+                if (!progress(what)) is_interrupted = 1;
+            };
+        const lobatto::Choice found = chosen(derive(written), changed, request);
         Choice choice;
         choice.settings = settings_of(found, settings);
         choice.method = found.measurement.candidate.member.method().name();
@@ -68,6 +84,15 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
         choice.seconds = found.measurement.seconds;
         choice.complete = found.complete;
         return choice;
+    });
+}
+
+std::vector<Claim> verify(const Scene& scene, const Settings& settings) {
+    return in_algebra([&] {
+        std::vector<Claim> claims;
+        for (const ProofRow& row : prove(scene.parts().scene, method_of(settings)).rows)
+            claims.push_back({row.claim, row.measured, row.bound, row.holds, row.meaning});
+        return claims;
     });
 }
 

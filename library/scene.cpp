@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Scenes of the library: read, described, emitted.
+#include "analysis/checked_scene.hpp"
+#include "analysis/stability/json.hpp"
 #include "analysis/support_text.hpp"
 #include "generator/describe/describe.hpp"
+#include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/constraints.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "library/parts.hpp"
 
@@ -166,6 +171,23 @@ std::pair<std::string, std::string> Scene::emit_plain(const Settings& settings) 
         const lobatto::Scene scene = with_method(*this, settings);
         const PlainSource source = lobatto::emit_plain(scene, scene.method.numbers);
         return std::pair(source.name + ".hpp", source.header);
+    });
+}
+
+std::string Scene::check_json(const Settings& settings) const {
+    return in_algebra([&] { return json_of(check_scene(with_method(*this, settings))); });
+}
+std::string Scene::stability_json(const Settings& settings) const {
+    return in_algebra([&] {
+        const lobatto::Scene scene = with_method(*this, settings);
+        refuse_clock(scene, "stability");
+        refuse_constraints(scene, "stability");
+        refuse_impacts(scene, "stability");
+        MethodChoice::require_double(scene, "stability");
+        if (scene.method.family == Family::splitting)
+            throw InputError(scene.path +
+                             ": what is exact of stability is of Lobatto and Gauss; choose points or stages");
+        return json_of(stability_report(scene, overrides_of(settings)));
     });
 }
 

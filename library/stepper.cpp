@@ -100,10 +100,11 @@ struct Stepper::Parts {
         throw ComputationError(kernel.parts().scene.path + ": " + explain_stop(result, request));
     }
 
-    void go_on_from(double t, std::vector<double> position, std::vector<double> momentum) {
+    // q and p stay where they lie: callers may look at them for as long as the stepper lives.
+    void go_on_from(double t, const std::vector<double>& position, const std::vector<double>& momentum) {
         time = t;
-        q = std::move(position);
-        p = std::move(momentum);
+        q.assign(position.begin(), position.end());
+        p.assign(momentum.begin(), momentum.end());
         last_step = 0;
         restart();
     }

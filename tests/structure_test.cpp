@@ -98,6 +98,7 @@ const std::vector<Room> rooms = {
     {"analysis", {"generator", "runtime"}},
     {"analysis/stability", {"analysis", "generator", "runtime"}},
     {"analysis/accuracy", {"analysis", "analysis/stability", "generator", "runtime"}},
+    {"analysis/proof", {"analysis", "analysis/accuracy", "generator", "runtime"}},
     {"analysis/tradeoff", {"analysis", "analysis/accuracy", "analysis/stability", "generator", "runtime"}},
     {"library/include/lobatto", {}},
     {"library", {"library/include/lobatto", "analysis", "generator", "runtime"}},

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "analysis/stability/chart.hpp"
+#include "analysis/stability/json.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The stability of a member and of a scene, for people and for machines.
+// The stability of a member and of a scene, for people.
 #pragma once
 
 #include <string>
@@ -16,9 +16,5 @@ std::string text_of(const StabilityReport& report);
 
 // A table, a line for each.
 std::string text_of(const std::vector<Stability>& members);
-
-// docs/stability.md, last section.
-std::string json_of(const std::vector<Stability>& members);
-std::string json_of(const StabilityReport& report);
 
 }  // namespace lobatto

@@ -107,6 +107,11 @@ public:
     std::pair<std::string, std::string> emit(const Settings& settings = {}) const;
     std::pair<std::string, std::string> emit_plain(const Settings& settings = {}) const;
 
+    /// What was found in it, and what its kernel leaves out, as JSON.
+    std::string check_json(const Settings& settings = {}) const;
+    /// Which steps keep linear motion bounded, and what this step does, as JSON (docs/stability.md).
+    std::string stability_json(const Settings& settings = {}) const;
+
     struct Parts;
     explicit Scene(std::shared_ptr<const Parts> parts);
     const Parts& parts() const { return *parts_; }
@@ -171,7 +176,7 @@ public:
     bool advance_to(double t);
 
     double t() const;
-    const double* q() const;  ///< n; until the next step
+    const double* q() const;  ///< n; the same place for as long as the stepper lives
     const double* p() const;
     std::vector<double> velocity() const;
     double energy() const;                    ///< H(t, q, p); not a number where the kernel has none
@@ -275,6 +280,18 @@ struct Choice {
     bool complete = false;       ///< no member that was not tried can be expected to win
 };
 /// The cheapest member of the family, and its step, that keep an error to the end. `budget`: seconds to search.
-LOBATTO_API Choice tune(const Scene& scene, double error, const Settings& settings = {}, double budget = 20);
+/// `progress`: told what is being done; false ends the search, which then throws ComputationError.
+LOBATTO_API Choice tune(const Scene& scene, double error, const Settings& settings = {}, double budget = 20,
+                        const std::function<bool(const std::string&)>& progress = {});
+
+// --- Proving ---------------------------------------------------------------------------------------------------------
+
+struct Claim {
+    std::string claim, measured, bound;
+    bool holds = false;
+    std::string meaning;  ///< of a failure
+};
+/// Everything that can be checked of a scene, from the quadrature to the running kernel.
+LOBATTO_API std::vector<Claim> verify(const Scene& scene, const Settings& settings = {});
 
 }  // namespace lobatto::api

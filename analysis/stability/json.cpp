@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The stability of a member and of a scene, for machines (docs/stability.md).
+#include "analysis/stability/json.hpp"
+
 #include <fmt/format.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "cli/print/stability_text.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/modified_energy.hpp"
 
@@ -17,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int shown_digits = 30;
 
-Json root_of(const RealRoot& root) {
+Json json_root(const RealRoot& root) {
     Json json{{"z", decimal_of(root, shown_digits)},
               {"angle", decimal_of_square_root(root, shown_digits)},
               {"polynomial", text_of(root.polynomial, "z")}};
@@ -45,8 +46,8 @@ Json member_of(const Stability& member) {
     for (std::size_t k = 0; k < member.intervals.size(); ++k) {
         const StabilityInterval& interval = member.intervals[k];
         Json one{{"stable", interval.stable}};
-        one["from"] = k > 0 ? root_of(member.limits[k - 1]) : Json("0");
-        one["to"] = k < member.limits.size() ? root_of(member.limits[k]) : Json("infinity");
+        one["from"] = k > 0 ? json_root(member.limits[k - 1]) : Json("0");
+        one["to"] = k < member.limits.size() ? json_root(member.limits[k]) : Json("infinity");
         if (!interval.stable) {
             one["rate"] = number(interval.rate);
             one["at"] = interval.peak ? Json(decimal_of_square_root(*interval.peak, shown_digits)) : Json("infinity");
@@ -55,7 +56,7 @@ Json member_of(const Stability& member) {
     }
     json["contacts"] = Json::array();
     for (const Contact& contact : member.contacts) {
-        Json one = root_of(contact.z);
+        Json one = json_root(contact.z);
         one["identity"] = contact.identity;
         json["contacts"].push_back(one);
     }

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Everything that can be checked of a scene without a paper, from the quadrature to the running kernel.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/method_choice.hpp"
+#include "runtime/measure/convergence.hpp"
+
+namespace lobatto {
+
+// A claim, what was measured of it, and what is allowed.
+struct ProofRow {
+    std::string claim, measured, bound;
+    bool holds = false;
+    std::string meaning;  // of a failure
+};
+
+struct Proof {
+    std::string title, method;
+    std::vector<ProofRow> rows;
+    Convergence convergence;  // without rows where it was not measured
+};
+
+// InputError, ComputationError where not even a first step can be taken.
+Proof prove(const Scene& written, const MethodChoice& method);
+
+}  // namespace lobatto
