@@ -1,0 +1,426 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto.hpp for Python: classes and functions of the module lobatto._lobatto, which python/lobatto makes pleasant.
+//
+// Arrays are NumPy's. Those of results own what C++ computed: nothing is copied. Long computations run without the
+// interpreter's lock and look for Ctrl-C ten times a second.
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <lobatto/lobatto.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace py = pybind11;
+namespace lob = lobatto::api;
+
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+// An array that owns the numbers; rows x columns where there are columns.
+template <class Number>
+py::array owned(std::vector<Number> numbers, py::ssize_t columns = 0) {
+    auto* const kept = new std::vector<Number>(std::move(numbers));
+    const py::capsule owner(kept, [](void* memory) { delete static_cast<std::vector<Number>*>(memory); });
+    const auto size = static_cast<py::ssize_t>(kept->size());
+    std::vector<py::ssize_t> shape{size};
+    if (columns > 0) shape = {size / columns, columns};
+    return py::array_t<Number>(shape, kept->data(), owner);
+}
+
+// A row of a stepper, looked at where it lies.
+py::array view(const double* numbers, std::size_t count, const py::object& owner) {
+    py::array_t<double> array(static_cast<py::ssize_t>(count), numbers, owner);
+    array.attr("flags").attr("writeable") = false;
+    return array;
+}
+
+const double* row_of(const Array& array, std::size_t count, const char* what) {
+    if (array.ndim() != 1 || static_cast<std::size_t>(array.size()) != count)
+        throw lob::InputError(std::string(what) + " needs " + std::to_string(count) +
+                              " numbers, one for each coordinate");
+    return array.data();
+}
+
+// Settings by the names of the command line; None is as the scene has it.
+lob::Settings settings_of(const py::kwargs& given) {
+    lob::Settings settings;
+    const auto text = [](const py::handle& value) { return std::string(py::str(value)); };
+    for (const auto& [key, value] : given) {
+        const std::string name = text(key);
+        if (value.is_none()) continue;
+        if (name == "points")
+            settings.points = value.cast<int>();
+        else if (name == "stages")
+            settings.stages = value.cast<int>();
+        else if (name == "splitting")
+            settings.splitting = value.cast<int>();
+        else if (name == "tolerance")
+            settings.tolerance = value.cast<double>();
+        else if (name == "every")
+            settings.every = value.cast<std::int64_t>();
+        else if (name == "arithmetic")
+            settings.arithmetic = text(value);
+        else if (name == "numbers")
+            settings.numbers = text(value);
+        else if (name == "step")
+            settings.step =
+                py::isinstance<py::str>(value) ? text(value) : text(py::repr(py::float_(value.cast<double>())));
+        else if (name == "until")
+            settings.until =
+                py::isinstance<py::str>(value) ? text(value) : text(py::repr(py::float_(value.cast<double>())));
+        else if (name == "set")
+            for (const auto& [parameter, formula] : value.cast<py::dict>())
+                settings.set.emplace_back(text(parameter), py::isinstance<py::str>(formula)
+                                                               ? text(formula)
+                                                               : text(py::repr(py::float_(formula.cast<double>()))));
+        else
+            throw py::type_error("unknown setting '" + name +
+                                 "'; there are points, stages, splitting, tolerance, arithmetic, numbers, step, until, "
+                                 "every and set");
+    }
+    return settings;
+}
+
+py::dict dict_of(const lob::Settings& settings) {
+    py::dict dict;
+    if (settings.points) dict["points"] = *settings.points;
+    if (settings.stages) dict["stages"] = *settings.stages;
+    if (settings.splitting) dict["splitting"] = *settings.splitting;
+    if (settings.tolerance) dict["tolerance"] = *settings.tolerance;
+    if (settings.every) dict["every"] = *settings.every;
+    for (const auto& [name, value] : {std::pair("arithmetic", settings.arithmetic),
+                                      {"numbers", settings.numbers},
+                                      {"step", settings.step},
+                                      {"until", settings.until}})
+        if (!value.empty()) dict[name] = value;
+    if (!settings.set.empty()) {
+        py::dict set;
+        for (const auto& [name, value] : settings.set) set[py::str(name)] = value;
+        dict["set"] = set;
+    }
+    return dict;
+}
+
+// Whether nobody pressed Ctrl-C, and what the caller's own function says.
+template <class... Arguments>
+std::function<bool(Arguments...)> watched(const py::object& progress) {
+    return [progress](Arguments... arguments) {
+        const py::gil_scoped_acquire lock;
+        if (PyErr_CheckSignals() != 0) return false;  // its exception stays set
+        if (progress.is_none()) return true;
+        const py::object answer = progress(arguments...);
+        return answer.is_none() || answer.cast<bool>();
+    };
+}
+
+// What was computed without the lock, or the exception that Ctrl-C left.
+template <class Work>
+auto unlocked(const Work& work) {
+    auto result = [&] {
+        const py::gil_scoped_release release;
+        return work();
+    }();
+    if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+    return result;
+}
+
+// States at ascending times of a trajectory whose kept states are given: steps are taken from the kept state before,
+// and the last of them is looked into on its own polynomial.
+std::pair<py::array, py::array> dense(lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
+                                      const Array& times) {
+    const std::size_t n = stepper.coordinates(), kept = static_cast<std::size_t>(t.size());
+    const auto count = static_cast<std::size_t>(times.size());
+    const double *const at = times.data(), *const first = t.data(), *const last = first + kept;
+    if (kept < 2) throw lob::InputError("a trajectory of one state has nothing in between");
+    std::vector<double> positions(count * n), velocities(count * n);
+    std::size_t begun = kept;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!(at[i] >= *first && at[i] <= last[-1]))
+            throw lob::InputError("t = " + std::to_string(at[i]) + " is outside the trajectory, which leads from " +
+                                  std::to_string(*first) + " to " + std::to_string(last[-1]));
+        const auto next = static_cast<std::size_t>(std::upper_bound(first, last, at[i]) - first);
+        const std::size_t from = std::min(next, kept - 1) - 1;
+        if (begun != from || stepper.t() - stepper.step_size() > at[i]) {
+            stepper.start(first[from], q.data() + from * n, p.data() + from * n);
+            begun = from;
+            if (at[i] > first[from]) stepper.step();
+        }
+        const double rounding = 1e-12 * std::fabs(stepper.step_size());
+        while (stepper.t() < at[i] - rounding) stepper.step();
+        std::vector<double> position, velocity;
+        if (std::fabs(stepper.t() - at[i]) <= rounding) {
+            position.assign(stepper.q(), stepper.q() + n);
+            velocity = stepper.velocity();
+        } else {
+            std::tie(position, velocity) = stepper.at(at[i]);
+        }
+        std::copy(position.begin(), position.end(), positions.begin() + static_cast<std::ptrdiff_t>(i * n));
+        std::copy(velocity.begin(), velocity.end(), velocities.begin() + static_cast<std::ptrdiff_t>(i * n));
+    }
+    const auto columns = static_cast<py::ssize_t>(n);
+    return {owned(std::move(positions), columns), owned(std::move(velocities), columns)};
+}
+
+py::list events_of(const std::vector<lob::EventHit>& hits, const std::vector<std::string>& names) {
+    py::list events;
+    for (const lob::EventHit& hit : hits)
+        events.append(py::make_tuple(names[static_cast<std::size_t>(hit.kind)], hit.t, owned(hit.q), owned(hit.p)));
+    return events;
+}
+
+py::dict dict_of(lob::Trajectory&& run) {
+    const auto n = static_cast<py::ssize_t>(run.coordinates.size());
+    py::dict dict;
+    dict["coordinates"] = run.coordinates;
+    dict["t"] = owned(std::move(run.t));
+    dict["q"] = owned(std::move(run.q), n);
+    dict["p"] = owned(std::move(run.p), n);
+    dict["H"] = run.energy.empty() ? py::object(py::none()) : py::object(owned(std::move(run.energy)));
+    dict["events"] = events_of(run.events, run.event_names);
+    dict["event_names"] = run.event_names;
+    dict["steps"] = run.steps;
+    dict["seconds"] = run.seconds;
+    dict["stopped_by"] = run.stopped_by;
+    dict["method"] = run.method;
+    dict["digest"] = run.digest;
+    dict["step"] = run.step;
+    dict["error"] = run.error;
+    dict["largest_error"] = run.largest_error;
+    dict["doubling"] = run.doubling;
+    dict["warnings"] = run.warnings;
+    return dict;
+}
+
+py::dict run(const lob::Scene& scene, bool measure, bool beyond_horizon, const py::object& progress,
+             const py::kwargs& given) {
+    lob::RunOptions options;
+    static_cast<lob::Settings&>(options) = settings_of(given);
+    options.measure = measure;
+    options.beyond_horizon = beyond_horizon;
+    options.progress = watched<double>(progress);
+    return dict_of(unlocked([&] { return lob::run(scene, options); }));
+}
+
+py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vector<std::string>& keep, int threads,
+               bool measure, const py::object& progress, const py::kwargs& given) {
+    lob::Starts starts;
+    for (const auto& [name, values] : columns) {
+        const auto array = values.cast<Array>();
+        starts.columns[std::string(py::str(name))].assign(array.data(), array.data() + array.size());
+        starts.count = static_cast<std::size_t>(array.size());
+    }
+    lob::SweepOptions options;
+    static_cast<lob::Settings&>(options) = settings_of(given);
+    options.keep = keep;
+    options.threads = threads;
+    options.measure = measure;
+    options.progress = watched<double>(progress);
+    lob::Sweep result = unlocked([&] { return lob::sweep(scene, starts, options); });
+    const auto n = static_cast<py::ssize_t>(result.coordinates.size());
+    py::dict dict, kept;
+    const std::size_t kinds = result.kept_names.size();
+    for (std::size_t k = 0; k < kinds; ++k) {
+        std::vector<double> column(result.count);
+        for (std::size_t i = 0; i < result.count; ++i) column[i] = result.kept[i * kinds + k];
+        kept[py::str(result.kept_names[k])] = owned(std::move(column));
+    }
+    dict["coordinates"] = result.coordinates;
+    dict["status"] = owned(std::move(result.status));
+    dict["steps"] = owned(std::move(result.steps));
+    dict["stop"] = owned(std::move(result.stop));
+    dict["t"] = owned(std::move(result.t));
+    dict["q"] = owned(std::move(result.q), n);
+    dict["p"] = owned(std::move(result.p), n);
+    dict["energy_error"] = owned(std::move(result.energy_error));
+    dict["error"] = result.error.empty() ? py::object(py::none()) : py::object(owned(std::move(result.error)));
+    dict["kept"] = kept;
+    dict["statuses"] = result.statuses;
+    return dict;
+}
+
+py::dict tune(const lob::Scene& scene, double error, double budget, const py::object& progress,
+              const py::kwargs& given) {
+    const lob::Settings settings = settings_of(given);
+    const auto going_on = watched<const std::string&>(progress);
+    const lob::Choice choice = [&] {
+        try {
+            return unlocked([&] { return lob::tune(scene, error, settings, budget, going_on); });
+        } catch (const lob::Error&) {
+            if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+            throw;
+        }
+    }();
+    py::dict dict;
+    dict["settings"] = dict_of(choice.settings);
+    dict["method"] = choice.method;
+    dict["step"] = choice.step;
+    dict["until"] = choice.until;
+    dict["predicted_error"] = choice.predicted_error;
+    dict["seconds"] = choice.seconds;
+    dict["complete"] = choice.complete;
+    return dict;
+}
+
+// Python's exceptions, with the texts and the exit codes of the command line.
+void add_errors(py::module_& module) {
+    static py::exception<lob::Error> error(module, "Error", PyExc_RuntimeError);
+    const auto under = [](PyObject* other) { return py::make_tuple(error, py::handle(other)); };
+    static py::exception<lob::InputError> input(module, "InputError", under(PyExc_ValueError));
+    static py::exception<lob::ComputationError> computation(module, "ComputationError", under(PyExc_ArithmeticError));
+    static py::exception<lob::MachineError> machine(module, "MachineError", under(PyExc_OSError));
+    static py::exception<lob::RunFailure> failure(module, "RunFailure", computation);
+    py::register_exception_translator([](std::exception_ptr thrown) {
+        try {
+            std::rethrow_exception(std::move(thrown));
+        } catch (const lob::RunFailure& caught) {
+            py::object exception = static_cast<py::object>(failure)(caught.what());
+            exception.attr("trajectory") = dict_of(lob::Trajectory(caught.trajectory()));
+            PyErr_SetObject(failure.ptr(), exception.ptr());
+        } catch (const lob::InputError& caught) {
+            PyErr_SetString(input.ptr(), caught.what());
+        } catch (const lob::ComputationError& caught) {
+            PyErr_SetString(computation.ptr(), caught.what());
+        } catch (const lob::MachineError& caught) {
+            PyErr_SetString(machine.ptr(), caught.what());
+        }
+    });
+}
+
+void add_scene(py::module_& module) {
+    py::class_<lob::Variable>(module, "Variable", "A coordinate or a parameter.")
+        .def_readonly("name", &lob::Variable::name)
+        .def_readonly("unit", &lob::Variable::unit)
+        .def_readonly("value", &lob::Variable::value, "A coordinate's initial position; a parameter's value.")
+        .def("__repr__", [](const lob::Variable& variable) {
+            return "Variable(" + variable.name + " = " + std::string(py::repr(py::float_(variable.value))) +
+                   (variable.unit.empty() ? "" : " " + variable.unit) + ")";
+        });
+    using Text = std::string (lob::Scene::*)(const lob::Settings&) const;
+    const auto text = [](Text function) {
+        return [function](const lob::Scene& scene, const py::kwargs& given) {
+            const lob::Settings settings = settings_of(given);
+            return unlocked([&] { return (scene.*function)(settings); });
+        };
+    };
+    py::class_<lob::Scene>(module, "Scene", "A mechanical system, read from a scene file and checked.")
+        .def(py::init<const std::string&>(), py::arg("path"))
+        .def_static("from_text", &lob::Scene::from_text, py::arg("text"), py::arg("path") = "scene.toml",
+                    "The text of a scene file; `path` stands in errors.")
+        .def_property_readonly("path", &lob::Scene::path)
+        .def_property_readonly("name", &lob::Scene::name)
+        .def_property_readonly("title", &lob::Scene::title)
+        .def_property_readonly("text", &lob::Scene::text, "Of the scene file.")
+        .def_property_readonly("lagrangian", &lob::Scene::lagrangian)
+        .def_property_readonly("coordinates", &lob::Scene::coordinates)
+        .def_property_readonly("parameters", &lob::Scene::parameters)
+        .def_property_readonly("events", &lob::Scene::events)
+        .def_property_readonly("method", &lob::Scene::method)
+        .def_property_readonly("step", &lob::Scene::step)
+        .def_property_readonly("until", &lob::Scene::until)
+        .def_property_readonly("starts_with_momenta", &lob::Scene::starts_with_momenta)
+        .def("_derivation_text", text(&lob::Scene::derivation))
+        .def("_derivation_latex", text(&lob::Scene::derivation_latex))
+        .def("_derivation_json", text(&lob::Scene::derivation_json))
+        .def("_check_json", text(&lob::Scene::check_json))
+        .def("_stability_json", text(&lob::Scene::stability_json))
+        .def(
+            "emit", [](const lob::Scene& scene, const py::kwargs& given) { return scene.emit(settings_of(given)); },
+            "The integrator as one C++17 header: (file name, text).")
+        .def(
+            "emit_plain",
+            [](const lob::Scene& scene, const py::kwargs& given) { return scene.emit_plain(settings_of(given)); },
+            "The integrator as a textbook prints it: (file name, text).")
+        .def("__repr__",
+             [](const lob::Scene& scene) { return "Scene('" + scene.path() + "': " + scene.title() + ")"; });
+}
+
+void add_stepper(py::module_& module) {
+    const auto vector = [](const py::object& self, const double* (lob::Stepper::*function)() const) {
+        const auto& stepper = self.cast<const lob::Stepper&>();
+        return view((stepper.*function)(), stepper.coordinates(), self);
+    };
+    py::class_<lob::Stepper>(module, "Stepper",
+                             "A trajectory that the caller takes forward.\n\n"
+                             "q and p are read-only views of where the motion is now; copy them to keep them.")
+        .def(py::init([](const lob::Scene& scene, const py::kwargs& given) {
+                 const lob::Settings settings = settings_of(given);
+                 return unlocked([&] { return lob::Stepper(lob::compile(scene, settings)); });
+             }),
+             py::arg("scene"))
+        .def("step", &lob::Stepper::step, "One step. False where a stop of the scene ended the motion.")
+        .def("advance", &lob::Stepper::advance, py::arg("steps"), py::call_guard<py::gil_scoped_release>(),
+             "So many steps. False where a stop ended the motion.")
+        .def("advance_to", &lob::Stepper::advance_to, py::arg("t"), py::call_guard<py::gil_scoped_release>(),
+             "Equal steps while they fit, then a shorter one that ends at t exactly.")
+        .def(
+            "start",
+            [](lob::Stepper& stepper, double t, const Array& q, const py::object& p, const py::object& velocity) {
+                if (p.is_none() == velocity.is_none()) throw lob::InputError("start: give p or velocity, one of them");
+                const std::size_t n = stepper.coordinates();
+                const auto rate = (p.is_none() ? velocity : p).cast<Array>();
+                if (p.is_none())
+                    stepper.start_from_velocity(t, row_of(q, n, "q"), row_of(rate, n, "velocity"));
+                else
+                    stepper.start(t, row_of(q, n, "q"), row_of(rate, n, "p"));
+            },
+            py::arg("t"), py::arg("q"), py::arg("p") = py::none(), py::kw_only(), py::arg("velocity") = py::none(),
+            "Another place to go on from: positions, and momenta or velocities.")
+        .def("set", &lob::Stepper::set, py::arg("name"), py::arg("value"), "A parameter, from the next step on.")
+        .def("parameter", &lob::Stepper::parameter, py::arg("name"))
+        .def(
+            "copy", [](const lob::Stepper& stepper) { return lob::Stepper(stepper); }, "A second motion from here.")
+        .def_property_readonly("t", &lob::Stepper::t)
+        .def_property_readonly("q", [vector](const py::object& self) { return vector(self, &lob::Stepper::q); })
+        .def_property_readonly("p", [vector](const py::object& self) { return vector(self, &lob::Stepper::p); })
+        .def_property_readonly("velocity", [](const lob::Stepper& stepper) { return owned(stepper.velocity()); })
+        .def_property_readonly("H", &lob::Stepper::energy, "The energy; not a number where the scene has none.")
+        .def_property_readonly("multipliers", [](const lob::Stepper& stepper) { return owned(stepper.multipliers()); })
+        .def_property_readonly("step_size", &lob::Stepper::step_size)
+        .def(
+            "at",
+            [](const lob::Stepper& stepper, double t) {
+                auto [q, velocity] = stepper.at(t);
+                return std::pair(owned(std::move(q)), owned(std::move(velocity)));
+            },
+            py::arg("t"), "Position and velocity at a time inside the last step, on its own polynomial.")
+        .def(
+            "tangent",
+            [](const lob::Stepper& stepper) {
+                return owned(stepper.tangent(), static_cast<py::ssize_t>(2 * stepper.coordinates()));
+            },
+            "d(q1, p1)/d(q, p) of the next step, 2n x 2n.")
+        .def("_take_events",
+             [](lob::Stepper& stepper, const std::vector<std::string>& names) {
+                 return events_of(stepper.take_events(), names);
+             })
+        .def("_dense", &dense);
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_lobatto, module) {
+    module.attr("__version__") = lob::version();
+    add_errors(module);
+    add_scene(module);
+    add_stepper(module);
+    module.def("run", &run, py::arg("scene"), py::arg("measure"), py::arg("beyond_horizon"), py::arg("progress"));
+    module.def("sweep", &sweep, py::arg("scene"), py::arg("starts"), py::arg("keep"), py::arg("threads"),
+               py::arg("measure"), py::arg("progress"));
+    module.def("tune", &tune, py::arg("scene"), py::arg("error"), py::arg("budget"), py::arg("progress"));
+    module.def("verify", [](const lob::Scene& scene, const py::kwargs& given) {
+        const lob::Settings settings = settings_of(given);
+        const auto claims = unlocked([&] { return lob::verify(scene, settings); });
+        py::list rows;
+        for (const lob::Claim& claim : claims)
+            rows.append(py::make_tuple(claim.claim, claim.measured, claim.bound, claim.holds));
+        return rows;
+    });
+}

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Scenes written in Python."""
+
+import json
+import re
+
+from ._lobatto import InputError, Scene
+
+
+
+def _value(value):
+    """As TOML has it: numbers with all their digits, formulas in quotes."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
+    if hasattr(value, "item"):  # of NumPy
+        value = value.item()
+    return repr(value)
+
+
+def _coordinate(name, value):
+    if isinstance(value, dict):
+        table = dict(value)
+    elif isinstance(value, (list, tuple)):
+        if len(value) != 2:
+            raise InputError(f"coordinate {name}: expected (position, velocity), not {len(value)} values")
+        table = {"position": value[0], "velocity": value[1]}
+    else:
+        table = {"position": value}
+    if "velocity" not in table and "momentum" not in table:
+        table["velocity"] = 0
+    return table
+
+
+def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output=None, extra="", **variables):
+    """A scene from a Lagrangian and the values of its names.
+
+    A name that stands in the Lagrangian with a prime, as q in ``m*q'^2/2``, is a coordinate. Its value is its initial
+    position, ``(position, velocity)``, or a table: ``dict(position=1, momentum=0, unit="m", force="-c*q'")``. Every
+    other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``.
+
+    ``method``: a table such as ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
+    scene file. ``extra``: more of a scene file, as text.
+    """
+    moving = set(re.findall(r"([A-Za-z_]\w*)'", lagrangian))
+    lines = []
+    if title:
+        lines.append(f"title = {_value(title)}")
+    lines.append(f"lagrangian = {_value(lagrangian)}")
+    coordinates = {name: value for name, value in variables.items() if name in moving}
+    missing = sorted(moving - set(coordinates))
+    if missing:
+        raise InputError(f"'{missing[0]}' stands in the Lagrangian as {missing[0]}', so it is a coordinate; give its "
+                         f"start: Lagrangian(..., {missing[0]}=(position, velocity))")
+    coordinates = {name: _coordinate(name, value) for name, value in coordinates.items()}
+    forces = {name: table.pop("force") for name, table in coordinates.items() if "force" in table}
+    for heading, table in ("coordinates", coordinates), ("forces", forces):
+        if table:
+            lines.append(f"[{heading}]")
+            lines += [f"{name} = {_value(value)}" for name, value in table.items()]
+    lines.append("[parameters]")
+    lines += [f"{name} = {_value(value)}" for name, value in variables.items() if name not in moving]
+    lines.append("[run]")
+    lines += [f"step = {_value(step)}", f"until = {_value(until)}"]
+    if method:
+        method = dict(method)
+        for family, size in (("gauss", "stages"), ("splitting", "splitting")):
+            if size in method:
+                method = {"family": family, "stages": method.pop(size), **method}
+        lines.append("[method]")
+        lines += [f"{name} = {_value(value)}" for name, value in method.items()]
+    if output:
+        lines.append("[output]")
+        lines += [f"{name} = {_value(value)}" for name, value in output.items()]
+    return Scene.from_text("\n".join(lines) + "\n" + extra, "Lagrangian.toml")

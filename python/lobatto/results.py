@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What runs, sweeps and searches return."""
+
+import html
+import json
+import re
+from typing import NamedTuple
+
+import numpy
+
+from ._lobatto import Stepper
+
+
+class State(NamedTuple):
+    """Positions and velocities at some times, times x n (n alone for one time)."""
+
+    t: numpy.ndarray
+    q: numpy.ndarray
+    velocity: numpy.ndarray
+
+
+def _table(rows):
+    cells = "".join(f"<tr><th style='text-align:left'>{html.escape(str(name))}</th>"
+                    f"<td style='text-align:left'>{html.escape(str(value))}</td></tr>" for name, value in rows)
+    return f"<table>{cells}</table>"
+
+
+class _Rows:
+    """Columns by name."""
+
+    def _index(self, name):
+        names = [variable.name for variable in self.coordinates]
+        if name in names:
+            return self.q, names.index(name)
+        if name.startswith("p_") and name[2:] in names:
+            return self.p, names.index(name[2:])
+        return None
+
+    def __getitem__(self, name):
+        if name in ("t", "H") and self._index(name) is None:
+            return getattr(self, name)
+        found = self._index(name)
+        if found is None:
+            names = [variable.name for variable in self.coordinates]
+            raise KeyError(f"there is no column '{name}'; there are t, {', '.join(names)}, p_{', p_'.join(names)}")
+        return found[0][:, found[1]]
+
+    @property
+    def names(self):
+        """Of the coordinates."""
+        return [variable.name for variable in self.coordinates]
+
+    @property
+    def units(self):
+        """Of the coordinates; "" where the scene names none."""
+        return [variable.unit for variable in self.coordinates]
+
+
+class Trajectory(_Rows):
+    """A run: t (count), q and p (count x n), H (count, or None), and what is known of it.
+
+    ``error``: measured at the end, relative to the amplitude of the motion; None where it was not measured.
+    ``run(t)`` gives states at any times in between, on the polynomial of the step there.
+    """
+
+    def __init__(self, scene, settings, values):
+        self.scene = scene
+        self._settings = settings
+        self._stepper = None
+        self.__dict__.update(values)
+
+    def __len__(self):
+        return len(self.t)
+
+    def __call__(self, t):
+        """Position and velocity at a time, or at an array of times, inside the run."""
+        if self._stepper is None:
+            settings = {name: value for name, value in self._settings.items() if name not in ("every", "numbers")}
+            self._stepper = Stepper(self.scene, **settings)
+        times = numpy.atleast_1d(numpy.asarray(t, dtype=float))
+        order = numpy.argsort(times, kind="stable")
+        q, velocity = self._stepper._dense(self.t, self.q, self.p, times[order])
+        back = numpy.argsort(order, kind="stable")
+        if numpy.ndim(t) == 0:
+            return State(float(t), q[0], velocity[0])
+        return State(times, q[back], velocity[back])
+
+    def plot(self, *names, x="t", ax=None, **options):
+        """Draws columns (all coordinates where none is named) over x by matplotlib; returns the axes."""
+        from matplotlib import pyplot
+
+        ax = ax or pyplot.figure().gca()
+        units = dict(zip(self.names, self.units))
+        for name in names or self.names:
+            unit = units.get(name, "")
+            ax.plot(self[x], self[name], label=f"{name} ({unit})" if unit else name, **options)
+        ax.set_xlabel(f"{x} ({units[x]})" if units.get(x) else x)
+        if len(names or self.names) == 1:
+            ax.set_ylabel(ax.get_lines()[-1].get_label())
+        else:
+            ax.legend()
+        ax.set_title(self.scene.title)
+        return ax
+
+    def _facts(self):
+        facts = [("scene", self.scene.title or self.scene.name), ("method", f"{self.method}, h = {self.step:g}"),
+                 ("steps", f"{self.steps}, to t = {self.t[-1]:g}"), ("states", len(self))]
+        if self.error is not None:
+            facts.append(("measured error", f"{self.error:.1e} of the amplitude at the end"))
+        if self.H is not None and len(self.H):
+            facts.append(("energy", f"{self.H[0]:g}, changes by {numpy.max(numpy.abs(self.H - self.H[0])):.1e} at most"))
+        if self.stopped_by:
+            facts.append(("stopped by", self.stopped_by))
+        facts += [("warning", warning) for warning in self.warnings]
+        return facts
+
+    def __repr__(self):
+        return "Trajectory(" + "; ".join(f"{name}: {value}" for name, value in self._facts()) + ")"
+
+    def _repr_html_(self):
+        return _table(self._facts())
+
+
+class Sweep(_Rows):
+    """The last states of many trajectories: status, steps, t (count), q and p (count x n), kept by name.
+
+    ``status`` 0: it reached the end or a stop; ``statuses[i]`` says what i means. ``ok`` is the mask of these.
+    """
+
+    def __init__(self, scene, values):
+        self.scene = scene
+        self.__dict__.update(values)
+        self.ok = self.status == 0
+
+    def __len__(self):
+        return len(self.status)
+
+    def __getitem__(self, name):
+        return self.kept[name] if name in self.kept else super().__getitem__(name)
+
+    def __repr__(self):
+        return f"Sweep({len(self)} trajectories, {int(self.ok.sum())} reached their end)"
+
+
+class Choice:
+    """What tune chose. ``run(scene, **choice.settings)`` keeps the promise."""
+
+    def __init__(self, scene, values):
+        self.scene = scene
+        self.__dict__.update(values)
+
+    def _facts(self):
+        return [("method", f"{self.method}, h = {self.step:g}"), ("until", f"t = {self.until:g}"),
+                ("predicted error", f"{self.predicted_error:.1e} of the amplitude"), ("cost", f"{self.seconds:.2g} s")]
+
+    def __repr__(self):
+        return "Choice(" + "; ".join(f"{name}: {value}" for name, value in self._facts()) + ")"
+
+    def _repr_html_(self):
+        return _table(self._facts())
+
+
+class Derivation:
+    """How the integrator follows from the Lagrangian: text, a LaTeX document, and data (docs/derivation.md)."""
+
+    def __init__(self, text, latex, data):
+        self.text = text
+        self.latex = latex
+        self.data = json.loads(data)
+
+    def __repr__(self):
+        return self.text
+
+    def _repr_latex_(self):
+        """Its formulas, one after another, for a notebook."""
+        formulas = re.findall(r"\\\[\n\\fit\{(.*?)\}\n\\\]\n", self.latex, re.DOTALL)
+        return "\n\n".join(f"$$ {formula} $$" for formula in formulas)
+
+
+class Claims(list):
+    """What verify looked at: (claim, measured, bound, holds)."""
+
+    @property
+    def ok(self):
+        return all(holds for _, _, _, holds in self)
+
+    def _repr_html_(self):
+        rows = "".join("<tr>" + "".join(f"<td style='text-align:left'>{html.escape(str(cell))}</td>" for cell in row) +
+                       "</tr>" for row in self)
+        return f"<table><tr><th>claim</th><th>measured</th><th>bound</th><th>holds</th></tr>{rows}</table>"

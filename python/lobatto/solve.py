@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What is done with a scene."""
+
+import json
+import warnings
+
+import numpy
+
+from . import _lobatto
+from ._lobatto import RunFailure, Scene, Stepper
+from .results import Choice, Claims, Derivation, Sweep, Trajectory
+
+
+def _scene(scene):
+    return scene if isinstance(scene, Scene) else Scene(str(scene))
+
+
+def run(scene, *, measure=True, beyond_horizon=False, progress=None, **settings):
+    """Runs a scene (or the path of one) to its end. Returns a Trajectory.
+
+    ``measure``: its error, by a companion on another processor. ``beyond_horizon``: go on where nothing of the motion
+    is left, for the statistics of chaos. ``progress(share)`` is called about ten times a second; False ends the run.
+    Raises RunFailure where it fails on its way, with what was computed as its ``trajectory``.
+    """
+    scene = _scene(scene)
+    try:
+        values = _lobatto.run(scene, measure, beyond_horizon, progress, **settings)
+    except RunFailure as failure:
+        failure.trajectory = Trajectory(scene, settings, failure.trajectory)
+        raise
+    for warning in values["warnings"]:
+        warnings.warn(warning, stacklevel=2)
+    return Trajectory(scene, settings, values)
+
+
+def sweep(scene, starts, *, keep=(), threads=0, measure=False, progress=None, **settings):
+    """Runs a scene from many starts at once. Returns a Sweep.
+
+    ``starts``: arrays by name, of one length or one number for all: positions "q", velocities "q'" or momenta "p_q",
+    parameters. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states.
+    """
+    columns = numpy.broadcast_arrays(*(numpy.atleast_1d(numpy.asarray(values, dtype=float)).ravel()
+                                       for values in starts.values()))
+    columns = dict(zip(starts, (numpy.ascontiguousarray(column) for column in columns)))
+    scene = _scene(scene)
+    return Sweep(scene, _lobatto.sweep(scene, columns, list(keep), threads, measure, progress, **settings))
+
+
+def tune(scene, error, *, budget=20, progress=None, **settings):
+    """The cheapest method and step that keep an error to the end, relative to the amplitude. Returns a Choice.
+
+    ``budget``: seconds to search.
+    """
+    scene = _scene(scene)
+    return Choice(scene, _lobatto.tune(scene, float(error), float(budget), progress, **settings))
+
+
+def derive(scene, **settings):
+    """How the integrator of a scene follows from its Lagrangian. A notebook shows its formulas."""
+    scene = _scene(scene)
+    return Derivation(scene._derivation_text(**settings), scene._derivation_latex(**settings),
+                      scene._derivation_json(**settings))
+
+
+def check(scene, **settings):
+    """What was found in a scene, and what its kernel leaves out, as a dictionary."""
+    return json.loads(_scene(scene)._check_json(**settings))
+
+
+def stability(scene, **settings):
+    """Which steps keep linear motion bounded, and what the scene's step does, as a dictionary (docs/stability.md)."""
+    return json.loads(_scene(scene)._stability_json(**settings))
+
+
+def verify(scene, **settings):
+    """Everything that can be checked of a scene: a list of (claim, measured, bound, holds); ``.ok`` where all hold."""
+    return Claims(_lobatto.verify(_scene(scene), **settings))
+
+
+class Solution(dict):
+    """As scipy's: fields are attributes."""
+
+    __getattr__ = dict.__getitem__
+
+    def __repr__(self):
+        return "\n".join(f"{name:>8}: {value!r}" for name, value in self.items())
+
+
+def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **settings):
+    """For users of scipy.integrate.solve_ivp: y holds positions, then velocities, 2n x times.
+
+    ``t_span`` begins where the scene begins, at 0, and ends later. ``y0``: positions and velocities; None: those of the
+    scene. Steps are equal (setting ``step``); there is no tolerance: tune chooses a step for an error. Returns t, y, sol
+    (with ``dense_output``), status, message, success, nfev (0: not counted).
+    """
+    scene = _scene(scene)
+    begin, end = (float(time) for time in t_span)
+    if begin != 0 or end < 0:
+        raise _lobatto.InputError(f"t_span: a scene begins at t = 0 and goes on to later times, not from {begin:g} to "
+                                  f"{end:g}")
+    stepper = Stepper(scene, until=end, **settings)
+    n = len(stepper.q)
+    if y0 is not None:
+        y0 = numpy.asarray(y0, dtype=float)
+        if y0.shape != (2 * n,):
+            raise _lobatto.InputError(f"y0 needs {2 * n} numbers: {n} positions, then {n} velocities")
+        stepper.start(0.0, y0[:n], velocity=y0[n:])
+    times, q, p, velocities, status, message = [0.0], [stepper.q.copy()], [stepper.p.copy()], [stepper.velocity], 0, ""
+    try:
+        while stepper.t < end:
+            going = stepper.step() if stepper.t + stepper.step_size <= end * (1 + 1e-12) else stepper.advance_to(end)
+            times.append(stepper.t)
+            q.append(stepper.q.copy())
+            p.append(stepper.p.copy())
+            velocities.append(stepper.velocity)
+            if not going:
+                status, message = 1, "a stop of the scene ended the motion"
+                break
+    except _lobatto.ComputationError as error:
+        status, message = -1, str(error)
+    t = numpy.array(times)
+    y = numpy.vstack([numpy.array(q).T, numpy.array(velocities).T])
+
+    def sol(at):
+        at = numpy.asarray(at, dtype=float)
+        ordered = numpy.sort(numpy.atleast_1d(at))
+        place = numpy.searchsorted(ordered, numpy.atleast_1d(at))
+        states = stepper.copy()._dense(t, numpy.array(q), numpy.array(p), ordered)
+        values = numpy.vstack([states[0][place].T, states[1][place].T])
+        return values[:, 0] if at.ndim == 0 else values
+
+    if t_eval is not None:
+        t_eval = numpy.asarray(t_eval, dtype=float)
+        t_eval = t_eval[t_eval <= t[-1]]
+        y, t_kept = sol(t_eval), t_eval
+    else:
+        t_kept = t
+    return Solution(t=t_kept, y=y, sol=sol if dense_output else None, status=status,
+                    message=message or "The solver successfully reached the end of the integration interval.",
+                    success=status >= 0, nfev=0)

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The Python module: one trajectory, many, choosing, errors, what it costs."""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy
+import pytest
+
+import lobatto
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SCENES = ROOT / "scenes"
+
+
+@pytest.fixture
+def pendulum():
+    return lobatto.Scene(str(SCENES / "pendulum.toml"))
+
+
+def test_a_run_is_that_of_the_command_line(pendulum, tmp_path):
+    run = lobatto.run(pendulum, until=5)
+    program = os.environ["LOBATTO_PROGRAM"]
+    subprocess.run([program, "run", pendulum.path, "--until", "5", "-o", tmp_path / "run.csv", "--quiet"], check=True)
+    rows = numpy.loadtxt(tmp_path / "run.csv", delimiter=",", comments=["#", "t"]).T
+    assert numpy.array_equal(rows[1], run["q"])
+    assert numpy.array_equal(rows[3], run.H)
+    assert run.error < 1e-6
+    assert run.units == ["rad"] and run.names == ["q"]
+
+
+def test_a_lagrangian_written_in_python_is_the_scene_of_the_same_text(pendulum):
+    scene = lobatto.Lagrangian("m*q'^2/2 - m*omega^2*(1 - cos(q))", q=dict(position="pi/2", velocity=0, unit="rad"),
+                               m=1, omega="2*pi", step=0.05, until=5, method=dict(points=4))
+    assert numpy.array_equal(lobatto.run(scene).q, lobatto.run(pendulum, until=5).q)
+    assert [variable.name for variable in scene.parameters] == ["m", "omega"]
+    with pytest.raises(lobatto.InputError, match="'q' stands in the Lagrangian as q'"):
+        lobatto.Lagrangian("q'^2/2")
+    with pytest.raises(lobatto.InputError, match="unknown name 'k'"):
+        lobatto.Lagrangian("q'^2/2 - k*q", q=1)
+
+
+def test_dense_output_is_the_polynomial_of_the_step(pendulum):
+    run = lobatto.run(pendulum, until=5, points=6)
+    fine = lobatto.run(pendulum, until=5, points=6, step=0.0125)
+    assert numpy.max(numpy.abs(run(fine.t).q - fine.q)) < 1e-8  # measured 1.3e-10
+    assert numpy.array_equal(run(run.t[7]).q, run.q[7])
+    sparse = lobatto.run(pendulum, until=5, points=6, every=10)
+    assert numpy.allclose(sparse(numpy.array([3.21, 0.4])).q, run(numpy.array([3.21, 0.4])).q, rtol=0, atol=1e-12)
+    with pytest.raises(lobatto.InputError, match="outside the trajectory"):
+        run(6.0)
+
+
+def test_arrays_are_not_copied_and_outlive_what_made_them(pendulum):
+    run = lobatto.run(pendulum, until=1)
+    q = run.q
+    first = q.copy()
+    del run
+    assert numpy.array_equal(q, first)
+    stepper = lobatto.Stepper(pendulum)
+    view = stepper.q
+    stepper.step()
+    assert view[0] == stepper.q[0]
+    assert not view.flags.writeable and not view.flags.owndata
+    del stepper
+    assert numpy.isfinite(view[0])
+
+
+def test_a_step_costs_less_than_a_microsecond_beyond_its_kernel(pendulum):
+    # No time is asserted: a machine may be busy. The figure is printed, for docs/python.md.
+    stepper = lobatto.Stepper(pendulum)
+    begin = time.perf_counter()
+    for _ in range(20000):
+        stepper.step()
+    print(f"{(time.perf_counter() - begin) / 20000 * 1e9:.0f} ns a step")
+    assert stepper.t == pytest.approx(1000)
+
+
+def test_a_stepper_goes_where_it_is_sent(pendulum):
+    stepper = lobatto.Stepper(pendulum, points=6)
+    stepper.start(1.0, [0.3], velocity=[0.5])
+    assert stepper.velocity[0] == pytest.approx(0.5, abs=1e-15)
+    stepper.advance_to(1.23)
+    assert stepper.t == 1.23
+    other = stepper.copy()
+    stepper.set("omega", 3.0)
+    stepper.step()
+    other.step()
+    assert stepper.q[0] != other.q[0]
+    assert stepper.parameter("omega") == 3
+    tangent = other.tangent()
+    assert abs(numpy.linalg.det(tangent) - 1) < 1e-13
+    with pytest.raises(lobatto.InputError, match="needs 1 numbers"):
+        stepper.start(0, [1, 2], [0, 0])
+
+
+def test_a_sweep_takes_and_gives_arrays(pendulum):
+    starts = numpy.linspace(0.1, 2, 50)
+    sweep = lobatto.sweep(pendulum, {"q": starts, "omega": 6.0}, until=3)
+    assert sweep.q.shape == (50, 1) and sweep.ok.all()
+    run = lobatto.run(pendulum, until=3, set={"omega": 6.0})
+    close = lobatto.sweep(pendulum, {"q": [numpy.pi / 2], "omega": [6.0]}, until=3)
+    assert close.q[0, 0] == pytest.approx(run.q[-1, 0], abs=1e-12)
+    kept = lobatto.sweep(pendulum, {"q": starts}, keep=["max(q)"], until=3, measure=True)
+    assert numpy.allclose(kept["max(q)"], starts, atol=0.05)
+    assert kept.error.max() < 1e-3
+    with pytest.raises(lobatto.InputError, match="unknown column 'quux'"):
+        lobatto.sweep(pendulum, {"quux": starts})
+
+
+def test_what_is_chosen_keeps_its_promise(pendulum):
+    choice = lobatto.tune(pendulum, 1e-8, budget=3, until=10)
+    run = lobatto.run(pendulum, **choice.settings)
+    assert run.error < 3e-8
+    assert "predicted error" in choice._repr_html_()
+
+
+def test_scenes_are_derived_checked_and_proved(pendulum):
+    derivation = lobatto.derive(pendulum)
+    assert derivation._repr_latex_().count("$$") > 20
+    assert derivation.data["scene"] == "pendulum"
+    assert lobatto.check(pendulum)["step"]["order"] == 6
+    assert lobatto.stability(pendulum)["step"]
+    assert lobatto.verify(pendulum).ok
+
+
+def test_errors_are_exceptions_with_the_texts_of_the_command_line(pendulum):
+    with pytest.raises(lobatto.RunFailure, match="did not converge") as failure:
+        lobatto.run(pendulum, step=2.9, until=100)
+    assert len(failure.value.trajectory) >= 2
+    assert isinstance(failure.value, lobatto.ComputationError) and isinstance(failure.value, ArithmeticError)
+    with pytest.raises(lobatto.InputError, match="no such file"):
+        lobatto.run("nowhere.toml")
+    with pytest.raises(TypeError, match="unknown setting 'stepp'"):
+        lobatto.run(pendulum, stepp=1)
+    with pytest.raises(ValueError, match="unknown parameter 'omga'"):
+        lobatto.run(pendulum, set={"omga": 1})
+
+
+def test_warnings_are_warnings(pendulum):
+    with pytest.warns(UserWarning, match="the error is"):
+        lobatto.run(pendulum, step=0.25, points=3, until=5)
+
+
+def test_ctrl_c_ends_a_long_run(pendulum):
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        lobatto.run(pendulum, until=1e9, every=10**6, measure=False)
+
+
+def test_other_threads_run_meanwhile(pendulum):
+    counted = []
+
+    def count():
+        while not done.is_set():
+            counted.append(1)
+            time.sleep(0.001)
+
+    done = threading.Event()
+    thread = threading.Thread(target=count)
+    thread.start()
+    lobatto.run(pendulum, until=1e5, every=1000, measure=False)
+    done.set()
+    thread.join()
+    assert len(counted) > 20
+
+
+def test_solve_ivp_agrees_with_scipy(pendulum):
+    integrate = pytest.importorskip("scipy.integrate")
+    omega = 2 * numpy.pi
+    times = numpy.linspace(0, 3, 31)
+    wanted = integrate.solve_ivp(lambda t, y: [y[1], -omega**2 * numpy.sin(y[0])], (0, 3), [1, 0.5], rtol=1e-11,
+                                 atol=1e-12, t_eval=times).y
+    found = lobatto.solve_ivp(pendulum, (0, 3), [1, 0.5], t_eval=times, dense_output=True, step=0.05, points=8)
+    assert numpy.max(numpy.abs(found.y[0] - wanted[0])) < 1e-8
+    assert found.success and found.sol(1.0).shape == (2,)
+    with pytest.raises(lobatto.InputError, match="t_span"):
+        lobatto.solve_ivp(pendulum, (1, 3))
+
+
+def test_a_notebook_shows_a_table_and_nothing_is_injected():
+    scene = lobatto.Lagrangian("x'^2/2 - x^2/2", title="<script>alert(1)</script>", x=1, until=3)
+    shown = lobatto.run(scene)._repr_html_()
+    assert "<script>" not in shown and "measured error" in shown
+
+
+@pytest.mark.parametrize("name, wanted", [("first_pendulum", "measured error"), ("fit_parameters", "l = 0.8"),
+                                          ("control_loop", "after 10.0 s: x = "), ("flip_times", "flip within 20")])
+def test_examples(name, wanted, tmp_path):
+    script = ROOT / "examples" / "python" / f"{name}.py"
+    arguments = ["picture.png"] if name in ("first_pendulum", "flip_times") else []
+    environment = {**os.environ, "PYTHONPATH": str(pathlib.Path(lobatto.__file__).parents[1])}
+    ran = subprocess.run([sys.executable, script, *arguments], cwd=tmp_path, env=environment, capture_output=True,
+                         text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert wanted in ran.stdout
+    if arguments:
+        assert (tmp_path / "picture.png").stat().st_size > 5000
