@@ -61,6 +61,7 @@ void describe(CommandLine& program) {
     add_tradeoff(program);
     add_tune(program);
     add_verify(program);
+    add_view(program);
     add_gallery(program);
     add_paper(program);
     // Last, because a command takes over the footer that its parent has at that moment.

@@ -105,7 +105,8 @@ const std::vector<Room> rooms = {
     {"cli/options", {"analysis", "generator", "runtime"}},
     {"cli/print", {"analysis", "generator", "runtime"}},
     {"cli/paper", {"analysis", "generator", "runtime", "cli/print"}},
-    {"cli/commands", {"analysis", "generator", "runtime", "cli/options", "cli/paper", "cli/print"}},
+    {"cli/view", {"analysis", "generator", "runtime", "cli/print"}},
+    {"cli/commands", {"analysis", "generator", "runtime", "cli/options", "cli/paper", "cli/print", "cli/view"}},
     {"cli", {"cli/commands", "cli/print", "generator/formula", "runtime"}},
 };
 

@@ -24,5 +24,6 @@ void add_sweep(CommandLine& program);
 void add_tradeoff(CommandLine& program);
 void add_tune(CommandLine& program);
 void add_verify(CommandLine& program);
+void add_view(CommandLine& program);
 
 }  // namespace lobatto

@@ -27,6 +27,7 @@ void SystemReader::Bodies::read() {
         if (line.constrains()) add_equations(line);
     for (const Line& line : lines_) {
         give_values(line.body);
+        draw(line.body);
         reader_.kinetic_energy_ += moving(line.body, kinetic_energy(line.body), true).expression;
         reader_.kinetic_text_ += fmt::format("{}T({})", reader_.kinetic_text_.empty() ? "" : " + ", line.body.name);
     }
@@ -293,6 +294,18 @@ Operand SystemReader::Bodies::moving(const RigidBody& body, const ex& expression
     operand.moves = !operand.value && !velocity;
     operand.velocities = !operand.value && velocity;
     return operand;
+}
+
+void SystemReader::Bodies::draw(const RigidBody& body) {
+    const std::size_t dimension = body.plane ? 2 : 3;
+    DrawnBody drawn{body.name, body.plane, {}, {}, body.mass, {}};
+    for (std::size_t i = 0; i < dimension; ++i) {
+        drawn.place.push_back(body.x[i]);
+        for (std::size_t j = 0; j < dimension; ++j) drawn.rotation.push_back(body.R[i][j]);
+        if (!body.plane) drawn.inertia.push_back(body.inertia[i][i]);
+    }
+    if (body.plane) drawn.inertia.push_back(body.inertia[2][2]);
+    reader_.scene_.bodies.push_back(drawn);
 }
 
 void SystemReader::Bodies::give_values(const RigidBody& body) {

@@ -82,6 +82,7 @@ private:
     Starts starts_of_quaternion(const Line& line) const;
     void add_equations(const JointLine& line);
     void give_values(const RigidBody& body);
+    void draw(const RigidBody& body);  // for pictures
     Operand moving(const RigidBody& body, const ex& expression, bool velocity) const;
 
     SystemReader& reader_;

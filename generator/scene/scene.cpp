@@ -43,7 +43,7 @@ public:
           document_(read_document(source)),
           root_(source, document_.entries, {1, 1}, "a scene",
                 {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "constraints",
-                 "bodies", "joints", "impacts", "method", "run", "output"}),
+                 "bodies", "joints", "impacts", "method", "run", "output", "view"}),
           system_(source, root_, scene_) {}
 
     Scene run(const std::vector<std::string>& kept) {
@@ -60,6 +60,7 @@ public:
         for (std::size_t i = of_motion; i < scene_.conditions.size(); ++i) scene_.conditions[i].of_motion = false;
         read_output();
         system_.read_kept(kept);
+        system_.read_view();
         system_.add_switches();
         refuse_beside_impacts();
         system_.refuse_unused();

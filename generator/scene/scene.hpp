@@ -74,7 +74,7 @@ struct Outputs {
     int dense = 0;             // states between two steps, evenly spaced, from the step's own polynomial
     std::vector<Event> events;
     std::vector<Reduction> kept;        // by sweeps
-    GiNaC::symbol energy_of_kept{"H"};  // in their formulas: H, and p_x of the coordinates
+    GiNaC::symbol energy_of_kept{"H"};  // in their formulas, and in plots: H, and p_x of the coordinates
     std::vector<GiNaC::symbol> momenta_of_kept;
 
     void watch_kept();  // makes the events of what is kept events of the kernel
@@ -111,6 +111,33 @@ struct Impact {
     std::vector<GiNaC::ex> reset_position = {}, reset_velocity = {};
 };
 
+// What `lobatto view` draws: at places of one line of [view], which move.
+struct MovingFigure {
+    enum class Kind { point, line, spring, circle };
+    std::string written;  // mass[3]
+    Kind kind = Kind::point;
+    std::vector<std::vector<GiNaC::ex>> corners;  // 2 or 3 formulas each; of points and circles one
+    GiNaC::ex radius = 0;                         // of circles, in the units of the places
+    bool trail = false;                           // it leaves a trace: points and circles
+    bool closed = false;                          // lines: back to the first corner
+};
+
+// A curve over time that `lobatto view` shows.
+struct Plot {
+    std::string text;  // as written, white space collapsed
+    GiNaC::ex value;   // in positions, velocities, time, parameters, H and momenta (Outputs)
+};
+
+// A rigid body, for pictures: where its centre is, how it is turned, and its inertia; in a plane the third is 0.
+struct DrawnBody {
+    std::string name;
+    bool plane = false;
+    std::vector<GiNaC::ex> place;     // 2 or 3
+    std::vector<GiNaC::ex> rotation;  // 2 x 2 or 3 x 3, by rows, from its frame to space
+    GiNaC::ex mass;
+    std::vector<GiNaC::ex> inertia;  // about its own axes; of a plane body one
+};
+
 // Initial rates are given either as velocities or as momenta, for all coordinates.
 enum class Start { velocity, momentum };
 
@@ -130,6 +157,9 @@ struct Scene {
     // Where bodies are in a plane, when the scene defines x and y, alone or with one index; in positions, time and
     // run-time parameters. For pictures.
     std::vector<std::pair<GiNaC::ex, GiNaC::ex>> places;
+    std::vector<DrawnBody> bodies;
+    std::vector<MovingFigure> figures;              // empty: what the coordinates tell (cli/view/figures.hpp)
+    std::vector<Plot> plots;                  // likewise
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;

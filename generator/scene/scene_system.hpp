@@ -24,6 +24,8 @@ public:
 
     // All names before the formulas they occur in.
     void read();
+    // What is drawn and plotted of the motion; after read_kept.
+    void read_view();
     // After the last formula of the scene.
     void add_switches();
     void refuse_unused() const;
@@ -80,6 +82,8 @@ private:
     void read_impact(const Entry& entry);
     void read_reset(const Entry& entry, Impact& impact, const Scope& scope, const std::vector<long>& indices);
     Event read_event(const Value& value, const std::string& key);
+    void read_figure(const Entry& entry);
+    void read_plots(const Entry& entry);
     void name_energy_and_momenta();
     void read_kept(const Source& source, const Text& text);
     const Group& group_of(const Subject& subject) const;

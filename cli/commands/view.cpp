@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// lobatto view: a page on which scenes move.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "cli/commands/commands.hpp"
+#include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/print/summary.hpp"
+#include "cli/print/tell.hpp"
+#include "cli/view/motion.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/partial_file.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t numbers_on_page = 1'000'000;  // of 16 bits: some 2.7 MB
+constexpr std::size_t most_motions = 6;
+
+struct ViewCommand {
+    std::vector<std::string> scenes;
+    std::vector<std::string> beside;
+    std::string output;  // empty: out/NAME.html
+    MethodOption method;
+    Overrides overrides;
+    bool quiet = false;
+};
+
+// One more run of the scene: "points=2 step=0.1".
+struct Beside {
+    MethodChoice method;
+    std::string step;
+};
+
+Beside beside_of(const std::string& text) {
+    Beside beside;
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+        const std::size_t equals = word.find('=');
+        const std::string key = word.substr(0, equals),
+                          value = equals == std::string::npos ? "" : word.substr(equals + 1);
+        const auto number = [&] {
+            std::size_t used = 0;
+            int count = 0;
+            try {
+                count = std::stoi(value, &used);
+            } catch (const std::exception&) {
+                used = 0;
+            }
+            if (used != value.size() || value.empty())
+                throw InputError(
+                    fmt::format("--beside: {} needs a whole number, as in points=2, not '{}'", key, value));
+            return count;
+        };
+        if (key == "points")
+            beside.method.points = number();
+        else if (key == "stages")
+            beside.method.stages = number();
+        else if (key == "splitting")
+            beside.method.splitting = number();
+        else if (key == "step" && !value.empty())
+            beside.step = value;
+        else
+            throw InputError(fmt::format(
+                "--beside: '{}' is not known; write points=2, stages=1, splitting=11 or step=0.1, with blanks between",
+                word));
+    }
+    return beside;
+}
+
+// InputError where there is no such member of the family.
+void check_size(const MethodChoice& method) {
+    const std::optional<Method> member = method.member();
+    if (!member) return;
+    const std::vector<int>& sizes = sizes_of(member->family);
+    if (std::find(sizes.begin(), sizes.end(), member->points) == sizes.end())
+        throw InputError(fmt::format("--beside: there is no method {} with {}; there are {}", word_of(member->family),
+                                     member->points, fmt::join(sizes, ", ")));
+}
+
+std::vector<Viewed> motions_of(const ViewCommand& options) {
+    const std::size_t count = options.scenes.size() * (1 + options.beside.size());
+    if (count > most_motions)
+        throw InputError(fmt::format("{} motions on one page; at most {}: name fewer scenes", count, most_motions));
+    std::vector<Viewed> all;
+    for (const std::string& path : options.scenes) {
+        Scene scene = read_scene(path);
+        options.method.apply(scene);
+        MethodOption::require_double(scene, "view");
+        const std::string label =
+            options.scenes.size() > 1 || options.beside.empty() ? scene.title : scene.method.name();
+        all.push_back(viewed_motion(scene, options.overrides, label, numbers_on_page / count));
+        for (const std::string& text : options.beside) {
+            const Beside beside = beside_of(text);
+            check_size(beside.method);
+            Scene other = scene;
+            beside.method.apply(other);
+            Overrides overrides = options.overrides;
+            if (!beside.step.empty()) overrides.step = beside.step;
+            all.push_back(viewed_motion(other, overrides, other.method.name(), numbers_on_page / count));
+        }
+    }
+    return all;
+}
+
+// Those of all motions, each once.
+std::vector<ViewChart> charts_of(const std::vector<Viewed>& all) {
+    std::vector<ViewChart> charts;
+    for (const Viewed& one : all)
+        for (const ViewChart& chart : one.charts)
+            if (std::none_of(charts.begin(), charts.end(),
+                             [&](const ViewChart& known) { return known.curves == chart.curves; }))
+                charts.push_back(chart);
+    return charts;
+}
+
+void view(const ViewCommand& options) {
+    const std::string path = output_path(options.output, result_name(options.scenes.front()) + ".html");
+    for (const std::string& scene : options.scenes) keep_scene(scene, path);
+    keep_foreign(path);
+    const std::vector<Viewed> all = motions_of(options);
+    if (std::any_of(all.begin(), all.end(), [](const Viewed& one) { return one.is_interrupted; }))
+        throw ExitCode{interrupted_exit};
+    std::vector<ViewMotion> motions;
+    for (const Viewed& one : all) motions.push_back(one.motion);
+    const std::string page = page_of(all.front().title, motions, charts_of(all), comfortable_rate(motions));
+    write_whole(path, "the page", page);
+    if (!options.quiet) {
+        for (const Viewed& one : all)
+            print_row(one.motion.label.substr(0, 24), fmt::format("{}; {} frames, {} figures", one.motion.note,
+                                                                  one.motion.times.size(), one.motion.figures.size()));
+        print_row("page", fmt::format("{}, {} kB: open it in a browser", path, (page.size() + 999) / 1000));
+    }
+    for (const Viewed& one : all)
+        if (!one.failure.empty())
+            tell("lobatto: warning: {}: the motion on the page ends early: {}\n", one.title, one.failure);
+}
+
+}  // namespace
+
+void add_view(CommandLine& program) {
+    Command command = program.command("view", "Run scenes and write a page on which they move");
+    const auto options = std::make_shared<ViewCommand>();
+    command.option("scenes", options->scenes, "Scene files; several stand side by side").required();
+    command
+        .option("--beside", options->beside,
+                "The same scene once more, by another method or step: \"points=2 step=0.1\"; may be repeated")
+        .one_value_each();
+    command.option("-o,--output", options->output, "Page (default: out/NAME.html)");
+    options->method.add_to(command);
+    add_step_option(command, options->overrides);
+    add_until_option(command, options->overrides);
+    add_set_option(command, options->overrides);
+    command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
+    command.footer("Example:\n  lobatto view scenes/double_pendulum.toml --beside points=2 -o pendulum.html");
+    command.does([options] { view(*options); });
+}
+
+}  // namespace lobatto

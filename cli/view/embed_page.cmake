@@ -1,0 +1,13 @@
+# Writes the texts of cli/view/page/ into one C++ file. OUTPUT, SOURCE_DIR: where to, and cli/view/page.
+set(text "// Written by embed_page.cmake.\n#include \"cli/view/page_text.hpp\"\n\nnamespace lobatto {\n\n")
+foreach(kind html css js)
+    file(READ ${SOURCE_DIR}/page.${kind} content)
+    string(REGEX REPLACE "\n$" "" content "${content}")
+    string(LENGTH "${content}" length)
+    if(length GREATER 65000)
+        message(FATAL_ERROR "page.${kind} is too long for one string literal")
+    endif()
+    string(APPEND text "const std::string_view page_${kind} = R\"~~~(${content})~~~\";\n")
+endforeach()
+string(APPEND text "\n}  // namespace lobatto\n")
+file(WRITE ${OUTPUT} "${text}")

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/view/motion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "analysis/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "analysis/tape.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/view/figures.hpp"
+#include "generator/formula/source.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t wanted_frames = 4000;  // at least, where steps can be filled
+constexpr int most_dense = 100;
+constexpr std::size_t most_plotted = 6, most_events = 2000;
+const char* const kind_names[] = {"point", "line", "spring", "circle"};
+
+// The states of a run; long ones keep every second when there are too many, again and again.
+class States {
+public:
+    States(std::size_t columns, std::size_t most) : columns_(columns), most_(std::max<std::size_t>(most, 16)) {}
+
+    void add(const Records& records) {
+        for (std::int64_t i = 0; i < records.count; ++i, ++seen_) {
+            const double* const row = records.rows + i * records.columns;
+            last_.assign(row, row + columns_);
+            last_.push_back(records.energy != nullptr ? records.energy[i] : std::nan(""));
+            if (seen_ % every_ != 0) continue;
+            rows_.insert(rows_.end(), last_.begin(), last_.end());
+            if (count() >= 2 * most_) halve();
+        }
+    }
+    void finish() {
+        if (!last_.empty() && row(count() - 1)[0] != last_[0]) rows_.insert(rows_.end(), last_.begin(), last_.end());
+        while (count() > most_ + 1) halve();
+    }
+    std::size_t count() const { return rows_.size() / (columns_ + 1); }
+    // t, q, p, H.
+    const double* row(std::size_t i) const { return rows_.data() + i * (columns_ + 1); }
+
+private:
+    void halve() {
+        const std::size_t width = columns_ + 1, last = count() - 1;
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i <= last; i += 2, ++kept)
+            std::copy_n(rows_.begin() + static_cast<std::ptrdiff_t>(i * width), width,
+                        rows_.begin() + static_cast<std::ptrdiff_t>(kept * width));
+        rows_.resize(kept * width);
+        every_ *= 2;
+    }
+
+    std::size_t columns_, most_;
+    std::int64_t seen_ = 0, every_ = 1;
+    std::vector<double> rows_, last_;
+};
+
+// Formulas become channels, each once.
+class Channels {
+public:
+    Channels(const Scene& scene, std::vector<GiNaC::symbol> variables)
+        : scene_(scene), variables_(std::move(variables)) {}
+
+    std::size_t of(const GiNaC::ex& formula) {
+        for (std::size_t i = 0; i < formulas_.size(); ++i)
+            if (formulas_[i].is_equal(formula)) return i;
+        const std::optional<Tape> tape = Tape::of(formula, variables_);
+        if (!tape) throw InputError(scene_.path + ": a formula of [view] holds a function that pictures do not know");
+        formulas_.push_back(formula);
+        tapes_.push_back(*tape);
+        return formulas_.size() - 1;
+    }
+    std::size_t count() const { return tapes_.size(); }
+    // Room for each frame; what is no number there is drawn as it was before.
+    std::vector<ViewChannel> values(const std::vector<std::vector<double>>& frames) const {
+        std::vector<ViewChannel> channels(tapes_.size());
+        for (std::size_t c = 0; c < tapes_.size(); ++c)
+            for (const std::vector<double>& frame : frames) {
+                const double value = tapes_[c](frame);
+                channels[c].push_back(std::isfinite(value) ? value : channels[c].empty() ? 0 : channels[c].back());
+            }
+        return channels;
+    }
+
+private:
+    const Scene& scene_;
+    std::vector<GiNaC::symbol> variables_;
+    std::vector<GiNaC::ex> formulas_;
+    std::vector<Tape> tapes_;
+};
+
+std::string with_unit(const std::string& name, const std::string& unit) {
+    return unit.empty() ? name : fmt::format("{} ({})", name, unit);
+}
+
+// The symbols that formulas of [view] may hold, in the order of a frame: parameters, t, q, velocities, p, H.
+std::vector<GiNaC::symbol> variables_of(Scene& scene) {
+    std::vector<GiNaC::symbol> variables;
+    for (const Parameter& parameter : scene.parameters) variables.push_back(parameter.symbol);
+    variables.push_back(scene.time);
+    for (const Coordinate& coordinate : scene.coordinates) variables.push_back(coordinate.position);
+    for (const Coordinate& coordinate : scene.coordinates) variables.push_back(coordinate.velocity);
+    while (scene.outputs.momenta_of_kept.size() < scene.coordinates.size())
+        scene.outputs.momenta_of_kept.emplace_back("p_" + scene.coordinates[scene.outputs.momenta_of_kept.size()].name);
+    for (const GiNaC::symbol& momentum : scene.outputs.momenta_of_kept) variables.push_back(momentum);
+    variables.push_back(scene.outputs.energy_of_kept);
+    return variables;
+}
+
+std::vector<ViewFigure> figures_in(const Scene& scene, Channels& channels) {
+    std::vector<ViewFigure> all;
+    for (const DrawnFigure& drawn : figures_of(scene)) {
+        ViewFigure figure;
+        figure.kind = kind_names[static_cast<int>(drawn.figure.kind)];
+        for (const auto& corner : drawn.figure.corners) {
+            figure.places.emplace_back();
+            for (const GiNaC::ex& component : corner) figure.places.back().push_back(channels.of(component));
+        }
+        figure.colour = drawn.colour;
+        figure.trail = drawn.figure.trail;
+        figure.closed = drawn.figure.closed;
+        figure.still = drawn.still;
+        figure.many = drawn.many;
+        if (drawn.figure.kind == MovingFigure::Kind::circle) figure.radius = channels.of(drawn.figure.radius);
+        all.push_back(figure);
+    }
+    return all;
+}
+
+// The curves that [view] names, or the first coordinates, those of one unit together; a phase portrait; the energy.
+void add_curves(Viewed& viewed, const Scene& scene, Channels& channels, bool conserves) {
+    ViewMotion& motion = viewed.motion;
+    std::map<std::string, ViewChart> by_unit;
+    std::vector<std::string> order;
+    const auto curve = [&](const std::string& name, const std::string& label, const GiNaC::ex& formula) {
+        motion.curves.push_back({name, label, channels.of(formula)});
+    };
+    if (scene.plots.empty()) {
+        for (std::size_t k = 0; k < std::min(scene.coordinates.size(), most_plotted); ++k) {
+            const Coordinate& coordinate = scene.coordinates[k];
+            curve(coordinate.name, with_unit(coordinate.written, coordinate.unit), coordinate.position);
+            if (by_unit.count(coordinate.unit) == 0) order.push_back(coordinate.unit);
+            by_unit[coordinate.unit].curves.push_back(coordinate.name);
+        }
+        for (const std::string& unit : order) viewed.charts.push_back(by_unit[unit]);
+    }
+    for (const Plot& plot : scene.plots) {
+        curve(plot.text, plot.text, plot.value);
+        viewed.charts.push_back({"", {plot.text}});
+    }
+    const Coordinate& first = scene.coordinates.front();
+    motion.curves.push_back({"phase", fmt::format("p_{0} over {0}", first.name),
+                             channels.of(scene.outputs.momenta_of_kept.front()), false, channels.of(first.position)});
+    viewed.charts.push_back({"phase portrait", {"phase"}, true});
+    if (scene.outputs.energy) {
+        curve("energy", conserves ? "H - H(0)" : "H", scene.outputs.energy_of_kept);
+        viewed.charts.push_back({conserves ? "energy error" : "energy", {"energy"}});
+    }
+}
+
+// What a run keeps so that it looks smooth: states between steps, or arrivals of a clock.
+void fill_steps(Scene& scene, std::size_t most_frames) {
+    const std::size_t wanted = std::min(wanted_frames, most_frames);
+    Outputs outputs = scene.outputs;
+    outputs.every = 1;
+    outputs.dense = 0;
+    outputs.tangent = outputs.multipliers = false;
+    if (scene.clock) {
+        outputs.interval = scene.run.until / GiNaC::numeric(static_cast<long>(wanted));
+    } else if (!scene.is_cut() && scene.method.family != Family::splitting && scene.run.stops.empty()) {
+        const double steps =
+            (scene.evaluate(scene.run.until, "the end time") / scene.evaluate(scene.run.step, "the step")).to_double();
+        const double between = std::ceil(static_cast<double>(wanted) / std::max(steps, 1.0)) - 1;
+        outputs.dense = static_cast<int>(std::clamp(between, 0.0, static_cast<double>(most_dense)));
+    }
+    scene.outputs = outputs;
+}
+
+std::vector<std::vector<double>> frames_of(const States& states, const LoadedStepper<double>& stepper,
+                                           const TrajectoryRequest& request, bool conserves) {
+    const std::size_t n = request.q.size();
+    const double energy_start = states.row(0)[1 + 2 * n];
+    std::vector<std::vector<double>> frames;
+    for (std::size_t i = 0; i < states.count(); ++i) {
+        const double* const row = states.row(i);
+        const std::vector<double> q(row + 1, row + 1 + n), p(row + 1 + n, row + 1 + 2 * n);
+        std::vector<double> frame = request.parameters, velocity(n);
+        if (stepper.velocity(row[0], q, p, velocity) != LOBATTO_OK) velocity.assign(n, std::nan(""));
+        frame.push_back(row[0]);
+        for (const auto& part : {q, velocity, p}) frame.insert(frame.end(), part.begin(), part.end());
+        frame.push_back(row[1 + 2 * n] - (conserves ? energy_start : 0));
+        frames.push_back(frame);
+    }
+    return frames;
+}
+
+}  // namespace
+
+Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers) {
+    Viewed viewed;
+    viewed.title = scene.title.empty() ? scene.name : scene.title;
+    apply(overrides, scene);
+    Channels channels(scene, variables_of(scene));
+    scene.outputs.energy = true;
+    viewed.motion.figures = figures_in(scene, channels);
+    const bool conserves = derive(scene).conserves_energy();
+    add_curves(viewed, scene, channels, conserves);
+    const std::size_t most_frames = std::clamp<std::size_t>(most_numbers / channels.count(), 64, 36000);
+    fill_steps(scene, most_frames);
+
+    const Derivation derivation = derive(scene);
+    const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    TrajectoryRequest request = request_of(scene, steps_of(scene, overrides).count, stepper);
+    States states(1 + 2 * request.q.size(), most_frames);
+    request.sink = [&](const Records& records) { states.add(records); };
+    request.events = [&](const EventRecords& events) {
+        for (std::int64_t i = 0; i < events.count && viewed.motion.events.size() < most_events; ++i) {
+            const double* const row = events.rows + i * events.columns;
+            if (row[0] < static_cast<double>(scene.reported().size()))
+                viewed.motion.events.push_back({row[1], static_cast<int>(row[0])});
+        }
+    };
+    const Interruption interruption;
+    request.interrupted = interruption.flag();
+    const TrajectoryResult result = integrate(kernel, request);
+    viewed.is_interrupted = result.interrupted;
+    states.finish();
+    if (result.status != LOBATTO_OK) viewed.failure = explain_stop(result, request);
+
+    ViewMotion& motion = viewed.motion;
+    motion.label = label;
+    motion.note = fmt::format("{}, h = {:.4g}{}", scene.method.name(), request.step,
+                              scene.clock ? " in the time of a clock" : "");
+    for (std::size_t i = 0; i < states.count(); ++i) motion.times.push_back(states.row(i)[0]);
+    motion.channels = channels.values(frames_of(states, stepper, request, conserves));
+    for (const Event& event : scene.reported()) motion.event_names.push_back(event.text);
+    return viewed;
+}
+
+}  // namespace lobatto

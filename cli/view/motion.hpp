@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// A scene, run for the eye: its states at so many times that the motion looks smooth, and all that is drawn of them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/method_choice.hpp"
+#include "analysis/overrides.hpp"
+#include "cli/view/page.hpp"
+#include "generator/scene/scene.hpp"
+
+namespace lobatto {
+
+struct Viewed {
+    ViewMotion motion;
+    std::vector<ViewChart> charts;
+    std::string title;
+    bool is_interrupted = false;
+    std::string failure;  // why the motion ended early; empty: it did not
+};
+
+// `most_numbers`: of all channels together, which decides how large the page is.
+Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers);
+
+}  // namespace lobatto
