@@ -133,8 +133,8 @@ void view(const ViewCommand& options) {
     write_whole(path, "the page", page);
     if (!options.quiet) {
         for (const Viewed& one : all)
-            print_row(one.motion.label.substr(0, 24), fmt::format("{}; {} frames, {} figures", one.motion.note,
-                                                                  one.motion.times.size(), one.motion.figures.size()));
+            print_row("motion", fmt::format("{}: {}; {} frames, {} figures", one.motion.label, one.motion.note,
+                                            one.motion.times.size(), one.motion.figures.size()));
         print_row("page", fmt::format("{}, {} kB: open it in a browser", path, (page.size() + 999) / 1000));
     }
     for (const Viewed& one : all)

@@ -133,7 +133,7 @@ std::vector<DrawnFigure> profile(const std::vector<ex>& values) {
     std::vector<Place> places;
     for (std::size_t i = 0; i < values.size(); ++i) places.push_back({ex(static_cast<long>(i + 1)), values[i]});
     std::vector<DrawnFigure> drawn{line(places)};
-    drawn.front().figure.written = "profile";
+    drawn.front().profile = true;
     if (values.size() > 64) return drawn;
     for (const Place& place : places) {
         drawn.push_back(point(place, 0, false));

@@ -13,7 +13,8 @@ struct DrawnFigure {
     MovingFigure figure;
     int colour = 0;
     bool still = false;
-    bool many = false;  // one of many points
+    bool many = false;     // one of many points
+    bool profile = false;  // values over an index: the two axes are of different kinds
 };
 
 // Those of [view] and of [bodies]. Without either: bodies in the plane or in space (x, y, z, alone or arrays), with the

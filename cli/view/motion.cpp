@@ -103,8 +103,9 @@ std::string with_unit(const std::string& name, const std::string& unit) {
     return unit.empty() ? name : fmt::format("{} ({})", name, unit);
 }
 
-// The symbols that formulas of [view] may hold, in the order of a frame: parameters, t, q, velocities, p, H.
-std::vector<GiNaC::symbol> variables_of(Scene& scene) {
+// The symbols that formulas of [view] may hold, in the order of a frame: parameters, t, q, velocities, p, H,
+// H - H(0).
+std::vector<GiNaC::symbol> variables_of(Scene& scene, const GiNaC::symbol& energy_change) {
     std::vector<GiNaC::symbol> variables;
     for (const Parameter& parameter : scene.parameters) variables.push_back(parameter.symbol);
     variables.push_back(scene.time);
@@ -114,12 +115,13 @@ std::vector<GiNaC::symbol> variables_of(Scene& scene) {
         scene.outputs.momenta_of_kept.emplace_back("p_" + scene.coordinates[scene.outputs.momenta_of_kept.size()].name);
     for (const GiNaC::symbol& momentum : scene.outputs.momenta_of_kept) variables.push_back(momentum);
     variables.push_back(scene.outputs.energy_of_kept);
+    variables.push_back(energy_change);
     return variables;
 }
 
-std::vector<ViewFigure> figures_in(const Scene& scene, Channels& channels) {
+std::vector<ViewFigure> figures_in(const std::vector<DrawnFigure>& figures, Channels& channels) {
     std::vector<ViewFigure> all;
-    for (const DrawnFigure& drawn : figures_of(scene)) {
+    for (const DrawnFigure& drawn : figures) {
         ViewFigure figure;
         figure.kind = kind_names[static_cast<int>(drawn.figure.kind)];
         for (const auto& corner : drawn.figure.corners) {
@@ -138,7 +140,8 @@ std::vector<ViewFigure> figures_in(const Scene& scene, Channels& channels) {
 }
 
 // The curves that [view] names, or the first coordinates, those of one unit together; a phase portrait; the energy.
-void add_curves(Viewed& viewed, const Scene& scene, Channels& channels, bool conserves) {
+// `energy_change`: of motions that conserve it.
+void add_curves(Viewed& viewed, const Scene& scene, Channels& channels, const std::optional<GiNaC::ex>& energy_change) {
     ViewMotion& motion = viewed.motion;
     std::map<std::string, ViewChart> by_unit;
     std::vector<std::string> order;
@@ -163,8 +166,8 @@ void add_curves(Viewed& viewed, const Scene& scene, Channels& channels, bool con
                              channels.of(scene.outputs.momenta_of_kept.front()), false, channels.of(first.position)});
     viewed.charts.push_back({"phase portrait", {"phase"}, true});
     if (scene.outputs.energy) {
-        curve("energy", conserves ? "H - H(0)" : "H", scene.outputs.energy_of_kept);
-        viewed.charts.push_back({conserves ? "energy error" : "energy", {"energy"}});
+        curve("energy", energy_change ? "H - H(0)" : "H", energy_change.value_or(scene.outputs.energy_of_kept));
+        viewed.charts.push_back({energy_change ? "energy error" : "energy", {"energy"}});
     }
 }
 
@@ -187,7 +190,7 @@ void fill_steps(Scene& scene, std::size_t most_frames) {
 }
 
 std::vector<std::vector<double>> frames_of(const States& states, const LoadedStepper<double>& stepper,
-                                           const TrajectoryRequest& request, bool conserves) {
+                                           const TrajectoryRequest& request) {
     const std::size_t n = request.q.size();
     const double energy_start = states.row(0)[1 + 2 * n];
     std::vector<std::vector<double>> frames;
@@ -198,7 +201,8 @@ std::vector<std::vector<double>> frames_of(const States& states, const LoadedSte
         if (stepper.velocity(row[0], q, p, velocity) != LOBATTO_OK) velocity.assign(n, std::nan(""));
         frame.push_back(row[0]);
         for (const auto& part : {q, velocity, p}) frame.insert(frame.end(), part.begin(), part.end());
-        frame.push_back(row[1 + 2 * n] - (conserves ? energy_start : 0));
+        frame.push_back(row[1 + 2 * n]);
+        frame.push_back(row[1 + 2 * n] - energy_start);
         frames.push_back(frame);
     }
     return frames;
@@ -210,11 +214,14 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
     Viewed viewed;
     viewed.title = scene.title.empty() ? scene.name : scene.title;
     apply(overrides, scene);
-    Channels channels(scene, variables_of(scene));
+    const GiNaC::symbol energy_change;
+    Channels channels(scene, variables_of(scene, energy_change));
     scene.outputs.energy = true;
-    viewed.motion.figures = figures_in(scene, channels);
-    const bool conserves = derive(scene).conserves_energy();
-    add_curves(viewed, scene, channels, conserves);
+    const std::vector<DrawnFigure> figures = figures_of(scene);
+    viewed.motion.figures = figures_in(figures, channels);
+    viewed.motion.is_profile = figures.front().profile;
+    add_curves(viewed, scene, channels,
+               derive(scene).conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
     const std::size_t most_frames = std::clamp<std::size_t>(most_numbers / channels.count(), 64, 36000);
     fill_steps(scene, most_frames);
 
@@ -240,10 +247,10 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
 
     ViewMotion& motion = viewed.motion;
     motion.label = label;
-    motion.note = fmt::format("{}, h = {:.4g}{}", scene.method.name(), request.step,
-                              scene.clock ? " in the time of a clock" : "");
+    motion.note = fmt::format("{}h = {:.4g}{}", label == scene.method.name() ? "" : scene.method.name() + ", ",
+                              request.step, scene.clock ? " in the time of a clock" : "");
     for (std::size_t i = 0; i < states.count(); ++i) motion.times.push_back(states.row(i)[0]);
-    motion.channels = channels.values(frames_of(states, stepper, request, conserves));
+    motion.channels = channels.values(frames_of(states, stepper, request));
     for (const Event& event : scene.reported()) motion.event_names.push_back(event.text);
     return viewed;
 }

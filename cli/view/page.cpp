@@ -70,9 +70,9 @@ Json json_of(const ViewMotion& motion) {
         if (!curve.is_over_time) curves[curve.name]["x"] = curve.x;
     }
     for (const ViewEvent& event : motion.events) events.push_back({{"t", event.time}, {"kind", event.kind}});
-    return {
-        {"label", motion.label}, {"note", motion.note}, {"times", packed(times)}, {"channels", channels},
-        {"figures", figures},    {"curves", curves},    {"events", events},       {"event_names", motion.event_names}};
+    return {{"label", motion.label}, {"note", motion.note}, {"times", packed(times)},
+            {"channels", channels},  {"figures", figures},  {"profile", motion.is_profile},
+            {"curves", curves},      {"events", events},    {"event_names", motion.event_names}};
 }
 
 // In a script element nothing may look like an end of it, or like a comment.

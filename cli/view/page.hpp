@@ -37,6 +37,7 @@ struct ViewMotion {
     std::vector<double> times;
     std::vector<ViewChannel> channels;
     std::vector<ViewFigure> figures;
+    bool is_profile = false;  // the two axes are of different kinds
     std::vector<ViewCurve> curves;
     std::vector<ViewEvent> events;
     std::vector<std::string> event_names;

@@ -158,7 +158,7 @@ struct Scene {
     // run-time parameters. For pictures.
     std::vector<std::pair<GiNaC::ex, GiNaC::ex>> places;
     std::vector<DrawnBody> bodies;
-    std::vector<MovingFigure> figures;              // empty: what the coordinates tell (cli/view/figures.hpp)
+    std::vector<MovingFigure> figures;        // empty: what the coordinates tell (cli/view/figures.hpp)
     std::vector<Plot> plots;                  // likewise
     std::vector<GiNaC::ex> initial_position;  // in parameters
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters

@@ -11,9 +11,9 @@ namespace {
 
 constexpr std::size_t most_figures = 2000, most_corners = 1000, most_plots = 24;
 const std::vector<std::pair<std::string, MovingFigure::Kind>> kinds = {{"point", MovingFigure::Kind::point},
-                                                                 {"line", MovingFigure::Kind::line},
-                                                                 {"spring", MovingFigure::Kind::spring},
-                                                                 {"circle", MovingFigure::Kind::circle}};
+                                                                       {"line", MovingFigure::Kind::line},
+                                                                       {"spring", MovingFigure::Kind::spring},
+                                                                       {"circle", MovingFigure::Kind::circle}};
 const std::string figure_example = "{ line = [[0, 0], [\"l*sin(q)\", \"-l*cos(q)\"]] }";
 
 }  // namespace
@@ -102,7 +102,8 @@ void SystemReader::read_figure(const Entry& entry) {
             figure.corners.emplace_back();
             for (const Value& component : corner.items) figure.corners.back().push_back(value_of("a place", component));
         }
-        if (figure.kind == MovingFigure::Kind::spring && figure.corners.size() != 2) fail(places.at, "a spring has two ends");
+        if (figure.kind == MovingFigure::Kind::spring && figure.corners.size() != 2)
+            fail(places.at, "a spring has two ends");
         if (radius != nullptr) figure.radius = value_of("radius", radius->value);
         scene_.figures.push_back(figure);
     }

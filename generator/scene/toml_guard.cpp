@@ -66,8 +66,9 @@ private:
             source_.fail(cursor_.position(), "not valid TOML: the name of a table must follow [, for example [run]");
     }
 
-    // A list after =: numbers and texts, with commas between them; blanks, line ends and comments anywhere.
-    void skip_list() {
+    // A list after =: numbers and texts, or lists of them, with commas between them; blanks, line ends and comments
+    // anywhere.
+    void skip_list(bool is_inner = false) {
         const Position open = cursor_.position();
         bool separated = true;
         for (cursor_.advance();; separated = cursor_.front() == ',', cursor_.skip(",")) {
@@ -78,6 +79,8 @@ private:
             const char c = cursor_.front();
             if (c == '"' || c == '\'') {
                 skip_string(c);
+            } else if (c == '[' && !is_inner) {
+                skip_list(true);
             } else {
                 skip_number();
             }

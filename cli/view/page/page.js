@@ -2,7 +2,9 @@
 // Draws the motions in #data: figures whose places are channels over time, and curves beside them. No library, no net.
 (() => {
 const data = JSON.parse(document.getElementById("data").textContent);
-const palette = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#999999"];
+const on_white = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#888888"];
+const on_black = ["#56b4e9", "#ff8c42", "#2fcf9f", "#e7a0c9", "#f5c04a", "#9ad1f5", "#b79cf0", "#bbbbbb"];
+let palette = on_white;
 const by = id => document.getElementById(id);
 
 // --- Channels: numbers over frames, 16 bits each between their least and their largest; or one number.
@@ -91,7 +93,7 @@ function bold(text) {
 class Stage {
     constructor(run, index) {
         this.run = run;
-        const caption = [bold(run.label)];
+        const caption = [bold(data.runs.length > 1 ? `${index + 1}: ${run.label}` : run.label)];
         if (run.note) caption.push(" " + run.note);
         this.canvas = pane(by("scenes"), caption);
         this.spatial = run.figures.some(figure => figure.places[0].length === 3);
@@ -154,7 +156,7 @@ class Stage {
             return [this.width / 2 + this.shift[0] + this.scale * u,
                     this.height / 2 + this.shift[1] - this.scale * (a * z + b * away), b * z - a * away];
         }
-        return [this.width / 2 + this.shift[0] + this.scale * x, this.height / 2 + this.shift[1] - this.scale * y, 0];
+        return [this.width / 2 + this.shift[0] + this.scale * x, this.height / 2 + this.shift[1] - (this.run.profile ? this.upright : this.scale) * y, 0];
     }
     at(place, frame) {
         const value = k => k < place.length ? this.run.channels[place[k]].at(frame) : 0;
@@ -167,6 +169,8 @@ class Stage {
         this.scale = this.zoom * (this.spatial ? Math.min(width - room, height - room - 16) / (2 * this.radius)
             : Math.min((width - room) / (this.size[0] || 1e-9), (height - room - 16) / (this.size[1] || 1e-9)));
         if (!this.spatial) this.scale = Math.min(this.scale, this.zoom * Math.min(width, height) / Math.max(...this.size) * 2);
+        this.upright = this.zoom * (height - 2 * room) / (this.size[1] || 1);
+        if (this.run.profile) this.scale = this.zoom * (width - room) / (this.size[0] || 1);
         context.clearRect(0, 0, width, height);
         this.ground(context);
         const frame = this.run.place(time);
@@ -250,10 +254,11 @@ class Stage {
 class Chart {
     constructor(title, curves, options = {}) {
         this.curves = curves; this.options = options;
+        this.names = [];
         const caption = [];
         curves.forEach((curve, i) => {
             const name = bold(curve.label);
-            name.style.color = this.colour(i);
+            this.names.push(name);
             if (i > 0) caption.push(" · ");
             caption.push(name);
         });
@@ -300,6 +305,7 @@ class Chart {
         this.picture.width = this.canvas.width; this.picture.height = this.canvas.height;
         const context = this.picture.getContext("2d");
         context.setTransform(ratio, 0, 0, ratio, 0, 0);
+        this.names.forEach((name, i) => { name.style.color = this.colour(i); });
         this.scales(width, height);
         const [left, right, low, high] = this.range;
         context.font = "11px system-ui, sans-serif";
@@ -374,7 +380,7 @@ for (const group of data.charts) {
     data.runs.forEach((run, r) => group.curves.forEach((name, i) => {
         const curve = run.curves[name];
         if (!curve) return;
-        curves.push({ run, label: several ? `${curve.label} (${run.label})` : curve.label, y: run.channels[curve.y],
+        curves.push({ run, label: several ? `${r + 1}: ${curve.label}` : curve.label, y: run.channels[curve.y],
                       x: curve.x === undefined ? undefined : run.channels[curve.x], colour: r * group.curves.length + i });
     }));
     if (curves.length) charts.push(new Chart(group.title, curves, { phase: group.phase }));
@@ -383,7 +389,9 @@ for (const group of data.charts) {
 const prefers_dark = window.matchMedia("(prefers-color-scheme: dark)");
 let chosen = null, fresh = true;
 function show_theme() {
-    document.documentElement.classList.toggle("dark", chosen ?? prefers_dark.matches);
+    const dark = chosen ?? prefers_dark.matches;
+    document.documentElement.classList.toggle("dark", dark);
+    palette = dark ? on_black : on_white;
     read_ink();
     redraw = fresh = true;
 }

@@ -462,7 +462,7 @@ TEST_CASE("lists, counts and elements that do not fit are refused") {
     check_error_of_chain(4, "x = { position = [1, true, 3], velocity = 0 }", {4, 22},
                          "a list in a scene holds numbers, and formulas in quotes");
     check_error_of_chain(4, "x = { position = [1, [2], 3], velocity = 0 }", {4, 22},
-                         "a list in a scene holds numbers, and formulas in quotes");
+                         "position 2 must be a number or a formula in quotes, not a list");
     check_error_of_chain(4, "x = { position = [1 2, 3], velocity = 0 }", {4, 21}, "a comma is missing before this");
     check_error_of_chain(7, "m = [1, 2", {8, 1}, "a comma is missing before this");
     check_error_of_chain(25, "events = [\"t = 1\", ", {25, 10}, "this list is not closed: add a ]");
