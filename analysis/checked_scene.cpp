@@ -77,13 +77,20 @@ std::string json_of(const Checked& checked) {
         findings.push_back({{"name", finding.name}, {"holds", finding.holds}, {"reason", finding.reason}});
     for (const GroupSolve& solve : solves_of(derivation)) {
         Json names = Json::array();
-        for (const int k : solve.coordinates) names.push_back(scene.coordinates[static_cast<std::size_t>(k)].written);
+        for (const int k : solve.coordinates) {
+            const auto i = static_cast<std::size_t>(k);
+            names.push_back(i < scene.coordinates.size()
+                                ? scene.coordinates[i].written
+                                : "lambda_" + scene.constraints[i - scene.coordinates.size()].name);
+        }
         groups.push_back(
             {{"coordinates", names}, {"unknowns", solve.unknowns}, {"band", solve.band}, {"method", solve.method}});
     }
     for (const CheckedOutput& output : checked.outputs)
         outputs.push_back({{"name", output.name}, {"asked", output.asked}, {"operations", output.operations}});
-    const Json json{{"name", scene.name},
+    const Json json{{"format", 1},
+                    {"command", "check"},
+                    {"name", scene.name},
                     {"title", scene.title},
                     {"lagrangian", scene.lagrangian_text},
                     {"kind", kind_of(derivation)},

@@ -65,13 +65,15 @@ void describe(CommandLine& program) {
     add_view(program);
     add_plot(program);
     add_schema(program);
+    add_manual(program);
     add_gallery(program);
     add_paper(program);
     // Last, because a command takes over the footer that its parent has at that moment.
     program.footer(
         "Example:\n"
         "  lobatto run scenes/pendulum.toml\n\n"
-        "`lobatto COMMAND --help` explains a command. In the source tree, `./lobatto test` runs the tests.");
+        "`lobatto COMMAND --help` explains a command. In the source tree, `./lobatto test` runs the tests.\n"
+        "Exit codes: 0 done, 2 wrong input, 3 failed computation, 4 failed compiler or machine, 130 interrupted.");
 }
 
 }  // namespace

@@ -19,9 +19,28 @@ string(REGEX REPLACE "/$" "" PKGCONFIG_TO_PREFIX "${PKGCONFIG_TO_PREFIX}")
 configure_file(${CMAKE_CURRENT_SOURCE_DIR}/cmake/lobatto.pc.in ${PROJECT_BINARY_DIR}/lobatto.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/lobatto.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes ${PROJECT_SOURCE_DIR}/examples ${PROJECT_SOURCE_DIR}/LICENSES DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
 install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE.md DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+
+# Manual pages, completions and the schema of scenes come from the program itself.
+set(MANUAL_DIR ${PROJECT_BINARY_DIR}/manual)
+cmake_policy(SET CMP0087 NEW)
+install(CODE "
+    file(MAKE_DIRECTORY ${MANUAL_DIR})
+    set(lobatto $<TARGET_FILE:lobatto>)
+    execute_process(COMMAND \${lobatto} manual -o ${MANUAL_DIR}/man1 OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND \${lobatto} schema -o ${MANUAL_DIR}/scene.schema.json COMMAND_ERROR_IS_FATAL ANY)
+    foreach(shell bash zsh fish)
+        execute_process(COMMAND \${lobatto} manual --completions \${shell} OUTPUT_FILE ${MANUAL_DIR}/lobatto.\${shell}
+            COMMAND_ERROR_IS_FATAL ANY)
+    endforeach()")
+install(DIRECTORY ${MANUAL_DIR}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR})
+install(FILES ${MANUAL_DIR}/lobatto.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME lobatto)
+install(FILES ${MANUAL_DIR}/lobatto.zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions RENAME _lobatto)
+install(FILES ${MANUAL_DIR}/lobatto.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+install(FILES ${MANUAL_DIR}/scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME lobatto)

@@ -103,7 +103,7 @@ const std::vector<Room> rooms = {
     {"library/include/lobatto", {}},
     {"library", {"library/include/lobatto", "analysis", "generator", "runtime"}},
     {"cli/options", {"analysis", "generator", "runtime"}},
-    {"cli/print", {"analysis", "generator", "runtime"}},
+    {"cli/print", {"analysis", "generator", "runtime", "cli/options"}},
     {"cli/paper", {"analysis", "generator", "runtime", "cli/print"}},
     {"cli/view", {"analysis", "generator", "runtime", "cli/print"}},
     {"cli/plot", {"generator/formula", "runtime", "cli/print"}},

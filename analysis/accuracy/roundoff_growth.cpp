@@ -124,7 +124,8 @@ struct Course {
 };
 
 Course follow(const Kernels& kernels, StartIn<double> in_double, double step, int number,
-              const std::vector<std::int64_t>& looks, const volatile int* interrupted) {
+              const std::vector<std::int64_t>& looks, const volatile int* interrupted,
+              const std::function<void(std::int64_t)>& taken) {
     const double factor = 1 + number * 0x1p-20;
     for (double& q : in_double.q) q *= factor;
     for (double& p : in_double.p) p *= factor;
@@ -162,6 +163,7 @@ Course follow(const Kernels& kernels, StartIn<double> in_double, double step, in
             plain.advance(more);
             clean.advance(more);
             if (reference) reference->advance(more);
+            taken(more);
         }
         if (plain.taken < look) break;
         if (reference) {
@@ -240,7 +242,7 @@ RoundoffGrowth growth_of(const std::vector<Course>& courses, std::vector<Differe
 }  // namespace
 
 RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, bool reference,
-                               const volatile int* interrupted) {
+                               const volatile int* interrupted, const std::function<void(std::int64_t)>& progress) {
     scene.outputs.energy = true;
     scene.outputs.tangent = false;
     scene.outputs.dense = 0;
@@ -266,6 +268,11 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
     std::atomic<int> next = 0;
     std::mutex guard;
     std::exception_ptr failure;
+    std::int64_t done = 0;
+    const auto taken = [&](std::int64_t more) {
+        const std::lock_guard lock(guard);
+        progress(done += more);
+    };
     {
         std::vector<std::jthread> workers;
         const int count =
@@ -273,7 +280,8 @@ RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories
         for (int worker = 0; worker < count; ++worker)
             workers.emplace_back([&] {
                 for (int i = next++; i < trajectories; i = next++) try {
-                        courses[static_cast<std::size_t>(i)] = follow(kernels, in_double, step, i, looks, interrupted);
+                        courses[static_cast<std::size_t>(i)] =
+                            follow(kernels, in_double, step, i, looks, interrupted, taken);
                     } catch (...) {
                         const std::lock_guard lock(guard);
                         if (!failure) failure = std::current_exception();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "generator/scene/scene.hpp"
@@ -41,7 +42,9 @@ struct RoundoffResult {
 // with nothing. ComputationError where a step fails; InputError without a constant mass matrix, and where energies
 // would be compared that the motion does not conserve. Ends soon after `interrupted` is raised: with the trajectories
 // that were at their end, or, where none was, as far as all had come that had begun.
-RoundoffResult roundoff_growth(Scene scene, std::int64_t steps, int trajectories, bool reference,
-                               const volatile int* interrupted);
+// `progress` hears now and then how many steps of all trajectories are done, from one thread at a time.
+RoundoffResult roundoff_growth(
+    Scene scene, std::int64_t steps, int trajectories, bool reference, const volatile int* interrupted,
+    const std::function<void(std::int64_t)>& progress = [](std::int64_t) {});
 
 }  // namespace lobatto

@@ -287,7 +287,8 @@ void symplecticity_on_constraints(std::vector<ProofRow>& rows, const Kernel& exa
 
 }  // namespace
 
-Proof prove(const Scene& written, const MethodChoice& method) {
+Proof prove(const Scene& written, const MethodChoice& method, const std::function<void(const std::string&)>& say) {
+    say("deriving and compiling");
     Scene scene = in_clock_time(written);  // a clock is another Lagrangian, whose steps are equal
     scene.clock.reset();
     method.apply(scene);
@@ -311,6 +312,7 @@ Proof prove(const Scene& written, const MethodChoice& method) {
 
     Proof proof{scene.title, scene.method.name(), {}, {}};
     std::vector<ProofRow>& rows = proof.rows;
+    say("checking quadrature, equations and programs");
     for (const auto& checks : {check_quadrature(derivation.quadrature), check_equations(derivation),
                                check_programs(with_walls, optimised_programs(with_walls).programs)})
         for (const Check& check : checks) rows.push_back(row_of(check));
@@ -322,6 +324,7 @@ Proof prove(const Scene& written, const MethodChoice& method) {
     if (written.clock)
         rows.push_back({"steps, from here on", "of the clock " + written.clock->text, "equal in its time", true, ""});
     if (scene.is_cut()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
+    say("checking steps");
     taken_steps(rows, derivation, kernel, exact_kernel, start, exact);
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
@@ -335,10 +338,12 @@ Proof prove(const Scene& written, const MethodChoice& method) {
     const double of_decimals =
         scene.method.family == Family::splitting ? 100 * std::pow(10.0, -splitting_of(scene.method.points).digits) : 0;
     Convergence& convergence = proof.convergence;
+    say("measuring the order of convergence");
     rows.push_back(decided("order of convergence", [&] {
         convergence = measure_order(exact_kernel, quadruple_start, start.step, of_decimals);
         return order(convergence, exact_kernel, quadruple_start);
     }));
+    say("checking momenta and energy over long runs");
     momenta(rows, kernel, start, scene);
     const std::string energy_claim = "H in double against quadruple";
     const double defect = energy_defect(kernel, exact_kernel, start.parameters, start.step, states);

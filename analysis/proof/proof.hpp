@@ -2,6 +2,7 @@
 // Everything that can be checked of a scene without a paper, from the quadrature to the running kernel.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ struct Proof {
 };
 
 // InputError, ComputationError where not even a first step can be taken.
-Proof prove(const Scene& written, const MethodChoice& method);
+// `say` hears what is being checked.
+Proof prove(
+    const Scene& written, const MethodChoice& method,
+    const std::function<void(const std::string&)>& say = [](const std::string&) {});
 
 }  // namespace lobatto

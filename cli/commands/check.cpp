@@ -2,14 +2,21 @@
 // lobatto check: what the generator found in a scene, what it did with it, and what that saved.
 #include <fmt/format.h>
 #include <fmt/ostream.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <filesystem>
 #include <iostream>
+#include <thread>
 
 #include "analysis/checked_scene.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/print/interruption.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/describe/explain.hpp"
+#include "runtime/error.hpp"
 
 namespace lobatto {
 
@@ -20,6 +27,7 @@ struct CheckCommand {
     MethodOption method;
     bool general = false;
     bool json = false;
+    bool watch = false;
 };
 
 // A label and a text, the text broken at blanks.
@@ -85,26 +93,57 @@ void print(const Checked& checked) {
     print_row("derived and written in", fmt::format("{:.2f} s", checked.seconds));
 }
 
+void check(const CheckCommand& options) {
+    Scene scene = read_scene(options.scene);
+    options.method.apply(scene);
+    const Checked checked = check_scene(std::move(scene), options.general);
+    if (options.json)
+        std::cout << json_of(checked) << '\n';
+    else
+        print(checked);
+}
+
+// The time of its last change, and its size; another one after every save.
+std::pair<std::filesystem::file_time_type, std::uintmax_t> state_of(const std::string& path) {
+    std::error_code ignored;
+    return {std::filesystem::last_write_time(path, ignored), std::filesystem::file_size(path, ignored)};
+}
+
+// Again after every save, until it is interrupted. An error is told, and the next save is waited for.
+void keep_checking(const CheckCommand& options) {
+    constexpr auto pause = std::chrono::milliseconds(100);
+    const bool on_terminal = isatty(STDOUT_FILENO) == 1;
+    const Interruption interruption;
+    while (*interruption.flag() == 0) {
+        const auto seen = state_of(options.scene);
+        if (on_terminal) fmt::print(std::cout, "\033[2J\033[H");
+        try {
+            check(options);
+        } catch (const InputError& error) {
+            tell("{}\n", error.what());
+        } catch (const ComputationError& error) {
+            tell("lobatto: {}\n", error.what());
+        }
+        fmt::print(std::cout, "\n(waiting for {} to be saved; Ctrl-C ends)\n\n", options.scene);
+        std::cout.flush();
+        while (*interruption.flag() == 0 && state_of(options.scene) == seen) std::this_thread::sleep_for(pause);
+    }
+    throw ExitCode{interrupted_exit};
+}
+
 }  // namespace
 
 void add_check(CommandLine& program) {
     const auto options = std::make_shared<CheckCommand>();
     Command command =
         program.command("check", "Say in plain words what was found in a scene, and what its kernel leaves out");
-    command.option("scene", options->scene, "the scene file").required();
+    command.option("SCENE", options->scene, "Scene file").required();
     options->method.add_to(command);
-    command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+    command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
     add_json_option(command, options->json);
+    command.flag("--watch", options->watch, "Print again whenever the scene is saved");
     command.footer("Example:\n  lobatto check scenes/two_pendulums.toml");
-    command.does([options] {
-        Scene scene = read_scene(options->scene);
-        options->method.apply(scene);
-        const Checked checked = check_scene(std::move(scene), options->general);
-        if (options->json)
-            std::cout << json_of(checked) << '\n';
-        else
-            print(checked);
-    });
+    command.does([options] { options->watch ? keep_checking(*options) : check(*options); });
 }
 
 }  // namespace lobatto

@@ -17,6 +17,7 @@ void add_derive(CommandLine& program);
 void add_emit(CommandLine& program);
 void add_gallery(CommandLine& program);
 void add_run(CommandLine& program);
+void add_manual(CommandLine& program);
 void add_new(CommandLine& program);
 void add_paper(CommandLine& program);
 void add_plot(CommandLine& program);

@@ -32,9 +32,9 @@ void derive_scene(const DeriveCommand& options) {
 void add_derive(CommandLine& program) {
     const auto options = std::make_shared<DeriveCommand>();
     Command command = program.command("derive", "Show how the integrator of a scene follows from its Lagrangian");
-    command.option("scene", options->scene, "the scene file").required();
+    command.option("SCENE", options->scene, "Scene file").required();
     options->method.add_to(command);
-    const Option latex = command.flag("--latex", options->latex, "a complete LaTeX document");
+    const Option latex = command.flag("--latex", options->latex, "A complete LaTeX document");
     add_json_option(command, options->json).excludes(latex);
     command.footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");
     command.does([options] { derive_scene(*options); });

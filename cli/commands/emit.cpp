@@ -174,24 +174,24 @@ void emit_scene(const EmitCommand& options) {
 void add_emit(CommandLine& program) {
     const auto options = std::make_shared<EmitCommand>();
     Command command = program.command("emit", "Write the integrator of a scene as a C++ header");
-    command.option("scene", options->scene, "the scene file").required();
-    command.option("-o,--output", options->folder, "folder for NAME.hpp and the kernel.hpp that it includes")
+    command.option("SCENE", options->scene, "Scene file").required();
+    command.option("-o,--output", options->folder, "Folder for NAME.hpp and the kernel.hpp that it includes")
         .required()
         .shown_as("FOLDER");
     options->method.add_to(command);
     const Option general =
-        command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+        command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
     const Option standalone =
-        command.flag("--standalone", options->standalone, "one file that carries kernel.hpp inside");
+        command.flag("--standalone", options->standalone, "One file that carries kernel.hpp inside");
     const Option no_support =
-        command.flag("--no-support", options->no_support, "do not write kernel.hpp; you provide it with -I")
+        command.flag("--no-support", options->no_support, "Do not write kernel.hpp; you provide it with -I")
             .excludes(standalone);
     command
-        .flag("--ensemble", options->ensemble, "with --standalone: also lobatto::Ensemble, trajectories side by side")
+        .flag("--ensemble", options->ensemble, "With --standalone: also lobatto::Ensemble, trajectories side by side")
         .excludes(no_support);
     command
         .flag("--plain", options->plain,
-              "the integrator as a textbook prints it: one short C++17 header, to read and to copy; slower")
+              "The integrator as a textbook prints it: one short C++17 header, to read and to copy; slower")
         .excludes(standalone)
         .excludes(no_support)
         .excludes(general);

@@ -13,6 +13,7 @@
 #include "cli/print/answers_json.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/gallery_picture.hpp"
+#include "cli/print/progress.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -104,7 +105,9 @@ void gallery(const GalleryCommand& options) {
         "and drew\nwhat came out. Click a title for the scene.\n";
     std::size_t failed = 0;
     std::vector<Drawn> drawn;
+    Progress progress(std::ssize(paths));
     for (const std::string& path : paths) {
+        progress.show(&path - paths.data());
         try {
             Scene scene = read_scene(path);
             const Picture picture = picture_of_scene(scene);
@@ -138,8 +141,8 @@ void gallery(const GalleryCommand& options) {
 void add_gallery(CommandLine& program) {
     const auto options = std::make_shared<GalleryCommand>();
     Command command = program.command("gallery", "Run scenes and draw one picture of each");
-    command.option("scenes", options->scenes, "scene files (default: all in the folder scenes)");
-    command.option("-o,--output", options->folder, "folder for the pictures (default: docs/gallery)")
+    command.option("SCENES", options->scenes, "Scene files (default: all in the folder scenes)");
+    command.option("-o,--output", options->folder, "Folder for the pictures (default: docs/gallery)")
         .shown_as("FOLDER");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto gallery -o pictures scenes/kepler.toml scenes/pleiades.toml");

@@ -79,8 +79,8 @@ void make_new(const NewCommand& options) {
 void add_new(CommandLine& program) {
     Command command = program.command("new", "Write a commented scene to begin with");
     const auto options = std::make_shared<NewCommand>();
-    command.option("kind", options->kind, "What it is of; --list shows them");
-    command.option("name", options->name, "The file, NAME or NAME.toml (default: as the kind)");
+    command.option("KIND", options->kind, "What it is of; --list shows them");
+    command.option("NAME", options->name, "The file, NAME or NAME.toml (default: as the kind)");
     command.flag("--list", options->list, "Show the kinds with a line each");
     command.footer("Example:\n  lobatto new --list");
     command.does([options] { make_new(*options); });

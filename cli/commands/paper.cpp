@@ -8,6 +8,7 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/paper/document.hpp"
+#include "cli/print/say.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 
@@ -22,12 +23,16 @@ struct PaperOptions {
 
 void validate(const PaperOptions& options) {
     output_folder(options.folder + (options.figures ? "/paper" : ""), "");
+    Say now;
+    now("checking every formula");
     std::vector<paper::Finding> findings;
     for (const paper::Statement& statement : paper::statements()) findings.push_back(paper::judge(statement));
     const auto say = [&](const std::string& text) {
         if (!options.json) fmt::print("{}", text);
     };
+    now.clear();
     say(walk_lines(findings));
+    now("running the experiments of the tables");
 
     const std::vector<PaperTable> tables{table_1(), table_2()};
     std::string document = walk_document(findings);
@@ -40,13 +45,16 @@ void validate(const PaperOptions& options) {
         "for N = 10, so that 1e−14 is some ten units of rounding; for the midpoint rule the row shows H itself, which "
         "it "
         "preserves.\n";
+    now.clear();
     for (const PaperTable& table : tables) {
         say(table_lines(table));
         document += table_document(table);
     }
 
     if (options.figures) {
+        now("running the experiments of the figures");
         const std::vector<Figure> figures = draw_figures(options.folder + "/paper");
+        now.clear();
         say(growth_lines(figures));
         document += figure_document(figures);
     }
@@ -73,7 +81,8 @@ void validate(const PaperOptions& options) {
 void add_paper(CommandLine& program) {
     Command command = program.command("paper", "Check every formula, table and figure of the paper behind the method");
     const auto options = std::make_shared<PaperOptions>();
-    command.option("-o,--output", options->folder, "Folder for paper.md and paper/figure1.svg … (default: out)");
+    command.option("-o,--output", options->folder, "Folder for paper.md and paper/figure1.svg … (default: out)")
+        .shown_as("FOLDER");
     command.flag("--figures,!--no-figures", options->figures,
                  "Draw the figures with gnuplot (default), or leave them out");
     add_json_option(command, options->json);

@@ -122,18 +122,19 @@ void add_plot(CommandLine& program) {
     Command command =
         program.command("plot", "Draw the columns of trajectories and tables: SVG, PNG, or in the terminal");
     const auto options = std::make_shared<PlotCommand>();
-    command.option("files", options->files, "What runs and sweeps wrote: .csv or .npy; several in one picture")
-        .required()
-        .shown_as("FILE");
+    command.option("FILES", options->files, "What runs and sweeps wrote: .csv or .npy; several in one picture")
+        .required();
     command.option("--x", options->x, "The column along the x axis (default: the first one)").shown_as("COLUMN");
     command.option("--y", options->y, "Columns of one panel, with commas between; repeated: one more panel")
         .one_value_each()
         .shown_as("COLUMNS");
-    command.choice("--log", options->log, {{"x", Log::x}, {"y", Log::y}, {"xy", Log::xy}}, "Axes that are logarithmic");
+    command.choice("--log", options->log, {{"x", Log::x}, {"y", Log::y}, {"xy", Log::xy}}, "Axes that are logarithmic")
+        .shown_as("AXES");
     command.flag("--points", options->points, "Dots instead of lines");
     command.flag("--events", options->events, "Mark the events that stand in the file beside a run's");
     const Option output =
-        command.option("-o,--output", options->output, "Picture, .svg or .png (default: out/NAME.svg)");
+        command.option("-o,--output", options->output, "Picture, .svg or .png (default: out/NAME.svg)")
+            .shown_as("FILE");
     command.flag("--terminal", options->terminal, "Draw in characters, on standard output").excludes(output);
     command.footer("Example:\n  lobatto plot out/pendulum.csv --x q --y p_q");
     command.does([options] { plot(*options); });

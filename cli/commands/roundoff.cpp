@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 
 #include "analysis/accuracy/roundoff_growth.hpp"
 #include "analysis/motion.hpp"
@@ -13,6 +14,7 @@
 #include "cli/print/answers_json.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/interruption.hpp"
+#include "cli/print/progress.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/mechanics/clock.hpp"
@@ -114,8 +116,11 @@ void roundoff(const RoundoffCommand& options) {
                       table = folder + "/roundoff.csv";
     keep_scene(path, table);
     const Interruption interruption;
-    const RoundoffResult result = roundoff_growth(std::move(scene), options.steps, options.trajectories,
-                                                  !options.no_reference, Interruption::flag());
+    std::optional<Progress> progress(std::in_place, options.steps * options.trajectories);
+    const RoundoffResult result =
+        roundoff_growth(std::move(scene), options.steps, options.trajectories, !options.no_reference,
+                        Interruption::flag(), [&](std::int64_t done) { progress->show(done); });
+    progress.reset();
     const auto say = [&](const std::string& text) {
         if (!options.json) fmt::print("{}", text);
     };
@@ -154,16 +159,19 @@ void add_roundoff(CommandLine& program) {
     const auto options = std::make_shared<RoundoffCommand>();
     Command command = program.command(
         "roundoff", "Measure how errors of rounding grow in long runs, in plain and in clean arithmetic");
-    command.option("scene", options->scene, "Scene file").required();
-    command.option("--steps", options->steps, "how many (default 100000)").between(10, 1000000000);
-    command.option("--trajectories", options->trajectories, "whose mean is taken (default 16)").between(2, 1000);
+    command.option("SCENE", options->scene, "Scene file").required();
+    command.option("--steps", options->steps, "How many (default: 100000)").shown_as("N").between(10, 1000000000);
+    command.option("--trajectories", options->trajectories, "Whose mean is taken (default: 16)")
+        .shown_as("N")
+        .between(2, 1000);
     options->method.add_members_to(command);
     add_step_option(command, options->overrides);
     add_set_option(command, options->overrides);
-    command.option("-o,--output", options->output, "Folder of the table and the picture (default: out/NAME_roundoff)");
+    command.option("-o,--output", options->output, "Folder of the table and the picture (default: out/NAME_roundoff)")
+        .shown_as("FOLDER");
     command.flag("--no-reference", options->no_reference,
-                 "without the steps in long double, which take most of the time: energies alone, against H(0)");
-    command.flag("--no-picture", options->no_picture, "the table alone, without gnuplot");
+                 "Without the steps in long double, which take most of the time: energies alone, against H(0)");
+    command.flag("--no-picture", options->no_picture, "The table alone, without gnuplot");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
     command.does([options] { roundoff(*options); });

@@ -330,21 +330,21 @@ void add_run(CommandLine& program) {
     Command command =
         program.command("run", "Derive, compile and run a scene; write its trajectory and say how good it is");
     const auto options = std::make_shared<RunOptions>();
-    command.option("scene", options->scene, "Scene file").required();
-    command.option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)");
+    command.option("SCENE", options->scene, "Scene file").required();
+    command.option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)").shown_as("FILE");
     options->method.add_to(command);
-    command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
+    command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
     add_step_option(command, options->overrides);
     add_until_option(command, options->overrides);
-    command.option("--every", options->overrides.every, "Keep every EVERY-th state");
+    command.option("--every", options->overrides.every, "Keep every N-th state").shown_as("N");
     add_set_option(command, options->overrides);
     command.flag(
         "--resume", options->resume,
-        "continue the same run where it was interrupted or killed; its files are then the same, byte for byte");
+        "Continue the same run where it was interrupted or killed; its files are then the same, byte for byte");
     command.flag("--unmeasured", options->unmeasured,
-                 "do not measure the error by a companion, the same run with 2/3 of the step on another processor");
+                 "Do not measure the error by a companion, the same run with 2/3 of the step on another processor");
     command.flag("--beyond-horizon", options->beyond_horizon,
-                 "go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
+                 "Go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");

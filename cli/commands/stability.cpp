@@ -111,11 +111,12 @@ void add_stability(CommandLine& program) {
     const auto options = std::make_shared<StabilityCommand>();
     Command command = program.command(
         "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
-    command.option("scene", options->scene, "the scene file (default: none, every member of both families)");
+    command.option("SCENE", options->scene, "Scene file (default: none, every member of both families)");
     options->method.add_to(command);
     add_step_option(command, options->overrides);
     add_set_option(command, options->overrides);
-    command.option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
+    command.option("--chart", options->chart, "Draw trace and growth, theory and measurement, into this SVG file")
+        .shown_as("FILE");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
     command.does([options] { options->scene ? show_scene(*options) : show_members(*options); });

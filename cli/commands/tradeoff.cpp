@@ -50,7 +50,7 @@ void tradeoff(const TradeoffOptions& options) {
     const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
 
     const Interruption interruption;
-    Say say;
+    Say say(seconds);
     ExperimentRequest request;
     request.seconds = seconds;
     request.store = folder + "/measurements.jsonl";
@@ -103,8 +103,9 @@ void add_tradeoff(CommandLine& program) {
     Command command =
         program.command("tradeoff", "Measure what accuracy costs: the family, steps and number types on a scene");
     const auto options = std::make_shared<TradeoffOptions>();
-    command.option("scene", options->scene, "Scene file").required();
-    command.option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)");
+    command.option("SCENE", options->scene, "Scene file").required();
+    command.option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)")
+        .shown_as("FOLDER");
     options->budget.add_to(command);
     add_until_option(command, options->overrides);
     add_set_option(command, options->overrides);

@@ -71,7 +71,7 @@ void tune(const TuneOptions& options) {
     Scene scene = written;
     apply(options.overrides, scene);
     const Interruption interruption;
-    Say say;
+    Say say(options.budget.seconds());
     ChoiceRequest request;
     request.error = error;
     request.seconds = options.budget.seconds();
@@ -100,8 +100,9 @@ void tune(const TuneOptions& options) {
 void add_tune(CommandLine& program) {
     Command command = program.command("tune", "Choose the cheapest method and step that keep a promised accuracy");
     const auto options = std::make_shared<TuneOptions>();
-    command.option("scene", options->scene, "Scene file").required();
+    command.option("SCENE", options->scene, "Scene file").required();
     command.option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
+        .shown_as("ERROR")
         .required();
     add_until_option(command, options->overrides);
     options->budget.add_to(command);

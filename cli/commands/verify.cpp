@@ -9,6 +9,7 @@
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/print/answers_json.hpp"
+#include "cli/print/say.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -39,7 +40,9 @@ void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
 }
 
 void verify(const VerifyOptions& options) {
-    const Proof proof = prove(read_scene(options.scene), options.method);
+    Say say;
+    const Proof proof = prove(read_scene(options.scene), options.method, [&](const std::string& what) { say(what); });
+    say.clear();
     if (options.json) {
         fmt::print("{}", json_of_proof(options.scene, proof));
     } else {
@@ -57,7 +60,7 @@ void add_verify(CommandLine& program) {
     Command command =
         program.command("verify", "Check a scene's equations, its emitted code and the promises of its integrator");
     const auto options = std::make_shared<VerifyOptions>();
-    command.option("scene", options->scene, "Scene file").required();
+    command.option("SCENE", options->scene, "Scene file").required();
     options->method.add_to(command);
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");

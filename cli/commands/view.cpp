@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <sstream>
 
 #include "cli/commands/commands.hpp"
@@ -11,6 +12,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
+#include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "cli/view/motion.hpp"
@@ -90,13 +92,20 @@ std::vector<Viewed> motions_of(const ViewCommand& options) {
     if (count > most_motions)
         throw InputError(fmt::format("{} motions on one page; at most {}: name fewer scenes", count, most_motions));
     std::vector<Viewed> all;
+    std::optional<Progress> progress;
+    const auto show_progress = [&](std::int64_t done, std::int64_t steps) {
+        if (!progress) progress.emplace(steps);
+        progress->show(done);
+        if (done >= steps) progress.reset();
+    };
     for (const std::string& path : options.scenes) {
         Scene scene = read_scene(path);
         options.method.apply(scene);
         MethodOption::require_double(scene, "view");
         const std::string label =
             options.scenes.size() > 1 || options.beside.empty() ? scene.title : scene.method.name();
-        all.push_back(viewed_motion(scene, options.overrides, label, numbers_on_page / count));
+        progress.reset();
+        all.push_back(viewed_motion(scene, options.overrides, label, numbers_on_page / count, show_progress));
         for (const std::string& text : options.beside) {
             const Beside beside = beside_of(text);
             check_size(beside.method);
@@ -104,7 +113,8 @@ std::vector<Viewed> motions_of(const ViewCommand& options) {
             beside.method.apply(other);
             Overrides overrides = options.overrides;
             if (!beside.step.empty()) overrides.step = beside.step;
-            all.push_back(viewed_motion(other, overrides, other.method.name(), numbers_on_page / count));
+            progress.reset();
+            all.push_back(viewed_motion(other, overrides, other.method.name(), numbers_on_page / count, show_progress));
         }
     }
     return all;
@@ -154,12 +164,13 @@ void view(const ViewCommand& options) {
 void add_view(CommandLine& program) {
     Command command = program.command("view", "Run scenes and write a page on which they move");
     const auto options = std::make_shared<ViewCommand>();
-    command.option("scenes", options->scenes, "Scene files; several stand side by side").required();
+    command.option("SCENES", options->scenes, "Scene files; several stand side by side").required();
     command
         .option("--beside", options->beside,
                 "The same scene once more, by another method or step: \"points=2 step=0.1\"; may be repeated")
+        .shown_as("CHOICE")
         .one_value_each();
-    command.option("-o,--output", options->output, "Page (default: out/NAME.html)");
+    command.option("-o,--output", options->output, "Page (default: out/NAME.html)").shown_as("FILE");
     options->method.add_to(command);
     add_step_option(command, options->overrides);
     add_until_option(command, options->overrides);

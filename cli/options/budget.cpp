@@ -17,7 +17,7 @@ constexpr double least = 1, most = 86400;
 }  // namespace
 
 void BudgetOption::add_to(Command& command) {
-    command.option("--budget", text, "Time it may take, as in 30s or 5min").show_default();
+    command.option("--budget", text, "Time it may take, as in 30s or 5min").shown_as("TIME").show_default();
 }
 
 double BudgetOption::seconds() const {

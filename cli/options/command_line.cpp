@@ -4,11 +4,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <iostream>
 #include <limits>
 #include <map>
+#include <sstream>
 #include <system_error>
+
+#include "generator/formula/suggest.hpp"
 
 namespace lobatto {
 
@@ -30,6 +34,66 @@ std::string whole_number_complaint(const std::string& number) {
     return fmt::format("a whole number in digits is wanted, at most {}, not {}", std::numeric_limits<Integer>::max(),
                        number);
 }
+
+// "TYPE:{plain,clean}": what the value is called, and what there is to say of it.
+std::pair<std::string, std::string> value_of(const CLI::Option& option) {
+    const std::string type = option.get_type_name();
+    const std::size_t colon = type.find(':');
+    return {type.substr(0, colon), colon == std::string::npos ? "" : type.substr(colon + 1)};
+}
+
+// Of "{plain,clean}".
+std::vector<std::string> words_in(const std::string& limits) {
+    std::vector<std::string> words;
+    if (!limits.starts_with('{') || !limits.ends_with('}')) return words;
+    std::istringstream list(limits.substr(1, limits.size() - 2));
+    for (std::string word; std::getline(list, word, ',');) words.push_back(word);
+    return words;
+}
+
+// ": plain, clean", or " (2 to 12)" of "INT in [2 - 12]".
+std::string limits_text(const std::string& limits) {
+    if (const auto words = words_in(limits); !words.empty()) return fmt::format(": {}", fmt::join(words, ", "));
+    const std::size_t open = limits.find('['), dash = limits.find(" - ");
+    if (open == std::string::npos || dash == std::string::npos) return "";
+    return fmt::format(" ({} to {})", limits.substr(open + 1, dash - open - 1),
+                       limits.substr(dash + 3, limits.size() - dash - 4));
+}
+
+std::string capital(std::string word) {
+    if (word.front() >= 'a' && word.front() <= 'z') word.front() = static_cast<char>(word.front() - 'a' + 'A');
+    return word;
+}
+
+std::string described(const CLI::Option& option) {
+    std::string text = option.get_description();
+    if (option.get_type_size() == 0) return text;
+    const std::string limits = limits_text(value_of(option).second);
+    const std::vector<std::string> words = words_in(value_of(option).second);
+    const bool are_named = !words.empty() && std::all_of(words.begin(), words.end(), [&](const std::string& word) {
+        return text.find(word) != std::string::npos || text.find(capital(word)) != std::string::npos;
+    });
+    if (!are_named) text += limits;
+    if (!option.get_default_str().empty()) text += " (default: " + option.get_default_str() + ")";
+    if (option.get_required() && !option.get_positional()) text += " (required)";
+    return text;
+}
+
+// One way of saying things in all helps.
+class HelpText : public CLI::Formatter {
+public:
+    HelpText() {
+        column_width(30);
+        label("Positionals", "Arguments");
+        label("Subcommands", "Commands");
+        label("SUBCOMMAND", "COMMAND");
+    }
+    std::string make_option_opts(const CLI::Option* option) const override {
+        if (option->get_type_size() == 0 || option->get_positional()) return "";
+        return " " + value_of(*option).first;
+    }
+    std::string make_option_desc(const CLI::Option* option) const override { return described(*option); }
+};
 
 }  // namespace
 
@@ -53,8 +117,8 @@ Option& Option::show_default() {
     return *this;
 }
 
-Option& Option::shown_as(const std::string& type_name) {
-    option_->type_name(type_name);
+Option& Option::shown_as(const std::string& word) {
+    option_->type_name(word);
     return *this;
 }
 
@@ -117,9 +181,11 @@ Option Command::option(const std::string& name, std::optional<double>& target, c
 Option Command::choice_of(const std::string& name, std::function<void(int)> store,
                           const std::vector<std::pair<std::string, int>>& words, const std::string& help) {
     const std::map<std::string, int> table(words.begin(), words.end());
-    CLI::Option* option = app_->add_option_function<int>(name, std::move(store), help);
-    option->transform(CLI::CheckedTransformer(table).description(""));
-    return Option(option);
+    std::vector<std::string> all;
+    for (const auto& [word, value] : words) all.push_back(word);
+    CLI::Option* option = app_->add_option_function<std::string>(
+        name, [table, store = std::move(store)](const std::string& word) { store(table.at(word)); }, help);
+    return Option(option).one_of(all);
 }
 
 Option Command::flag(const std::string& name, bool& target, const std::string& help) {
@@ -137,16 +203,18 @@ void Command::does(std::function<void()> work) {
 CommandLine::CommandLine(const std::string& description, const std::string& name)
     : app_(std::make_unique<CLI::App>(description, name)) {
     app_->require_subcommand(0, 1);
+    app_->formatter(std::make_shared<HelpText>());
+    app_->set_help_flag("-h,--help", "Print this help and exit");
 }
 
 CommandLine::~CommandLine() = default;
 
 void CommandLine::version(const std::string& text) {
-    app_->set_version_flag("--version", text);
+    app_->set_version_flag("--version", text, "Print the version and exit");
 }
 
 Command CommandLine::command(const std::string& name, const std::string& description) {
-    return Command(app_->add_subcommand(name, description));
+    return Command(app_->add_subcommand(name, description)->group("Commands"));
 }
 
 void CommandLine::footer(const std::string& text) {
@@ -164,18 +232,66 @@ void CommandLine::run(int argc, char** argv) {
     }
 }
 
+std::string CommandLine::description() const {
+    return app_->get_description();
+}
+
+std::string CommandLine::end_of_help() const {
+    return app_->get_footer();
+}
+
+std::vector<CommandHelp> CommandLine::commands() const {
+    std::vector<CommandHelp> all;
+    for (const CLI::App* command : app_->get_subcommands([](const CLI::App*) { return true; })) {
+        CommandHelp help{command->get_name(), command->get_description(), command->get_footer(), {}};
+        for (const CLI::Option* option : command->get_options()) {
+            CommandHelp::Item item;
+            item.is_placed = option->get_positional();
+            if (item.is_placed) item.names.push_back(option->get_name(true));
+            for (const std::string& name : option->get_snames()) item.names.push_back("-" + name);
+            for (const std::string& name : option->get_lnames()) item.names.push_back("--" + name);
+            const auto [value, limits] = value_of(*option);
+            if (option->get_type_size() != 0) item.value = item.is_placed ? item.names.front() : value;
+            item.words = words_in(limits);
+            item.text = described(*option);
+            item.is_required = option->get_required();
+            item.is_repeated = option->get_expected_max() > 1;
+            help.items.push_back(item);
+        }
+        all.push_back(help);
+    }
+    return all;
+}
+
+namespace {
+
+// What a misspelt option was probably meant to be.
+std::string option_hint(const std::string& what, const CLI::App& command) {
+    const std::size_t at = what.find("--");
+    if (what.find("not expected") == std::string::npos || at == std::string::npos) return "";
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    const std::string hint = suggestion(what.substr(at, what.find_first_of(" =", at) - at), names);
+    return hint.empty() ? "" : "." + hint;
+}
+
+}  // namespace
+
 WrongArguments CommandLine::complaint(const std::string& what) const {
     const auto chosen = app_->get_subcommands();
     if (!chosen.empty())
-        return {fmt::format("{}\n`lobatto {} --help` shows what can be given.", what, chosen.front()->get_name())};
+        return {fmt::format("{}{}\n`lobatto {} --help` shows what can be given.", what,
+                            option_hint(what, *chosen.front()), chosen.front()->get_name())};
     const auto extras = app_->remaining();
     if (extras.empty() || extras.front().starts_with('-'))
-        return {fmt::format("{}\n`lobatto --help` shows what can be given.", what)};
+        return {fmt::format("{}{}\n`lobatto --help` shows what can be given.", what, option_hint(what, *app_))};
     const std::string& word = extras.front();
     std::vector<std::string> names;
     for (const CLI::App* command : app_->get_subcommands([](const CLI::App*) { return true; }))
         names.push_back(command->get_name());
-    const std::string hint = word.ends_with(".toml") ? fmt::format(" Did you mean `lobatto run {}`?", word) : "";
+    const std::string hint =
+        word.ends_with(".toml") ? fmt::format(" Did you mean `lobatto run {}`?", word) : suggestion(word, names);
     return {fmt::format("unknown command '{}'; the commands are: {}.{}", word, fmt::join(names, ", "), hint)};
 }
 

@@ -26,10 +26,10 @@ public:
     explicit Option(CLI::Option* option) : option_(option) {}
 
     Option& required();
-    Option& excludes(const Option& other);           // both at once are an error
-    Option& one_value_each();                        // an option that may be repeated takes one value each time
-    Option& show_default();                          // in the help
-    Option& shown_as(const std::string& type_name);  // "FOLDER" in place of "TEXT"
+    Option& excludes(const Option& other);      // both at once are an error
+    Option& one_value_each();                   // an option that may be repeated takes one value each time
+    Option& show_default();                     // in the help
+    Option& shown_as(const std::string& word);  // what its value is called in the help: "FOLDER"
     Option& between(std::int64_t least, std::int64_t most);
     Option& one_of(const std::vector<int>& values);
     Option& one_of(const std::vector<std::string>& values);
@@ -45,7 +45,7 @@ class Command {
 public:
     explicit Command(CLI::App* app) : app_(app) {}
 
-    // A name such as "scene" stands at a fixed place; "-o,--output" and "--step" are given by name.
+    // A name such as "SCENE" stands at a fixed place; "-o,--output" and "--step" are given by name.
     Option option(const std::string& name, std::string& target, const std::string& help);
     Option option(const std::string& name, std::vector<std::string>& target, const std::string& help);
     Option option(const std::string& name, std::optional<std::string>& target, const std::string& help);
@@ -86,6 +86,19 @@ struct WrongArguments {
     std::string message;
 };
 
+// What the help says of a command, piece by piece: for manual pages and completions.
+struct CommandHelp {
+    struct Item {
+        std::vector<std::string> names;  // "-o", "--output"; of a value at a fixed place "SCENE"
+        std::string value;               // what its value is called; empty: a flag
+        std::vector<std::string> words;  // of which the value is one; empty: of others
+        std::string text;
+        bool is_required = false, is_repeated = false, is_placed = false;
+    };
+    std::string name, description, footer;
+    std::vector<Item> items;
+};
+
 class CommandLine {
 public:
     CommandLine(const std::string& description, const std::string& name);
@@ -93,6 +106,9 @@ public:
     void version(const std::string& text);
     Command command(const std::string& name, const std::string& description);
     void footer(const std::string& text);
+    std::string description() const;
+    std::string end_of_help() const;
+    std::vector<CommandHelp> commands() const;
     // Runs the command that the arguments name, or prints the help. Throws WrongArguments, and what commands throw.
     void run(int argc, char** argv);
 

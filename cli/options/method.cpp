@@ -10,7 +10,9 @@ namespace lobatto {
 
 std::pair<Option, Option> MethodOption::add_members_to(Command& command) {
     Option lobatto = command.option("--points", points, "Lobatto with this many points: order 2 points - 2");
+    lobatto.shown_as("N");
     Option gauss = command.option("--stages", stages, "Gauss with this many stages: order 2 stages");
+    gauss.shown_as("N");
     lobatto.between(2, 12);
     gauss.between(1, 10).excludes(lobatto);
     return {lobatto, gauss};
@@ -20,11 +22,13 @@ void MethodOption::add_to(Command& command) {
     const auto [lobatto, gauss] = add_members_to(command);
     command
         .option("--splitting", splitting,
-                "an explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
+                "An explicit splitting method with this many stages: 6 (order 4), 11, 14 (6), 17 (8), 35 (10)")
+        .shown_as("N")
         .one_of(splitting_stages())
         .excludes(lobatto)
         .excludes(gauss);
-    command.option("--tolerance", tolerance, "stop the iteration of a step at increments this small, relative")
+    command.option("--tolerance", tolerance, "Stop the iteration of a step at increments this small, relative")
+        .shown_as("EPSILON")
         .checked_by([](const std::string& text) {
             const double value = std::strtod(text.c_str(), nullptr);
             return value > 0 && value <= 1e-3 ? ""
@@ -32,11 +36,12 @@ void MethodOption::add_to(Command& command) {
                                                     "; it must be above 0 and at most 0.001; leave it out to iterate "
                                                     "to rounding";
         });
-    command.option("--arithmetic", arithmetic, "plain, or clean: rounding errors grow like a random walk only (slower)")
+    command.option("--arithmetic", arithmetic, "Plain, or clean: rounding errors grow like a random walk only (slower)")
+        .shown_as("KIND")
         .one_of(std::vector<std::string>{"plain", "clean"});
     std::vector<std::string> names;
     for (const Precision precision : all_precisions) names.push_back(precision_name(precision));
-    command.option("--numbers", numbers, "what the steps are computed in, from float to quadruple").one_of(names);
+    command.option("--numbers", numbers, "What the steps are computed in").shown_as("TYPE").one_of(names);
 }
 
 }  // namespace lobatto

@@ -68,7 +68,7 @@ void keep_foreign(const std::string& path) {
 }
 
 Option add_json_option(Command& command, bool& json) {
-    return command.flag("--json", json, "For machines: one line of JSON (docs/machines.md)");
+    return command.flag("--json", json, "Print JSON instead, for machines (docs/machines.md)");
 }
 
 }  // namespace lobatto

@@ -23,7 +23,7 @@ void keep_scene(const std::string& scene, const std::string& path);
 // InputError where a file that is not ours stands in the place of a result.
 void keep_foreign(const std::string& path);
 
-// --json: what a command reports as one line of JSON, by its schema in docs/schemas/.
+// --json: what a command reports as JSON, by its schema in docs/schemas/.
 Option add_json_option(Command& command, bool& json);
 
 }  // namespace lobatto

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What commands report, for machines: JSON of one line each, by the schemas in docs/schemas/. A number that is not
+// What commands report, for machines: JSON, by the schemas in docs/schemas/. A number that is not
 // known or not finite is null.
 #pragma once
 

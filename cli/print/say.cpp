@@ -9,12 +9,14 @@
 
 namespace lobatto {
 
-Say::Say() : on_terminal_(isatty(STDERR_FILENO) == 1) {}
+Say::Say(double seconds)
+    : on_terminal_(isatty(STDERR_FILENO) == 1), seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
 
 void Say::operator()(const std::string& what) {
     if (!on_terminal_) return;
     shown_ = true;
-    tell("\r\033[K{} ...", what);
+    const double left = seconds_ - std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    tell("\r\033[K{} ...{}", what, seconds_ > 0 && left > 1 ? fmt::format(" ({:.0f} s left at most)", left) : "");
     std::fflush(stderr);
 }
 

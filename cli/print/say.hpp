@@ -2,13 +2,15 @@
 // What is being done right now, on one line of the terminal that is written over; nothing where no one watches.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 namespace lobatto {
 
 class Say {
 public:
-    Say();
+    // `seconds`: that all may take, of which it tells how many are left; 0: not known.
+    explicit Say(double seconds = 0);
     ~Say() { clear(); }
     Say(const Say&) = delete;
     Say& operator=(const Say&) = delete;
@@ -19,6 +21,8 @@ public:
 private:
     bool on_terminal_;
     bool shown_ = false;
+    double seconds_;
+    std::chrono::steady_clock::time_point start_;
 };
 
 }  // namespace lobatto

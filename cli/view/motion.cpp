@@ -210,7 +210,8 @@ std::vector<std::vector<double>> frames_of(const States& states, const LoadedSte
 
 }  // namespace
 
-Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers) {
+Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers,
+                     const std::function<void(std::int64_t, std::int64_t)>& progress) {
     Viewed viewed;
     viewed.title = scene.title.empty() ? scene.name : scene.title;
     apply(overrides, scene);
@@ -240,6 +241,7 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
     };
     const Interruption interruption;
     request.interrupted = interruption.flag();
+    request.progress = [&](std::int64_t done) { progress(done, request.steps); };
     const TrajectoryResult result = integrate(kernel, request);
     viewed.is_interrupted = result.interrupted;
     states.finish();

@@ -2,6 +2,8 @@
 // A scene, run for the eye: its states at so many times that the motion looks smooth, and all that is drawn of them.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,7 +22,9 @@ struct Viewed {
     std::string failure;  // why the motion ended early; empty: it did not
 };
 
-// `most_numbers`: of all channels together, which decides how large the page is.
-Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers);
+// `most_numbers`: of all channels together, which decides how large the page is. `progress` hears the steps done, and
+// of how many.
+Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers,
+                     const std::function<void(std::int64_t, std::int64_t)>& progress);
 
 }  // namespace lobatto

@@ -118,8 +118,12 @@ std::vector<GroupSolve> solves_of(const Derivation& derivation) {
     std::vector<GroupSolve> solves;
     for (const Group& group : structure.groups) {
         GroupSolve solve;
-        for (const int k : group.coordinates)
-            solve.coordinates.push_back(general ? structure.routhian().active[static_cast<std::size_t>(k)] : k);
+        const std::vector<int> active = general ? structure.routhian().active : std::vector<int>();
+        for (const int k : group.coordinates) {
+            const auto i = static_cast<std::size_t>(k);
+            const int multiplier = k - static_cast<int>(active.size()) + derivation.system.n;
+            solve.coordinates.push_back(!general ? k : i < active.size() ? active[i] : multiplier);
+        }
         solve.unknowns = points * static_cast<int>(group.coordinates.size()) + multipliers;
         solve.band =
             multipliers > 0 ? solve.unknowns - 1 : std::min((group.bandwidth + 1) * points, solve.unknowns) - 1;

@@ -11,7 +11,7 @@ namespace lobatto {
 
 // Equations that are solved together.
 struct GroupSolve {
-    std::vector<int> coordinates;  // indices in the scene
+    std::vector<int> coordinates;  // indices in the scene; behind its coordinates the multipliers of its constraints
     int unknowns = 0;
     int band = 0;        // of the matrix, on either side of its diagonal; unknowns - 1 when it is full
     std::string method;  // "closed formula", "full matrix", "banded matrix"; "nothing to solve"
