@@ -75,7 +75,7 @@ std::map<std::string, double> end_of(const std::string& trajectory) {
 
 }  // namespace
 
-TEST_CASE("each scene of docs/coming_from.md runs and ends where its reference says") {
+TEST_CASE("each scene of docs/coming_from.md runs and ends where its reference says" * doctest::test_suite("slow")) {
     const std::vector<Comparison> all = comparisons();
     CHECK(all.size() == 6);
     const test::TemporaryFolder folder;
