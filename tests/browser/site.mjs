@@ -88,6 +88,11 @@ await page.close();
 const moving = await opened(`${home}/moving.html`);
 const frame = moving.page.frames().find(one => one.url().includes("moving/double_pendulum"));
 check("the scene on the page moves", await frame.waitForFunction(() => window.lobatto && window.lobatto.state.frames > 3).then(() => true));
+const is_dark = () => frame.evaluate(() => document.documentElement.classList.contains("dark"));
+const was_dark = await is_dark();
+await moving.page.locator(".md-header__option label:visible").first().click();
+await moving.page.waitForTimeout(300);
+check("and is as dark or light as the page", await is_dark() !== was_dark);
 await moving.page.close();
 
 for (const name of ["index.html", "derivation.html", "moving.html", "scenes/kepler.html"]) {
