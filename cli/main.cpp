@@ -51,6 +51,7 @@ void flush_output() {
 
 void describe(CommandLine& program) {
     program.version("lobatto " LOBATTO_VERSION);
+    add_new(program);
     add_check(program);
     add_derive(program);
     add_emit(program);
@@ -62,6 +63,8 @@ void describe(CommandLine& program) {
     add_tune(program);
     add_verify(program);
     add_view(program);
+    add_plot(program);
+    add_schema(program);
     add_gallery(program);
     add_paper(program);
     // Last, because a command takes over the footer that its parent has at that moment.

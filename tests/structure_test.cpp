@@ -106,7 +106,9 @@ const std::vector<Room> rooms = {
     {"cli/print", {"analysis", "generator", "runtime"}},
     {"cli/paper", {"analysis", "generator", "runtime", "cli/print"}},
     {"cli/view", {"analysis", "generator", "runtime", "cli/print"}},
-    {"cli/commands", {"analysis", "generator", "runtime", "cli/options", "cli/paper", "cli/print", "cli/view"}},
+    {"cli/plot", {"generator/formula", "runtime", "cli/print"}},
+    {"cli/commands",
+     {"analysis", "generator", "runtime", "cli/options", "cli/paper", "cli/plot", "cli/print", "cli/view"}},
     {"cli", {"cli/commands", "cli/print", "generator/formula", "runtime"}},
 };
 

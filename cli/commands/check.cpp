@@ -8,6 +8,7 @@
 #include "analysis/checked_scene.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
 #include "generator/describe/explain.hpp"
 
 namespace lobatto {
@@ -93,7 +94,7 @@ void add_check(CommandLine& program) {
     command.option("scene", options->scene, "the scene file").required();
     options->method.add_to(command);
     command.flag("--general", options->general, "use nothing of what the scene's structure allows, for comparison");
-    command.flag("--json", options->json, "for machines");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto check scenes/two_pendulums.toml");
     command.does([options] {
         Scene scene = read_scene(options->scene);

@@ -5,6 +5,7 @@
 #include "cli/commands/commands.hpp"
 
 #include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
 #include "generator/describe/describe.hpp"
 #include "generator/pipeline.hpp"
 
@@ -34,7 +35,7 @@ void add_derive(CommandLine& program) {
     command.option("scene", options->scene, "the scene file").required();
     options->method.add_to(command);
     const Option latex = command.flag("--latex", options->latex, "a complete LaTeX document");
-    command.flag("--json", options->json, "for machines (described in docs/derivation.md)").excludes(latex);
+    add_json_option(command, options->json).excludes(latex);
     command.footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");
     command.does([options] { derive_scene(*options); });
 }

@@ -16,6 +16,7 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/print/answers_json.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
@@ -35,6 +36,7 @@ struct EmitCommand {
     bool no_support = false;
     bool ensemble = false;
     bool plain = false;
+    bool json = false;
 };
 
 [[noreturn]] void fail_to_write(const fs::path& path, const std::string& reason) {
@@ -108,6 +110,10 @@ fs::path path_for(const EmitCommand& options, const std::string& name) {
 void write_plain(const PlainSource& source, const EmitCommand& options) {
     const fs::path path = path_for(options, source.name);
     write_atomically(path, source.header);
+    if (options.json) {
+        fmt::print(std::cout, "{}", json_of_emitted(options.scene, {path.string()}, source.name, {}));
+        return;
+    }
     fmt::print(std::cout,
                "Wrote {0}, {1} lines\n\nUse it:\n"
                "  #include \"{2}.hpp\"  // g++ -std=c++17 -O2 -I {3} program.cpp\n"
@@ -148,6 +154,13 @@ void emit_scene(const EmitCommand& options) {
         write_atomically(support, support_text());
     }
     write_atomically(path, source.header);
+    if (options.json) {
+        std::vector<std::string> files{path.string()};
+        if (!options.standalone && !options.no_support)
+            files.push_back((fs::path(options.folder) / "kernel.hpp").string());
+        fmt::print(std::cout, "{}", json_of_emitted(options.scene, files, source.name, source.report));
+        return;
+    }
     print_report(source.report);
     fmt::print(std::cout, "\nWrote {}", path.string());
     if (!options.standalone && !options.no_support)
@@ -182,6 +195,7 @@ void add_emit(CommandLine& program) {
         .excludes(standalone)
         .excludes(no_support)
         .excludes(general);
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto emit scenes/pendulum.toml --plain -o kernels");
     command.does([options] { emit_scene(*options); });
 }

@@ -10,6 +10,7 @@
 #include "analysis/motion.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/print/answers_json.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/gallery_picture.hpp"
 #include "cli/print/tell.hpp"
@@ -30,6 +31,7 @@ constexpr double smaller_ones[] = {0.2, 0.4, 0.6, 0.8};
 struct GalleryCommand {
     std::string folder = "docs/gallery";
     std::vector<std::string> scenes;
+    bool json = false;
 };
 
 std::vector<std::string> all_scenes() {
@@ -43,8 +45,8 @@ std::vector<std::string> all_scenes() {
     return scenes;
 }
 
-States run(const std::string& path, const Kernel& kernel, TrajectoryRequest request) {
-    States states;
+MotionRows run(const std::string& path, const Kernel& kernel, TrajectoryRequest request) {
+    MotionRows states;
     states.n = kernel->coordinates;
     request.sink = [&](const Records& records) {
         states.rows.insert(states.rows.end(), records.rows, records.rows + records.count * records.columns);
@@ -55,15 +57,15 @@ States run(const std::string& path, const Kernel& kernel, TrajectoryRequest requ
 }
 
 // The same motion begun nearer to the middle between its ends.
-std::vector<States> smaller_motions(const std::string& path, const Kernel& kernel, const TrajectoryRequest& request,
-                                    const States& states) {
+std::vector<MotionRows> smaller_motions(const std::string& path, const Kernel& kernel, const TrajectoryRequest& request,
+                                        const MotionRows& states) {
     double low = states.q(0, 0), high = low;
     for (std::size_t i = 0; i < states.count(); ++i) {
         low = std::min(low, states.q(i, 0));
         high = std::max(high, states.q(i, 0));
     }
     const double middle = (low + high) / 2;
-    std::vector<States> smaller;
+    std::vector<MotionRows> smaller;
     for (const double share : smaller_ones) {
         TrajectoryRequest nearer = request;
         nearer.q[0] = middle + share * (request.q[0] - middle);
@@ -85,12 +87,12 @@ Picture picture_of_scene(Scene& scene) {
     const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
     LoadedStepper<double> stepper(kernel);
     const TrajectoryRequest request = request_of(scene, steps.count, stepper);
-    const States states = run(scene.path, kernel, request);
+    const MotionRows states = run(scene.path, kernel, request);
     const auto& forces = derivation.system.outer_force;
     const bool nested =
         !scene.is_cut() && shape_of(scene) == Shape::phase && derivation.system.autonomous && forces.front().is_zero();
     return picture_of(scene, states,
-                      nested ? smaller_motions(scene.path, kernel, request, states) : std::vector<States>{});
+                      nested ? smaller_motions(scene.path, kernel, request, states) : std::vector<MotionRows>{});
 }
 
 void gallery(const GalleryCommand& options) {
@@ -101,6 +103,7 @@ void gallery(const GalleryCommand& options) {
         "Every scene of this folder's pictures is a short text file; `lobatto gallery` derived, compiled and ran each "
         "and drew\nwhat came out. Click a title for the scene.\n";
     std::size_t failed = 0;
+    std::vector<Drawn> drawn;
     for (const std::string& path : paths) {
         try {
             Scene scene = read_scene(path);
@@ -108,8 +111,10 @@ void gallery(const GalleryCommand& options) {
             draw(options.folder, scene.name, picture.script, picture.width, picture.height);
             const std::string svg = scene.name + ".svg";
             const auto bytes = fs::file_size(fs::path(options.folder) / svg);
-            fmt::print("{:<44}{:>4} kB  {}\n", (fs::path(options.folder) / svg).generic_string(), (bytes + 999) / 1000,
-                       picture.caption);
+            drawn.push_back({path, scene.title, picture.caption, (fs::path(options.folder) / svg).generic_string()});
+            if (!options.json)
+                fmt::print("{:<44}{:>4} kB  {}\n", (fs::path(options.folder) / svg).generic_string(),
+                           (bytes + 999) / 1000, picture.caption);
             page += fmt::format("\n## [{}]({})\n{}\n\n![{}]({})\n", scene.title,
                                 fs::relative(path, options.folder).generic_string(), picture.caption, scene.title, svg);
         } catch (const MachineError&) {
@@ -120,8 +125,11 @@ void gallery(const GalleryCommand& options) {
         }
     }
     write_whole(options.folder + "/README.md", "the page", page);
-    fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
-               options.folder);
+    if (options.json)
+        fmt::print("{}", json_of_drawn("gallery", options.folder + "/README.md", drawn));
+    else
+        fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
+                   options.folder);
     if (failed > 0) throw ExitCode{some_failed};
 }
 
@@ -133,6 +141,7 @@ void add_gallery(CommandLine& program) {
     command.option("scenes", options->scenes, "scene files (default: all in the folder scenes)");
     command.option("-o,--output", options->folder, "folder for the pictures (default: docs/gallery)")
         .shown_as("FOLDER");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto gallery -o pictures scenes/kepler.toml scenes/pleiades.toml");
     command.does([options] { gallery(*options); });
 }

@@ -17,14 +17,17 @@ namespace {
 
 struct PaperOptions {
     std::string folder = "out";
-    bool figures = true;
+    bool figures = true, json = false;
 };
 
 void validate(const PaperOptions& options) {
     output_folder(options.folder + (options.figures ? "/paper" : ""), "");
     std::vector<paper::Finding> findings;
     for (const paper::Statement& statement : paper::statements()) findings.push_back(paper::judge(statement));
-    fmt::print("{}", walk_lines(findings));
+    const auto say = [&](const std::string& text) {
+        if (!options.json) fmt::print("{}", text);
+    };
+    say(walk_lines(findings));
 
     const std::vector<PaperTable> tables{table_1(), table_2()};
     std::string document = walk_document(findings);
@@ -38,20 +41,21 @@ void validate(const PaperOptions& options) {
         "it "
         "preserves.\n";
     for (const PaperTable& table : tables) {
-        fmt::print("{}", table_lines(table));
+        say(table_lines(table));
         document += table_document(table);
     }
 
     if (options.figures) {
         const std::vector<Figure> figures = draw_figures(options.folder + "/paper");
-        fmt::print("{}", growth_lines(figures));
+        say(growth_lines(figures));
         document += figure_document(figures);
     }
     const std::string path = options.folder + "/paper.md";
     write_whole(path, "the document", document);
-    fmt::print(
+    say(fmt::format(
         "\nWritten: {}{}\n", path,
-        options.figures ? fmt::format(", {}/paper/figure1.svg … figure4.svg and their data", options.folder) : "");
+        options.figures ? fmt::format(", {}/paper/figure1.svg … figure4.svg and their data", options.folder) : ""));
+    if (options.json) fmt::print("{}", paper_json(path, findings, tables));
 
     for (const paper::Finding& finding : findings)
         if (!paper::is_resolved(finding))
@@ -72,6 +76,7 @@ void add_paper(CommandLine& program) {
     command.option("-o,--output", options->folder, "Folder for paper.md and paper/figure1.svg … (default: out)");
     command.flag("--figures,!--no-figures", options->figures,
                  "Draw the figures with gnuplot (default), or leave them out");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto paper -o docs");
     command.does([options] { validate(*options); });
 }

@@ -10,6 +10,7 @@
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/options/overrides.hpp"
+#include "cli/print/answers_json.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/tell.hpp"
@@ -30,7 +31,7 @@ struct RoundoffCommand {
     Overrides overrides;
     std::int64_t steps = 100000;
     int trajectories = 16;
-    bool no_reference = false, no_picture = false;
+    bool no_reference = false, no_picture = false, json = false;
 };
 
 // Nothing where there is no number.
@@ -108,27 +109,31 @@ void roundoff(const RoundoffCommand& options) {
     scene.method.arithmetic = StepArithmetic::clean;
     scene.method.tolerance = 0;
     const std::string name = scene.method.name(), path = scene.path;
-    const std::string step = fmt::format("{:.6g}", step_of(scene, options.overrides).to_double());
+    const double step = step_of(scene, options.overrides).to_double();
     const std::string folder = output_folder(options.output, result_name(scene.path) + "_roundoff"),
                       table = folder + "/roundoff.csv";
     keep_scene(path, table);
     const Interruption interruption;
     const RoundoffResult result = roundoff_growth(std::move(scene), options.steps, options.trajectories,
                                                   !options.no_reference, Interruption::flag());
-    fmt::print(
-        "{}: {}, h = {}, {} trajectories.\n{}\n\n", path, name, step, options.trajectories,
+    const auto say = [&](const std::string& text) {
+        if (!options.json) fmt::print("{}", text);
+    };
+    say(fmt::format(
+        "{}: {}, h = {:.6g}, {} trajectories.\n{}\n\n", path, name, step, options.trajectories,
         options.no_reference
             ? "The energy against H(0), relative to |H(0)|, or to half of the largest kinetic energy if that is "
               "larger: the method's own error is in it."
             : "What rounding changes, against the same steps in long double: H relative to |H(0)|, or to half of "
-              "the largest kinetic energy if that is larger, q to its largest.");
+              "the largest kinetic energy if that is larger, q to its largest."));
     if (!result.plain.rows.empty()) {
-        print(result);
+        if (!options.json) print(result);
         write_whole(table, "the table", csv_of(result));
         const std::string script = options.no_picture ? "" : script_of(result);
         if (!script.empty()) draw(folder, "roundoff", script, 900, 640, "leave the picture out with --no-picture");
-        fmt::print("\n{}{} has all of it.\n", table, script.empty() ? "" : " and roundoff.svg beside it");
+        say(fmt::format("\n{}{} has all of it.\n", table, script.empty() ? "" : " and roundoff.svg beside it"));
     }
+    if (options.json) fmt::print("{}", json_of_roundoff(result, path, name, step, table));
     if (result.interrupted) {
         tell("lobatto: interrupted {}\n", result.plain.rows.empty()
                                               ? "before anything could be told"
@@ -159,6 +164,7 @@ void add_roundoff(CommandLine& program) {
     command.flag("--no-reference", options->no_reference,
                  "without the steps in long double, which take most of the time: energies alone, against H(0)");
     command.flag("--no-picture", options->no_picture, "the table alone, without gnuplot");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
     command.does([options] { roundoff(*options); });
 }

@@ -14,6 +14,7 @@
 #include "cli/options/output_path.hpp"
 #include "cli/options/overrides.hpp"
 #include "cli/options/resume.hpp"
+#include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
@@ -37,6 +38,7 @@ struct RunOptions {
     bool unmeasured = false;
     bool beyond_horizon = false;
     bool quiet = false;
+    bool json = false;
 };
 
 TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const TrajectoryRequest& request) {
@@ -89,24 +91,37 @@ std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult
                        static_cast<double>(result.iterations) / static_cast<double>(steps), result.iterations_most);
 }
 
-std::string defect_text(const Kernel& kernel, Precision numbers, const Scene& scene) {
+// Nothing where the first step has no derivative in this precision.
+std::optional<double> defect_of(const Kernel& kernel, Precision numbers, const Scene& scene) {
     try {
-        return with_type_of(numbers, [&](auto type) {
+        return with_type_of(numbers, [&](auto type) -> std::optional<double> {
             using real = decltype(type);
             const ExactStart exact(scene);
             const auto h = number_of<real>(scene.evaluate(scene.run.step, "the step"));
             const StartIn<real> start = start_in<real>(exact, kernel, h);
             LoadedStepper<real> stepper(kernel);
             stepper.prepare(start.parameters, h);
-            return fmt::format("{:.2g}", static_cast<double>(symplectic_defect(stepper, start.q, start.p)));
+            return static_cast<double>(symplectic_defect(stepper, start.q, start.p));
         });
     } catch (const ComputationError&) {
-        return "not measured: the first step has no derivative in this precision";
+        return std::nullopt;
     }
 }
 
-void print_table(const Derivation& derivation, const Scene& scene, const Kernel& run_kernel,
-                 const TrajectoryRequest& request, const TrajectoryResult& result, const Watch& watch) {
+// Of the first step, its equations solved to rounding.
+bool has_defect(const PreparedRun& run) {
+    return run.kernel.table().has_tangent != 0 && !run.derivation.system.has_forces();
+}
+
+std::string defect_text(const PreparedRun& run) {
+    const std::optional<double> defect = defect_of(run.kernel, run.scene.method.numbers, run.scene);
+    return defect ? fmt::format("{:.2g}", *defect) : "not measured: the first step has no derivative in this precision";
+}
+
+void print_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                 const Watch& watch) {
+    const Derivation& derivation = run.derivation;
+    const Scene& scene = run.scene;
     const bool clocked = scene.clock.has_value();
     const std::string of_all =
         clocked || result.steps_done == request.steps || result.stop >= 0 ? "" : fmt::format(" of {}", request.steps);
@@ -114,7 +129,7 @@ void print_table(const Derivation& derivation, const Scene& scene, const Kernel&
     print_row("steps", fmt::format("{}{}, h = {:.6g}{}, to t = {:.6g}", steps, of_all, request.step,
                                    clocked ? " in the time of the clock " + scene.clock->text : "", result.time));
     if (steps == 0) return;
-    const lobatto_kernel& kernel = run_kernel.table();
+    const lobatto_kernel& kernel = run.kernel.table();
     print_row("time per step", duration(result.seconds / static_cast<double>(steps)));
     print_row("iterations", iterations_text(kernel, result, steps));
     const bool conserves = derivation.conserves_energy();
@@ -127,11 +142,10 @@ void print_table(const Derivation& derivation, const Scene& scene, const Kernel&
     }
     if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
-    if (kernel.has_tangent != 0 &&
-        !derivation.system.has_forces())  // of the first step, its equations solved to rounding
+    if (has_defect(run))
         print_row("symplectic defect",
                   request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
-                                        : defect_text(run_kernel, scene.method.numbers, scene));
+                                        : defect_text(run));
     if (const auto error = watch.position_error()) {
         const std::string& unit = scene.coordinates.front().unit;
         print_row("position error",
@@ -266,7 +280,7 @@ void run(const RunOptions& options) {
         keep_foreign(event_path(options, scene));
     }
     if (!options.resume) keep_strangers(path);
-    if (!options.quiet)
+    if (!options.quiet && !options.json)
         fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, run.source.digest, run.derivation_seconds,
                    run.compiled.from_cache ? "found compiled in the cache"
                                            : fmt::format("compiled in {:.2f} s", run.compiled.seconds));
@@ -283,7 +297,7 @@ void run(const RunOptions& options) {
             observers.restore(from->observers);
             request.from = &from->halfway;
         }
-        if (!options.quiet)
+        if (!options.quiet && !options.json)
             print_row("resumed", from ? fmt::format("at t = {:.6g}, after {} steps", from->halfway.result.time,
                                                     from->halfway.result.steps_done)
                                       : "nothing was left: from the start");
@@ -293,8 +307,13 @@ void run(const RunOptions& options) {
     const TrajectoryResult result = integrate_into(files, observers, identity, run, request, options.quiet);
     const RunVerdict verdict = verdict_of(run, request, result, observers, options.beyond_horizon);
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
-    if (!options.quiet) {
-        print_table(run.derivation, scene, run.kernel, request, result, observers.watch);
+    if (options.json) {
+        const bool is_exact = has_defect(run) && request.tolerance == 0 && result.steps_done > 0;
+        fmt::print("{}", json_of_run(run, request, result, observers, verdict,
+                                     is_exact ? defect_of(run.kernel, scene.method.numbers, scene) : std::nullopt,
+                                     {path, has_events ? files.events_path() : ""}));
+    } else if (!options.quiet) {
+        print_table(run, request, result, observers.watch);
         if (verdict.error) print_row("measured error", text_of(*verdict.error, scene));
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
@@ -327,6 +346,7 @@ void add_run(CommandLine& program) {
     command.flag("--beyond-horizon", options->beyond_horizon,
                  "go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
     command.does([options] { run(*options); });
 }

@@ -116,7 +116,7 @@ void add_stability(CommandLine& program) {
     add_step_option(command, options->overrides);
     add_set_option(command, options->overrides);
     command.option("--chart", options->chart, "draw trace and growth, theory and measurement, into this SVG file");
-    command.flag("--json", options->json, "for machines (described in docs/stability.md)");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto stability scenes/harmonic_oscillator.toml --chart stability.svg");
     command.does([options] { options->scene ? show_scene(*options) : show_members(*options); });
 }

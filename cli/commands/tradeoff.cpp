@@ -31,6 +31,7 @@ struct TradeoffOptions {
     std::string output;  // a folder; empty: out/NAME.tradeoff
     BudgetOption budget;
     Overrides overrides;
+    bool json = false;
 };
 
 void write(const std::string& path, const std::string& text) {
@@ -75,17 +76,21 @@ void tradeoff(const TradeoffOptions& options) {
     if (experiment.store().all().empty())
         throw ComputationError(fmt::format(
             "{}: nothing could be measured within {:.3g} s; give more time with --budget", scene.path, seconds));
-    fmt::print("{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, experiment.store().all().size(),
-               experiment.store().found() > 0 ? fmt::format(" ({} of an earlier run)", experiment.store().found()) : "",
-               experiment.until(), experiment.elapsed(), reference_text(experiment), front_table(experiment));
+    if (!options.json)
+        fmt::print(
+            "{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, experiment.store().all().size(),
+            experiment.store().found() > 0 ? fmt::format(" ({} of an earlier run)", experiment.store().found()) : "",
+            experiment.until(), experiment.elapsed(), reference_text(experiment), front_table(experiment));
     write(folder + "/tradeoff.csv", csv_of(experiment));
     const std::string json = json_of(experiment);
     write(folder + "/tradeoff.json", json);
+    if (options.json) fmt::print("{}", json);
     if (!interrupted) {
         const std::vector<std::string> pictures = draw_pictures(experiment, folder);
         write(folder + "/report.html", report_page(experiment, folder, pictures, json));
-        fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
-                   fmt::join(pictures, ".svg, "));
+        if (!options.json)
+            fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
+                       fmt::join(pictures, ".svg, "));
     } else {
         tell("lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
         throw ExitCode{interrupted_exit};
@@ -103,6 +108,7 @@ void add_tradeoff(CommandLine& program) {
     options->budget.add_to(command);
     add_until_option(command, options->overrides);
     add_set_option(command, options->overrides);
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
     command.does([options] { tradeoff(*options); });
 }

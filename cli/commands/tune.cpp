@@ -8,7 +8,9 @@
 #include "analysis/tradeoff/method_text.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/budget.hpp"
+#include "cli/options/output_path.hpp"
 #include "cli/options/overrides.hpp"
+#include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
@@ -28,7 +30,7 @@ struct TuneOptions {
     std::string error;
     BudgetOption budget;
     Overrides overrides;
-    bool write = false;
+    bool write = false, json = false;
 };
 
 double error_of(const TuneOptions& options) {
@@ -78,11 +80,12 @@ void tune(const TuneOptions& options) {
     try {
         const Choice choice = choose(derive(written), scene, request);
         say.clear();
-        print(choice, scene, error);
-        if (options.write) {
-            write_method(choice, scene, error, !options.overrides.until.empty());
+        if (!options.json) print(choice, scene, error);
+        if (options.write) write_method(choice, scene, error, !options.overrides.until.empty());
+        if (options.json)
+            fmt::print("{}", json_of_choice(choice, scene, error, options.write));
+        else if (options.write)
             fmt::print("\nwritten into {}\n", scene.path);
-        }
     } catch (const Interrupted&) {
         say.clear();
         tell("lobatto: interrupted; nothing was chosen.\n");
@@ -104,6 +107,7 @@ void add_tune(CommandLine& program) {
     options->budget.add_to(command);
     add_set_option(command, options->overrides);
     command.flag("--write", options->write, "Write the method and the step into the scene file");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto tune scenes/pendulum.toml --error 1e-8 --until 1000");
     command.does([options] { tune(*options); });
 }

@@ -7,6 +7,8 @@
 #include "analysis/proof/proof.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
+#include "cli/options/output_path.hpp"
+#include "cli/print/answers_json.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -16,6 +18,7 @@ namespace {
 struct VerifyOptions {
     std::string scene;
     MethodOption method;
+    bool json = false;
 };
 
 void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
@@ -37,8 +40,12 @@ void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
 
 void verify(const VerifyOptions& options) {
     const Proof proof = prove(read_scene(options.scene), options.method);
-    fmt::print("{}: {} ({})\n", options.scene, proof.title, proof.method);
-    print(proof.rows, proof.convergence);
+    if (options.json) {
+        fmt::print("{}", json_of_proof(options.scene, proof));
+    } else {
+        fmt::print("{}: {} ({})\n", options.scene, proof.title, proof.method);
+        print(proof.rows, proof.convergence);
+    }
     for (const ProofRow& row : proof.rows)
         if (!row.holds)
             throw ComputationError(fmt::format("{}: the check '{}' fails: {}.", options.scene, row.claim, row.meaning));
@@ -52,6 +59,7 @@ void add_verify(CommandLine& program) {
     const auto options = std::make_shared<VerifyOptions>();
     command.option("scene", options->scene, "Scene file").required();
     options->method.add_to(command);
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
     command.does([options] { verify(*options); });
 }

@@ -9,6 +9,7 @@
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/options/overrides.hpp"
+#include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
@@ -29,7 +30,7 @@ struct ViewCommand {
     std::string output;  // empty: out/NAME.html
     MethodOption method;
     Overrides overrides;
-    bool quiet = false;
+    bool quiet = false, json = false;
 };
 
 // One more run of the scene: "points=2 step=0.1".
@@ -131,7 +132,13 @@ void view(const ViewCommand& options) {
     for (const Viewed& one : all) motions.push_back(one.motion);
     const std::string page = page_of(all.front().title, motions, charts_of(all), comfortable_rate(motions));
     write_whole(path, "the page", page);
-    if (!options.quiet) {
+    if (options.json) {
+        std::vector<Drawn> drawn;
+        for (std::size_t i = 0; i < all.size(); ++i)
+            drawn.push_back(
+                {options.scenes[i / (1 + options.beside.size())], all[i].motion.label, all[i].motion.note, ""});
+        fmt::print("{}", json_of_drawn("view", path, drawn));
+    } else if (!options.quiet) {
         for (const Viewed& one : all)
             print_row("motion", fmt::format("{}: {}; {} frames, {} figures", one.motion.label, one.motion.note,
                                             one.motion.times.size(), one.motion.figures.size()));
@@ -158,6 +165,7 @@ void add_view(CommandLine& program) {
     add_until_option(command, options->overrides);
     add_set_option(command, options->overrides);
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
+    add_json_option(command, options->json);
     command.footer("Example:\n  lobatto view scenes/double_pendulum.toml --beside points=2 -o pendulum.html");
     command.does([options] { view(*options); });
 }

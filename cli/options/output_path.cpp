@@ -67,4 +67,8 @@ void keep_foreign(const std::string& path) {
             "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));
 }
 
+Option add_json_option(Command& command, bool& json) {
+    return command.flag("--json", json, "For machines: one line of JSON (docs/machines.md)");
+}
+
 }  // namespace lobatto

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "cli/options/command_line.hpp"
+
 namespace lobatto {
 
 // `given`, or without one out/NAME; makes the folder then. Throws MachineError.
@@ -20,5 +22,8 @@ void keep_scene(const std::string& scene, const std::string& path);
 
 // InputError where a file that is not ours stands in the place of a result.
 void keep_foreign(const std::string& path);
+
+// --json: what a command reports as one line of JSON, by its schema in docs/schemas/.
+Option add_json_option(Command& command, bool& json);
 
 }  // namespace lobatto

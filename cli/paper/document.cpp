@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 namespace lobatto {
 
@@ -178,6 +179,42 @@ std::string growth_lines(const std::vector<Figure>& figures) {
                                 growth.rounding_plain, growth.rounding_clean);
     }
     return text;
+}
+
+namespace {
+
+const char* word_of(paper::Verdict verdict) {
+    switch (verdict) {
+        case paper::Verdict::verified:
+            return "verified";
+        case paper::Verdict::up_to_factor:
+            return "up to a factor";
+        case paper::Verdict::misprint:
+            return "misprint";
+        case paper::Verdict::definition:
+            return "definition";
+        case paper::Verdict::inconsistent:
+            break;
+    }
+    return "inconsistent";
+}
+
+}  // namespace
+
+std::string paper_json(const std::string& document, const std::vector<paper::Finding>& findings,
+                       const std::vector<PaperTable>& tables) {
+    nlohmann::ordered_json json = {{"format", 1}, {"command", "paper"}, {"document", document}};
+    json["statements"] = nlohmann::ordered_json::array();
+    for (const paper::Finding& finding : findings)
+        json["statements"].push_back({{"label", finding.label},
+                                      {"what", finding.what},
+                                      {"verdict", word_of(finding.verdict)},
+                                      {"resolved", paper::is_resolved(finding)},
+                                      {"demonstration", finding.demonstration}});
+    json["tables"] = nlohmann::ordered_json::array();
+    for (const PaperTable& table : tables)
+        json["tables"].push_back({{"title", table.title}, {"reproduced", table.reproduced()}});
+    return json.dump() + "\n";
 }
 
 }  // namespace lobatto

@@ -20,4 +20,8 @@ std::string walk_lines(const std::vector<paper::Finding>& findings);
 std::string table_lines(const PaperTable& table);
 std::string growth_lines(const std::vector<Figure>& figures);
 
+// For machines: one line of JSON (docs/schemas/paper.json).
+std::string paper_json(const std::string& document, const std::vector<paper::Finding>& findings,
+                       const std::vector<PaperTable>& tables);
+
 }  // namespace lobatto

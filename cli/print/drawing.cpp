@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Drawings as SVG files, through gnuplot.
+// Drawings through gnuplot.
 #include "cli/print/drawing.hpp"
 
 #include <fmt/format.h>
@@ -57,18 +57,15 @@ private:
     std::string path_;
 };
 
-}  // namespace
-
-void draw(const std::string& folder, const std::string& name, const std::string& script, int width, int height,
-          const std::string& without) {
-    const std::string path = (std::filesystem::path(folder) / (name + ".svg")).string();
+// What gnuplot makes of a script for one of its terminals. `path`: of the picture, for errors.
+std::string drawn(const std::string& folder, const std::string& path, const std::string& terminal,
+                  const std::string& script, const std::string& without) {
     const std::string otherwise = without.empty() ? elsewhere : without;
     const Workplace workplace(folder, path, otherwise);
-    write_whole(workplace / "script", "the picture's script",
-                fmt::format("set terminal svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb "
-                            "\"white\"{}set output \"{}/picture\"\n{}",
-                            width, height, style, workplace.name(), script),
-                otherwise);
+    write_whole(
+        workplace / "script", "the picture's script",
+        fmt::format("set terminal {}{}set output \"{}/picture\"\n{}", terminal, style, workplace.name(), script),
+        otherwise);
     ProcessRequest request;
     request.arguments = {"/usr/bin/env", "gnuplot", workplace.name() + "/script"};
     request.folder = folder;
@@ -78,14 +75,43 @@ void draw(const std::string& folder, const std::string& name, const std::string&
         throw MachineError(fmt::format("cannot draw {}: gnuplot is missing. Install it (apt install gnuplot-nox){}",
                                        path, without.empty() ? "" : ", or " + without));
     std::ifstream file(workplace / "picture", std::ios::binary);
-    const std::string picture(std::istreambuf_iterator<char>(file), {});
+    std::string picture(std::istreambuf_iterator<char>(file), {});
     // On a full disk gnuplot leaves a part of it, and is content.
-    if (!result.succeeded() || !picture.ends_with("</svg>\n\n"))
+    const bool is_whole = terminal.starts_with("svg")   ? picture.ends_with("</svg>\n\n")
+                          : terminal.starts_with("png") ? picture.find("IEND") != std::string::npos
+                                                        : !picture.empty();
+    if (!result.succeeded() || !is_whole)
         throw MachineError(fmt::format("gnuplot could not draw {}: {}", path,
                                        !result.output.empty() ? result.output
                                        : result.succeeded()   ? "the picture is not whole. Is the disk full?"
                                                               : "no message"));
-    write_whole(path, "the picture", picture, otherwise);
+    return picture;
+}
+
+std::string svg_terminal(int width, int height) {
+    return fmt::format("svg size {},{} dynamic font \"DejaVu Sans,15\" background rgb \"white\"", width, height);
+}
+
+}  // namespace
+
+void draw(const std::string& folder, const std::string& name, const std::string& script, int width, int height,
+          const std::string& without) {
+    const std::string path = (std::filesystem::path(folder) / (name + ".svg")).string();
+    write_whole(path, "the picture", drawn(folder, path, svg_terminal(width, height), script, without),
+                without.empty() ? elsewhere : without);
+}
+
+void draw_picture(const std::string& path, const std::string& script, int width, int height) {
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    const std::string terminal = path.ends_with(".png")
+                                     ? fmt::format("pngcairo size {},{} font \"DejaVu Sans,11\"", width, height)
+                                     : svg_terminal(width, height);
+    write_whole(path, "the picture", drawn(folder.empty() ? "." : folder.string(), path, terminal, script, ""));
+}
+
+std::string drawn_in_characters(const std::string& script, int columns, int rows) {
+    return drawn(std::filesystem::temp_directory_path().string(), "in the terminal",
+                 fmt::format("dumb size {},{}", columns, rows), script, "");
 }
 
 std::string gnuplot_text(const std::string& text) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Drawings as SVG files, through gnuplot.
+// Drawings through gnuplot: SVG, PNG, or characters of a terminal.
 #pragma once
 
 #include <string>
@@ -12,6 +12,12 @@ namespace lobatto {
 // refuses; `without`: how one does without the picture, "leave --chart out", if one can.
 void draw(const std::string& folder, const std::string& name, const std::string& script, int width, int height,
           const std::string& without = "");
+
+// The same as PATH, whose ending is .svg or .png, where the script holds its data.
+void draw_picture(const std::string& path, const std::string& script, int width, int height);
+
+// The same in characters, for a terminal of so many columns and rows.
+std::string drawn_in_characters(const std::string& script, int columns, int rows);
 
 // A text for gnuplot, between single quotes, where it is no command.
 std::string gnuplot_text(const std::string& text);

@@ -194,12 +194,12 @@ std::string colour(std::size_t index) {
     return colours[index % std::size(colours)];
 }
 
-std::string span(const States& states) {
+std::string span(const MotionRows& states) {
     return fmt::format("{:.6g}", states.time(states.count() - 1));
 }
 
 // The states of one turn around the middle of the motion, or all of them.
-std::size_t one_turn(const States& states) {
+std::size_t one_turn(const MotionRows& states) {
     Range q, p;
     for (std::size_t i = 0; i < states.count(); ++i) {
         q.take(states.q(i, 0));
@@ -217,8 +217,8 @@ std::size_t one_turn(const States& states) {
     return states.count();
 }
 
-Picture phase(const Scene& scene, const States& states, const std::vector<States>& smaller) {
-    const auto curve = [](const States& of, std::size_t count, const std::string& in, double width) {
+Picture phase(const Scene& scene, const MotionRows& states, const std::vector<MotionRows>& smaller) {
+    const auto curve = [](const MotionRows& of, std::size_t count, const std::string& in, double width) {
         Curve result{{}, in, width};
         for (std::size_t i = 0; i < count; ++i) result.points.push_back({of.q(i, 0), of.p(i, 0)});
         return result;
@@ -230,7 +230,7 @@ Picture phase(const Scene& scene, const States& states, const std::vector<States
                      fmt::format("Momentum over position, from t = {:.4g} to t = {:.4g}.", states.time(0),
                                  states.time(states.count() - 1)));
     std::vector<Curve> curves;
-    for (const States& one : smaller) curves.push_back(curve(one, one_turn(one), "#8fc1de", 1.4));
+    for (const MotionRows& one : smaller) curves.push_back(curve(one, one_turn(one), "#8fc1de", 1.4));
     curves.push_back(curve(states, one_turn(states), colour(1), 2.2));
     return drawn(scene, curves, axes, "Momentum over position: the scene's motion (orange) and smaller ones.");
 }
@@ -249,7 +249,7 @@ std::optional<Bodies> bodies_of(const Scene& scene) {
     return bodies;
 }
 
-Picture path(const Scene& scene, const States& states) {
+Picture path(const Scene& scene, const MotionRows& states) {
     const auto bodies = bodies_of(scene);
     std::vector<Curve> curves;
     if (!bodies) {
@@ -289,7 +289,7 @@ Picture path(const Scene& scene, const States& states) {
 
 // Rods from the origin to each body in turn at equal times, the older the paler, and the path of the last body; until
 // that is some three times as long as the picture is wide.
-Picture strobe(const Scene& scene, const States& states) {
+Picture strobe(const Scene& scene, const MotionRows& states) {
     Formulas formulas;
     for (const Parameter& parameter : scene.parameters)
         formulas.set(parameter.symbol, float_of(scene.evaluate(parameter.value, "the parameter " + parameter.name)));
@@ -341,7 +341,7 @@ Picture strobe(const Scene& scene, const States& states) {
                              scene.places.size() == 1 ? "bob" : "last bob"));
 }
 
-Picture polar(const Scene& scene, const States& states) {
+Picture polar(const Scene& scene, const MotionRows& states) {
     const int r = indices_of(scene, "r").front(), theta = indices_of(scene, "theta").front();
     Curve curve{{}, colour(0), 0, true};
     for (std::size_t i = 0; i < states.count(); ++i)
@@ -370,7 +370,7 @@ bool hangs(const Scene& scene, const Coordinate& theta) {
 }
 
 // Seen from 20 degrees above the equator; what lies behind is paler.
-Picture sphere(const Scene& scene, const States& states) {
+Picture sphere(const Scene& scene, const MotionRows& states) {
     const int theta = indices_of(scene, "theta").front(), phi = indices_of(scene, "phi").front();
     const double lift = pi / 9, up = hangs(scene, scene.coordinates[static_cast<std::size_t>(theta)]) ? -1 : 1;
     struct Place {
@@ -414,7 +414,7 @@ std::vector<int> longest_array(const Scene& scene) {
     return longest;
 }
 
-Picture waterfall(const Scene& scene, const States& states) {
+Picture waterfall(const Scene& scene, const MotionRows& states) {
     const std::vector<int> array = longest_array(scene);
     const std::size_t count = states.count();
     const std::size_t lines = std::min<std::size_t>(lines_in_waterfall, count);
@@ -450,7 +450,7 @@ Picture waterfall(const Scene& scene, const States& states) {
     return drawn(scene, curves, axes, fmt::format("{}[i] at {} times, one above the other.", name, lines));
 }
 
-Picture series(const Scene& scene, const States& states) {
+Picture series(const Scene& scene, const MotionRows& states) {
     std::vector<Curve> curves;
     const int shown = std::min<int>(states.n, static_cast<int>(std::size(colours)));
     std::string names;
@@ -486,7 +486,7 @@ Shape shape_of(const Scene& scene) {
 
 namespace {
 
-Picture picture_as(Shape shape, const Scene& scene, const States& states, const std::vector<States>& smaller) {
+Picture picture_as(Shape shape, const Scene& scene, const MotionRows& states, const std::vector<MotionRows>& smaller) {
     switch (shape) {
         case Shape::strobe:
             return strobe(scene, states);
@@ -508,7 +508,7 @@ Picture picture_as(Shape shape, const Scene& scene, const States& states, const 
 
 }  // namespace
 
-Picture picture_of(const Scene& scene, const States& states, const std::vector<States>& smaller) {
+Picture picture_of(const Scene& scene, const MotionRows& states, const std::vector<MotionRows>& smaller) {
     const Shape shape = shape_of(scene);
     const bool bodies = shape == Shape::path && scene.coordinates.size() > 3;
     const std::size_t budget = bodies || shape == Shape::strobe || shape == Shape::waterfall ? most_points
@@ -516,7 +516,7 @@ Picture picture_of(const Scene& scene, const States& states, const std::vector<S
                                : shape == Shape::phase                                       ? 3000
                                                                                              : 4500;
     // Of a motion too long for a picture its end is cut off; of a driven one, which settles, the beginning.
-    States shown = states;
+    MotionRows shown = states;
     const auto row = static_cast<std::ptrdiff_t>(1 + 2 * states.n);
     while (true) {
         Picture picture = picture_as(shape, scene, shown, smaller);

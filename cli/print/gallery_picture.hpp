@@ -10,7 +10,7 @@
 namespace lobatto {
 
 // States of a motion, row by row: t, q[n], p[n].
-struct States {
+struct MotionRows {
     int n = 0;
     std::vector<double> rows;
     std::size_t count() const { return rows.size() / static_cast<std::size_t>(1 + 2 * n); }
@@ -41,6 +41,6 @@ enum class Shape {
 Shape shape_of(const Scene& scene);
 
 // `smaller`: motions from starts nearer to the middle, for the shape phase.
-Picture picture_of(const Scene& scene, const States& states, const std::vector<States>& smaller);
+Picture picture_of(const Scene& scene, const MotionRows& states, const std::vector<MotionRows>& smaller);
 
 }  // namespace lobatto

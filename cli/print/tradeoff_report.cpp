@@ -85,7 +85,9 @@ std::string json_of(const Experiment& experiment) {
     nlohmann::ordered_json measurements = nlohmann::ordered_json::array(), front = measurements;
     for (const auto& [key, m] : experiment.store().all()) measurements.push_back(json_of(m));
     for (const Measurement& m : pareto_front(experiment)) front.push_back(json_of(m));
-    const nlohmann::ordered_json json = {{"scene", experiment.scene().name},
+    const nlohmann::ordered_json json = {{"format", 1},
+                                         {"command", "tradeoff"},
+                                         {"scene", experiment.scene().name},
                                          {"title", experiment.scene().title},
                                          {"until", experiment.until()},
                                          {"reference",
@@ -98,7 +100,7 @@ std::string json_of(const Experiment& experiment) {
                                          {"chaotic", experiment.is_chaotic()},
                                          {"front", front},
                                          {"measurements", measurements}};
-    return json.dump(1) + '\n';
+    return json.dump() + '\n';
 }
 
 }  // namespace lobatto

@@ -222,7 +222,7 @@ std::vector<DrawnFigure> from_coordinates(const Scene& scene) {
 
 std::vector<DrawnFigure> figures_of(const Scene& scene) {
     std::vector<DrawnFigure> all;
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    for (std::size_t b = 0; scene.figures.empty() && b < scene.bodies.size(); ++b)
         add(all, body(scene, scene.bodies[b], static_cast<int>(2 * b)));
     int colour = 0;
     for (const MovingFigure& figure : scene.figures) {

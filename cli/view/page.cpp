@@ -8,7 +8,7 @@
 #include <numeric>
 #include <string_view>
 
-#include "cli/view/page_text.hpp"
+#include "cli/print/embedded.hpp"
 
 namespace lobatto {
 
@@ -128,6 +128,15 @@ double comfortable_rate(const std::vector<ViewMotion>& motions) {
     return power * (bounded / power < 2 ? 1 : bounded / power < 5 ? 2 : 5);
 }
 
+namespace {
+
+std::string_view part_of_page(std::string_view name) {
+    return std::find_if(page_texts.begin(), page_texts.end(), [&](const EmbeddedText& one) { return one.name == name; })
+        ->text;
+}
+
+}  // namespace
+
 std::string page_of(const std::string& title, const std::vector<ViewMotion>& motions,
                     const std::vector<ViewChart>& charts, double rate) {
     Json runs = Json::array(), drawn = Json::array();
@@ -135,12 +144,12 @@ std::string page_of(const std::string& title, const std::vector<ViewMotion>& mot
     for (const ViewChart& chart : charts)
         drawn.push_back({{"title", chart.title}, {"curves", chart.curves}, {"phase", chart.phase}});
     const Json data{{"title", title}, {"rate", rate}, {"runs", runs}, {"charts", drawn}};
-    std::string page(page_html);
+    std::string page(part_of_page("page.html"));
     std::size_t from = 0;
     put(page, from, "@TITLE@", in_html(title));
-    put(page, from, "@STYLE@", page_css);
+    put(page, from, "@STYLE@", part_of_page("page.css"));
     put(page, from, "@DATA@", in_script(data.dump(-1, ' ', false, Json::error_handler_t::replace)));
-    put(page, from, "@SCRIPT@", page_js);
+    put(page, from, "@SCRIPT@", part_of_page("page.js"));
     return page;
 }
 

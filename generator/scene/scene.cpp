@@ -22,7 +22,6 @@ namespace lobatto {
 namespace {
 
 constexpr std::size_t longest_title = 200;
-constexpr long long most_steps = 9'000'000'000'000'000;  // step numbers are exact as doubles up to 2^53
 
 // The values of the run-time parameters: as given, or else those of the scene.
 GiNaC::exmap values_of(const std::vector<Parameter>& parameters, const std::vector<GiNaC::ex>& given) {
@@ -41,9 +40,7 @@ public:
     explicit Reader(const Source& source)
         : source_(source),
           document_(read_document(source)),
-          root_(source, document_.entries, {1, 1}, "a scene",
-                {"title", "time", "lagrangian", "coordinates", "parameters", "definitions", "forces", "constraints",
-                 "bodies", "joints", "impacts", "method", "run", "output", "view"}),
+          root_(source, document_.entries, {1, 1}, "a scene", scene_keys()),
           system_(source, root_, scene_) {}
 
     Scene run(const std::vector<std::string>& kept) {
@@ -101,7 +98,7 @@ private:
         const Entry* section = root_.find("method");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[method] with a line points = 4"), section->at,
-                          "[method]", {"family", "points", "stages", "tolerance", "arithmetic", "numbers", "clock"});
+                          "[method]", keys_of_section("method"));
         const Entry *family = table.find("family"), *points = table.find("points"), *stages = table.find("stages");
         if (family != nullptr) {
             const Value& value = family->value;
@@ -123,8 +120,7 @@ private:
             fail(stages->at,
                  "Lobatto has points, not stages: write points = 4, or add family = \"gauss\" or \"splitting\"");
         if (points != nullptr)
-            scene_.method.points =
-                static_cast<int>(integer_of(source_, *points, 2, 12, "there is Lobatto with 2 to 12 points"));
+            scene_.method.points = static_cast<int>(table.whole(*points, "there is Lobatto with 2 to 12 points"));
         if (stages != nullptr && splitting)
             scene_.method.points = splitting_stages_of(*stages);
         else if (stages != nullptr)
@@ -178,9 +174,7 @@ private:
     void read_run() {
         const std::string example = "[run] with lines step = 0.05 and until = 10";
         const Entry& section = root_.get("run", example);
-        const Table table(
-            source_, table_of(source_, section, example), section.at, "[run]",
-            {"step", "steps_per_period", "period", "until", "error", "beyond_horizon", "assemble", "stop"});
+        const Table table(source_, table_of(source_, section, example), section.at, "[run]", keys_of_section("run"));
         const Entry* step = table.find("step");
         const Entry* per_period = table.find("steps_per_period");
         const Entry* period = table.find("period");
@@ -200,7 +194,7 @@ private:
         if (!h.is_positive())
             fail(length.value.at, fmt::format("{} is {}; it must be positive", scope.formula, shown(h)));
         if (per_period != nullptr) {
-            const long long count = integer_of(source_, *per_period, 1, most_steps, "at least 1 and at most 9e15");
+            const long long count = table.whole(*per_period, "at least 1 and at most 9e15");
             scene_.run.step = scene_.run.step / GiNaC::numeric(static_cast<long>(count));
             h = h / GiNaC::numeric(static_cast<long>(count));
         }
@@ -238,8 +232,7 @@ private:
         const Entry* section = root_.find("output");
         if (section == nullptr) return;
         const Table table(source_, table_of(source_, *section, "[output] with a line every = 1"), section->at,
-                          "[output]",
-                          {"every", "energy", "momenta", "multipliers", "tangent", "dense", "events", "keep"});
+                          "[output]", keys_of_section("output"));
         Outputs& outputs = scene_.outputs;
         const Entry* every = table.find("every");
         if (every != nullptr && scene_.clock) {
@@ -262,8 +255,7 @@ private:
         }
         if (const Entry* tangent = table.find("tangent")) outputs.tangent = boolean_of(source_, *tangent);
         if (const Entry* dense = table.find("dense")) {
-            outputs.dense =
-                static_cast<int>(integer_of(source_, *dense, 0, 100, "0 to 100 states between two steps are computed"));
+            outputs.dense = static_cast<int>(table.whole(*dense, "0 to 100 states between two steps are computed"));
             if (outputs.dense > 0 && scene_.clock)
                 fail(
                     dense->at,

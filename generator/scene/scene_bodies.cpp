@@ -47,7 +47,7 @@ void SystemReader::Bodies::declare_body(const Entry& entry) {
     if (entry.key == "ground") fail(entry.at, "'ground' is what does not move; give the body another name");
     reader_.declarations_.declare(entry.key, entry.at, "body");
     Line line{Table(source_, table_of(source_, entry, body_example), entry.at, "body " + entry.key,
-                    {"mass", "inertia", "position", "orientation", "angle", "velocity", "angular_velocity"})};
+                    keys_of_section("bodies"))};
     const std::string moments = "its principal moments in space, [1, 1, 0.5], or one number in a plane";
     line.body.name = entry.key;
     line.body.at = entry.at;
@@ -95,11 +95,7 @@ bool SystemReader::Bodies::hangs_on(std::optional<std::size_t> body, std::size_t
 }
 
 void SystemReader::Bodies::declare_joint(const Entry& entry) {
-    static const std::vector<std::pair<std::string, std::vector<std::string>>> types = {
-        {"ball", {"type", "bodies", "point"}},
-        {"hinge", {"type", "bodies", "point", "axis", "angle", "velocity"}},
-        {"slider", {"type", "bodies", "axis", "position", "velocity"}},
-        {"distance", {"type", "bodies", "from", "to", "length"}}};
+    const auto& types = joint_types();
     reader_.declarations_.declare(entry.key, entry.at, "joint");
     const std::vector<Entry>& keys = table_of(source_, entry, joint_example);
     const auto given = std::find_if(keys.begin(), keys.end(), [](const Entry& key) { return key.key == "type"; });
@@ -110,7 +106,8 @@ void SystemReader::Bodies::declare_joint(const Entry& entry) {
         fail(given == keys.end() ? entry.at : given->value.at,
              fmt::format("of which type is joint {}? there are \"ball\", \"hinge\", \"slider\" and \"distance\"",
                          entry.key));
-    JointLine line{Table(source_, keys, entry.at, type->first + " " + entry.key, type->second)};
+    JointLine line{
+        Table(source_, keys, entry.at, type->first + " " + entry.key, keys_of_section("joints"), type->second)};
     Joint& joint = line.joint;
     joint.name = entry.key;
     joint.at = entry.at;

@@ -64,7 +64,7 @@ void SystemReader::read_impact(const Entry& entry) {
     const ArrayName array = declare_array(entry, "impact", "[impacts]");
     const auto& [name, index] = array;
     const Table table(source_, table_of(source_, entry, "{ when = \"y = 0 falling\", restitution = 1 }"), entry.at,
-                      "impact " + name, {"when", "count", "restitution", "reset"});
+                      "impact " + name, keys_of_section("impacts"));
     const Entry& when = table.get("when", "for example when = \"y = 0 falling\"");
     const Entry *restitution = table.find("restitution"), *reset = table.find("reset");
     if (when.value.kind != Value::Kind::text)

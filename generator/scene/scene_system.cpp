@@ -90,7 +90,7 @@ void SystemReader::read_parameters() {
         bool constant = false;
         if (entry.value.kind == Value::Kind::table) {
             const Table table(source_, entry.value.entries, entry.at, "parameter " + entry.key,
-                              {"value", "unit", "constant"});
+                              keys_of_section("parameters"));
             value = &table.get("value", "a number, for example value = 1");
             if (const Entry* given = table.find("unit")) unit = label_of(source_, *given, longest_unit);
             if (const Entry* flag = table.find("constant")) constant = boolean_of(source_, *flag);
@@ -149,7 +149,7 @@ void SystemReader::read_coordinate(const Entry& entry) {
     declarations_.declare(entry.key, entry.at, "coordinate");
     const std::string example_line = entry.key + " = { position = 1, velocity = 0 }";
     const Table table(source_, table_of(source_, entry, example_line), entry.at, "coordinate " + entry.key,
-                      {"count", "unit", "position", "velocity", "momentum"});
+                      keys_of_section("coordinates"));
     std::string unit;
     if (const Entry* given = table.find("unit")) unit = label_of(source_, *given, longest_unit);
     Group group{&entry, scene_.coordinates.size(), 1, false, nullptr, nullptr};
@@ -359,7 +359,7 @@ void SystemReader::read_constraint(const Entry& entry) {
     const auto& [name, index] = array;
     const Entry *equation = &entry, *number = nullptr;
     if (entry.value.kind == Value::Kind::table) {
-        const Table table(source_, entry.value.entries, entry.at, "constraint " + name, {"equation", "count"});
+        const Table table(source_, entry.value.entries, entry.at, "constraint " + name, keys_of_section("constraints"));
         equation = &table.get("equation", "for example equation = \"x^2 + y^2 = l^2\"");
         number = table.find("count");
     } else if (index) {

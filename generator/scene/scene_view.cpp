@@ -10,10 +10,6 @@ namespace lobatto {
 namespace {
 
 constexpr std::size_t most_figures = 2000, most_corners = 1000, most_plots = 24;
-const std::vector<std::pair<std::string, MovingFigure::Kind>> kinds = {{"point", MovingFigure::Kind::point},
-                                                                       {"line", MovingFigure::Kind::line},
-                                                                       {"spring", MovingFigure::Kind::spring},
-                                                                       {"circle", MovingFigure::Kind::circle}};
 const std::string figure_example = "{ line = [[0, 0], [\"l*sin(q)\", \"-l*cos(q)\"]] }";
 
 }  // namespace
@@ -51,14 +47,14 @@ void SystemReader::read_plots(const Entry& entry) {
 void SystemReader::read_figure(const Entry& entry) {
     const ArrayName array = declare_array(entry, "figure", "[view]");
     const Table table(source_, table_of(source_, entry, figure_example), entry.at, "figure " + array.name,
-                      {"point", "line", "spring", "circle", "radius", "trail", "closed", "count"});
+                      keys_of_section("view"));
     const Entry* shape = nullptr;
     MovingFigure figure;
-    for (const auto& [word, kind] : kinds)
-        if (const Entry* found = table.find(word)) {
+    for (std::size_t k = 0; k < figure_shapes().size(); ++k)
+        if (const Entry* found = table.find(figure_shapes()[k])) {
             if (shape != nullptr) fail(found->at, fmt::format("figure {} is a {} already", array.name, shape->key));
             shape = found;
-            figure.kind = kind;
+            figure.kind = static_cast<MovingFigure::Kind>(k);
         }
     if (shape == nullptr)
         fail(entry.at, fmt::format("figure {} has no shape; add one of point, line, spring and circle, as in {}",

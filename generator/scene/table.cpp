@@ -11,12 +11,13 @@
 namespace lobatto {
 
 Table::Table(const Source& source, const std::vector<Entry>& entries, Position at, std::string name,
-             const std::vector<std::string>& keys)
-    : source_(source), entries_(entries), at_(at), name_(std::move(name)) {
+             const std::vector<Key>& keys, const std::vector<std::string>& allowed)
+    : source_(source), entries_(entries), keys_(keys), at_(at), name_(std::move(name)) {
+    const std::vector<std::string> known = allowed.empty() ? names_of(keys) : allowed;
     for (const Entry& entry : entries_)
-        if (std::find(keys.begin(), keys.end(), entry.key) == keys.end())
+        if (std::find(known.begin(), known.end(), entry.key) == known.end())
             source_.fail(entry.at, fmt::format("unknown key '{}' in {}; known: {}.{}", entry.key.substr(0, 40), name_,
-                                               listing(keys), suggestion(entry.key, keys)));
+                                               listing(known), suggestion(entry.key, known)));
 }
 
 const Entry* Table::find(const std::string& key) const {
@@ -27,6 +28,11 @@ const Entry* Table::find(const std::string& key) const {
 const Entry& Table::get(const std::string& key, const std::string& example) const {
     if (const Entry* entry = find(key)) return *entry;
     source_.fail(at_, fmt::format("{} has no {}: add {}", name_, key, example));
+}
+
+long long Table::whole(const Entry& entry, const std::string& range) const {
+    const auto key = std::find_if(keys_.begin(), keys_.end(), [&](const Key& one) { return one.name == entry.key; });
+    return integer_of(source_, entry, key->least, key->most, range);
 }
 
 namespace {

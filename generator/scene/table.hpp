@@ -7,22 +7,26 @@
 
 #include "generator/formula/source.hpp"
 #include "generator/scene/document.hpp"
+#include "generator/scene/keys.hpp"
 
 namespace lobatto {
 
 class Table {
 public:
-    // Refuses keys that are not among `keys`.
+    // Refuses keys that are not among `keys`, which outlive the table; or not among those of them that are `allowed`.
     Table(const Source& source, const std::vector<Entry>& entries, Position at, std::string name,
-          const std::vector<std::string>& keys);
+          const std::vector<Key>& keys, const std::vector<std::string>& allowed = {});
 
     Position at() const { return at_; }
     const Entry* find(const std::string& key) const;                             // nullptr: not given
     const Entry& get(const std::string& key, const std::string& example) const;  // an error when not given
+    // The whole number of an entry, which must be within the limits of its key; `range` says them.
+    long long whole(const Entry& entry, const std::string& range) const;
 
 private:
     const Source& source_;
     const std::vector<Entry>& entries_;
+    const std::vector<Key>& keys_;
     Position at_;
     std::string name_;
 };

@@ -1,0 +1,13 @@
+# Writes the texts of some files into one C++ file. OUTPUT: where to; NAME: of the list; FOLDER, and FILES in it.
+set(text "// Written by embed_texts.cmake.\n#include \"cli/print/embedded.hpp\"\n\nnamespace lobatto {\n\nconst std::vector<EmbeddedText> ${NAME} = {\n")
+string(REPLACE "," ";" FILES "${FILES}")
+foreach(file ${FILES})
+    file(READ ${FOLDER}/${file} content)
+    string(LENGTH "${content}" length)
+    if(length GREATER 65000)
+        message(FATAL_ERROR "${file} is too long for one string literal")
+    endif()
+    string(APPEND text "{\"${file}\", R\"~~~(${content})~~~\"},\n")
+endforeach()
+string(APPEND text "};\n\n}  // namespace lobatto\n")
+file(WRITE ${OUTPUT} "${text}")
