@@ -80,8 +80,10 @@ const before = await scheme();
 await page.locator(".md-header__option label:visible").first().click();
 check("a click makes it dark, or light", await scheme() !== before);
 await page.locator(".md-search__input").click();
-await page.locator(".md-search__input").fill("symplectic");
-await page.waitForSelector(".md-search-result__item", { timeout: 10000 }).catch(() => {});
+// Its index is read in another thread, which takes a while on a busy machine.
+await page.waitForFunction(() => /Type/.test(document.querySelector(".md-search-result__meta").textContent), null, { timeout: 60000 }).catch(() => {});
+await page.locator(".md-search__input").pressSequentially("symplectic", { delay: 30 });
+await page.waitForSelector(".md-search-result__item", { timeout: 30000 }).catch(() => {});
 check("the search finds something", await page.locator(".md-search-result__item").count() > 3);
 await page.close();
 
