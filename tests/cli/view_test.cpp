@@ -72,6 +72,20 @@ TEST_CASE("the page of a scene carries its motion, and asks nothing of the net")
     CHECK(data["rate"].get<double>() > 0);
 }
 
+TEST_CASE("a second call replaces the page of the first, and nothing that Lobatto did not write") {
+    const test::TemporaryFolder folder;
+    const std::string page = folder / "page.html";
+    const std::vector<std::string> command{
+        LOBATTO_PROGRAM, "view", tree + "/scenes/kepler.toml", "--until", "5", "--quiet", "-o", page};
+    for (int call = 0; call < 2; ++call) {
+        const test::Finished finished = test::run(command);
+        INFO(finished.err);
+        CHECK(finished.exit_code == 0);
+    }
+    test::write_text(page, "<!doctype html>\n<title>A page of somebody else</title>\n");
+    CHECK(test::run(command).exit_code == 2);
+}
+
 TEST_CASE("titles and labels cannot break out of the page") {
     const test::TemporaryFolder folder;
     const std::string scene = folder / "x.toml";
