@@ -4,7 +4,7 @@
 
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
-#include "generator/describe/schema.hpp"
+#include "generator/scene/schema.hpp"
 #include "runtime/run/partial_file.hpp"
 
 namespace lobatto {

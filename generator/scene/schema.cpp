@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "generator/describe/schema.hpp"
+#include "generator/scene/schema.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What programs read: every --json by its schema in docs/schemas/.
+#include <doctest/doctest.h>
+
+#include "tests/json_schema.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+const std::string tree = LOBATTO_SOURCE_DIR;
+
+std::string scene(const std::string& name) {
+    return tree + "/scenes/" + name + ".toml";
+}
+
+// The answer of a command, by its schema.
+nlohmann::json answer_of(const std::string& schema, std::vector<std::string> command, int exit_code = 0) {
+    command.insert(command.begin(), LOBATTO_PROGRAM);
+    command.emplace_back("--json");
+    const test::Finished finished = test::run(command);
+    CAPTURE(command[1]);
+    CAPTURE(finished.err);
+    CHECK(finished.exit_code == exit_code);
+    const nlohmann::json answer = nlohmann::json::parse(finished.out);
+    const test::JsonSchema rules(nlohmann::json::parse(test::read_file(tree + "/docs/schemas/" + schema + ".json")));
+    CHECK(rules.complaint(answer) == "");
+    if (schema != "derive" && schema.find("stability") == std::string::npos) CHECK(answer["command"] == schema);
+    CHECK(answer["format"] == 1);
+    return answer;
+}
+
+}  // namespace
+
+TEST_CASE("run --json: numbers for everything that run prints, also of a run that fails or stops") {
+    const test::TemporaryFolder folder;
+    const std::string output = folder / "run.csv";
+    const auto pendulum = answer_of("run", {"run", scene("pendulum"), "-o", output});
+    CHECK(pendulum["ending"] == "done");
+    CHECK(pendulum["steps"] == 2400);
+    CHECK(pendulum["energy_error_relative"].get<double>() < 1e-7);
+    CHECK(pendulum["measured_error"]["at_end"].get<double>() > 0);
+    CHECK(pendulum["position_error"].get<double>() < 1e-7);
+    CHECK(pendulum["files"]["trajectory"] == output);
+    const auto lost = answer_of("run", {"run", scene("double_pendulum"), "--until", "1000", "-o", output}, 3);
+    CHECK(lost["ending"] == "failed");
+    CHECK(lost["failure"].get<std::string>().find("left its motion") != std::string::npos);
+    CHECK(lost["measured_error"]["lost_after"].is_number());
+    const auto ball = answer_of("run", {"run", scene("bouncing_ball"), "-o", output});
+    CHECK(ball["events"].size() >= 1);
+    CHECK(ball["events"][0]["count"].get<double>() > 1);
+    const auto rod = answer_of("run", {"run", scene("rod_pendulum"), "-o", output});
+    CHECK(rod["state"]["q"].size() == 2);
+    answer_of("run", {"run", scene("driven_damped_pendulum"), "-o", output});
+    answer_of("run", {"run", scene("pythagorean"), "-o", output});
+}
+
+TEST_SUITE("slow") {
+    TEST_CASE("the reports of the other commands keep their schemas") {
+        const test::TemporaryFolder folder;
+        CHECK(answer_of("check", {"check", scene("two_pendulums")})["step"]["unknowns"] == 4);
+        // The multipliers of constraints stand among what is solved for.
+        const auto crank = answer_of("check", {"check", scene("slider_crank")});
+        CHECK(crank["step"]["groups"][0]["coordinates"].dump().find("lambda_piston") != std::string::npos);
+        answer_of("derive", {"derive", scene("pendulum")});
+        answer_of("derive", {"derive", scene("rod_pendulum")});
+        answer_of("stability_members", {"stability"});
+        answer_of("stability", {"stability", scene("harmonic_oscillator")});
+        answer_of("stability", {"stability", scene("henon_heiles")});
+        const auto proof = answer_of("verify", {"verify", scene("pendulum")});
+        CHECK(proof["holds"] == true);
+        CHECK(proof["claims"].size() > 10);
+        const auto choice =
+            answer_of("tune", {"tune", scene("pendulum"), "--error", "1e-3", "--until", "5", "--budget", "20s"});
+        CHECK(choice["choice"]["error"].get<double>() <= 1e-3);
+        const auto noise = answer_of("roundoff", {"roundoff", scene("kepler"), "--steps", "1000", "--trajectories", "2",
+                                                  "--no-picture", "-o", folder / "roundoff"});
+        CHECK(noise["plain"]["rows"].size() == noise["clean"]["rows"].size());
+        const auto trade = answer_of(
+            "tradeoff", {"tradeoff", scene("pendulum"), "--until", "5", "--budget", "3s", "-o", folder / "tradeoff"});
+        CHECK(trade == nlohmann::json::parse(test::read_file(folder / "tradeoff/tradeoff.json")));
+        const auto emitted = answer_of("emit", {"emit", scene("pendulum"), "-o", folder / "kernels"});
+        CHECK(emitted["files"].size() == 2);
+        CHECK(emitted["passes"].size() > 3);
+        answer_of("emit", {"emit", scene("pendulum"), "--plain", "-o", folder / "plain"});
+        const auto page =
+            answer_of("view", {"view", scene("pendulum"), "--beside", "points=2", "-o", folder / "v.html"});
+        CHECK(page["drawn"].size() == 2);
+        CHECK(page["drawn"][1]["title"] == "Lobatto, 2 points");
+        const auto pictures = answer_of("gallery", {"gallery", scene("kepler"), "-o", folder / "gallery"});
+        CHECK(std::filesystem::exists(pictures["drawn"][0]["file"].get<std::string>()));
+    }
+
+    TEST_CASE("paper --json says of every statement how it was decided") {
+        const test::TemporaryFolder folder;
+        const auto paper = answer_of("paper", {"paper", "--no-figures", "-o", folder / "paper"});
+        CHECK(paper["statements"].size() > 20);
+        for (const auto& statement : paper["statements"]) CHECK(statement["resolved"] == true);
+        for (const auto& table : paper["tables"]) CHECK(table["reproduced"] == true);
+    }
+}
+
+TEST_CASE("a schema that is broken says where") {
+    const test::JsonSchema rules(nlohmann::json::parse(test::read_file(tree + "/docs/schemas/emit.json")));
+    CHECK(rules.complaint({{"format", 2}}) != "");
+    CHECK(rules.complaint({{"format", 1}, {"command", "emit"}}) == "$ has no \"scene\"");
+}
