@@ -13,9 +13,11 @@
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
+#include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "cli/view/motion.hpp"
+#include "cli/view/video.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 
@@ -25,11 +27,13 @@ namespace {
 
 constexpr std::size_t numbers_on_page = 1'000'000;  // of 16 bits: some 2.7 MB
 constexpr std::size_t most_motions = 6;
+constexpr double longest_video = 20;  // seconds
 
 struct ViewCommand {
     std::vector<std::string> scenes;
     std::vector<std::string> beside;
     std::string output;  // empty: out/NAME.html
+    std::string video;   // empty: none
     MethodOption method;
     Overrides overrides;
     bool quiet = false, json = false;
@@ -134,14 +138,24 @@ std::vector<ViewChart> charts_of(const std::vector<Viewed>& all) {
 void view(const ViewCommand& options) {
     const std::string path = output_path(options.output, result_name(options.scenes.front()) + ".html");
     for (const std::string& scene : options.scenes) keep_scene(scene, path);
+    if (!options.video.empty()) check_video_name(options.video);
     keep_foreign(path);
     const std::vector<Viewed> all = motions_of(options);
     if (std::any_of(all.begin(), all.end(), [](const Viewed& one) { return one.is_interrupted; }))
         throw ExitCode{interrupted_exit};
     std::vector<ViewMotion> motions;
     for (const Viewed& one : all) motions.push_back(one.motion);
-    const std::string page = page_of(all.front().title, motions, charts_of(all), comfortable_rate(motions));
+    const double rate = comfortable_rate(motions);
+    const std::string page = page_of(all.front().title, motions, charts_of(all), rate);
     write_whole(path, "the page", page);
+    if (!options.video.empty()) {
+        double end = 0;
+        for (const ViewMotion& motion : motions) end = std::max(end, motion.times.back());
+        Say say;
+        say("drawing the frames of the video");
+        write_video(path, options.video, std::min(end / rate, longest_video));
+        say.clear();
+    }
     if (options.json) {
         std::vector<Drawn> drawn;
         for (std::size_t i = 0; i < all.size(); ++i)
@@ -153,6 +167,7 @@ void view(const ViewCommand& options) {
             print_row("motion", fmt::format("{}: {}; {} frames, {} figures", one.motion.label, one.motion.note,
                                             one.motion.times.size(), one.motion.figures.size()));
         print_row("page", fmt::format("{}, {} kB: open it in a browser", path, (page.size() + 999) / 1000));
+        if (!options.video.empty()) print_row("video", options.video);
     }
     for (const Viewed& one : all)
         if (!one.failure.empty())
@@ -171,6 +186,10 @@ void add_view(CommandLine& program) {
         .shown_as("CHOICE")
         .one_value_each();
     command.option("-o,--output", options->output, "Page (default: out/NAME.html)").shown_as("FILE");
+    command
+        .option("--video", options->video,
+                "Also the first 20 seconds as a video, .mp4 or .gif; needs chromium and ffmpeg")
+        .shown_as("FILE");
     options->method.add_to(command);
     add_step_option(command, options->overrides);
     add_until_option(command, options->overrides);

@@ -443,7 +443,57 @@ function tick(now) {
     if (redraw) { redraw = false; show(); }
     requestAnimationFrame(tick);
 }
+// --- `lobatto view --video`: with #frames=COUNT,RATE every frame stands as a picture in the text of the page.
+function paint_text(context) {
+    const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    for (let node = texts.nextNode(); node; node = texts.nextNode()) {
+        const parent = node.parentElement;
+        if (!node.data.trim() || !parent.closest("h1, figcaption")) continue;
+        const range = document.createRange();
+        range.selectNodeContents(node);
+        const box = range.getBoundingClientRect(), style = getComputedStyle(parent);
+        context.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
+        context.fillStyle = style.color;
+        context.textBaseline = "middle";
+        context.fillText(node.data.replace(/\s+/g, " "), box.left, box.top + box.height / 2);
+    }
+}
+function picture(canvas) {
+    const context = canvas.getContext("2d");
+    context.fillStyle = ink.back;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    for (const figure of document.querySelectorAll("figure")) {
+        const box = figure.getBoundingClientRect();
+        context.fillStyle = ink.pane;
+        context.fillRect(box.left, box.top, box.width, box.height);
+        const one = figure.querySelector("canvas"), place = one.getBoundingClientRect();
+        context.drawImage(one, place.left, place.top, place.width, place.height);
+    }
+    paint_text(context);
+    context.textAlign = "right";
+    context.fillText(by("clock").textContent, canvas.width - 20, 24);
+    context.textAlign = "left";
+    return canvas.toDataURL("image/jpeg", 0.92);
+}
+function print_frames(count, rate) {
+    const canvas = document.createElement("canvas"), frames = [];
+    canvas.width = window.innerWidth & ~1;  // encoders want even sizes
+    canvas.height = window.innerHeight & ~1;
+    state.playing = false;
+    for (let i = 0; i < count; ++i) {
+        state.time = Math.min(i / rate * state.rate, end);
+        show();
+        frames.push(picture(canvas).split(",")[1]);
+    }
+    const text = document.createElement("pre");
+    text.id = "frames";
+    text.textContent = frames.join("\n");
+    document.body.replaceChildren(text);
+}
+
 show_theme();
 window.lobatto = { state, data, seek };
-requestAnimationFrame(now => { state.last = now; tick(now); });
+const asked = /^#frames=(\d+),(\d+)$/.exec(window.location.hash);
+if (asked) print_frames(Number(asked[1]), Number(asked[2]));
+else requestAnimationFrame(now => { state.last = now; tick(now); });
 })();
