@@ -51,6 +51,9 @@ void flush_output() {
 
 void describe(CommandLine& program) {
     program.version("lobatto " LOBATTO_VERSION);
+#ifdef LOBATTO_MPI  // each process would do the whole work of another command
+    add_sweep(program);
+#else
     add_check(program);
     add_derive(program);
     add_emit(program);
@@ -58,12 +61,14 @@ void describe(CommandLine& program) {
     add_stability(program);
     add_roundoff(program);
     add_sweep(program);
+    add_merge(program);
     add_tradeoff(program);
     add_tune(program);
     add_verify(program);
     add_view(program);
     add_gallery(program);
     add_paper(program);
+#endif
     // Last, because a command takes over the footer that its parent has at that moment.
     program.footer(
         "Example:\n"

@@ -56,13 +56,13 @@ TEST_CASE("a word that is no command is refused with exit code 2, the commands, 
     CHECK(unknown.code == 2);
     CHECK(unknown.text ==
           "lobatto: unknown command 'nonsense'; the commands are: check, derive, emit, run, stability, "
-          "roundoff, sweep, tradeoff, tune, verify, view, gallery, "
+          "roundoff, sweep, merge, tradeoff, tune, verify, view, gallery, "
           "paper.\n");
     const Answer scene = shell(program + " scenes/pendulum.toml");
     CHECK(scene.code == 2);
     CHECK(scene.text ==
           "lobatto: unknown command 'scenes/pendulum.toml'; the commands are: check, derive, emit, run, "
-          "stability, roundoff, sweep, tradeoff, tune, verify, view, gallery, paper. "
+          "stability, roundoff, sweep, merge, tradeoff, tune, verify, view, gallery, paper. "
           "Did you mean `lobatto run scenes/pendulum.toml`?\n");
 }
 
