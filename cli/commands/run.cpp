@@ -259,12 +259,14 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, co
 
 // What a file of this kind cannot hold, or not go on with.
 void refuse_format(const RunOptions& options) {
-    if (!options.resume || (options.output != standard_output && format_of(options) == TableFormat::csv)) return;
-    throw InputError(fmt::format("--resume: {} cannot be continued, only a .csv can; leave --resume out",
-                                 options.output == standard_output ? "standard output" : options.output));
+    const bool is_csv = options.output != standard_output && format_of(options) == TableFormat::csv;
+    if (options.resume && !is_csv)
+        throw InputError(fmt::format("--resume: {} cannot be continued, only a .csv can; leave --resume out",
+                                     options.output == standard_output ? "standard output" : options.output));
 }
 
 void run(const RunOptions& options) {
+    if (!options.output.empty()) keep_scene(options.scene, options.output);
     refuse_format(options);
     const bool quiet = options.quiet || options.output == standard_output;
     Scene read = read_scene(options.scene);

@@ -230,6 +230,7 @@ void sweep(const SweepOptions& options) {
     const bool is_stream = options.output == standard_output;
     const bool quiet = options.quiet || is_stream;
     const auto [number, of] = shard_of(options.starts.shard);
+    if (!options.output.empty()) keep_scene(options.scene, options.output);
     const TableFormat format = options.table_format();
     const std::unique_ptr<SweepStudy> study = study_of(options, threads);
     refuse_both(options, study->starts());

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double range_seconds = 1;           // that a range should take
 constexpr std::int64_t first_range = 64;      // trajectories
-constexpr std::int64_t most_cells = 1 << 19;  // of the rows of a range
+constexpr std::int64_t most_cells = 1 << 17;  // of the rows of a range
 constexpr int ahead = 2;                      // ranges that a process has at a time, so that it never waits
 constexpr int window = 8;                     // ranges for each process that may wait for an earlier one
 

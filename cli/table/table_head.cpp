@@ -49,11 +49,19 @@ std::vector<std::string> split(const std::string& text, const std::string& separ
     return parts;
 }
 
-// Which columns are whole numbers is not said in CSV; their names say it.
-bool is_whole(std::string name) {
-    while (name.ends_with('_')) name.pop_back();
-    return name == "index" || name == "status" || name == "steps" || name == "stop" || name == "points" ||
-           name == "stages" || name == "splitting";
+// The units in "q [rad], p_q": after the names, which are known.
+void read_units(const std::string& text, std::vector<TableColumn>& columns) {
+    std::size_t at = 0;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+        const std::string next = c + 1 < columns.size() ? ", " + columns[c + 1].name : "";
+        at += columns[c].name.size();
+        if (text.compare(at, 2, " [") == 0) {
+            const std::size_t end = next.empty() ? text.size() - 1 : std::min(text.find("]" + next, at), text.size());
+            columns[c].unit = text.substr(at + 2, end - at - 2);
+            at = end + 1;
+        }
+        at = std::min(at + 2, text.size());
+    }
 }
 
 }  // namespace
@@ -66,6 +74,10 @@ std::string csv_head(const TableHead& head) {
     std::string text = fmt::format("# lobatto {}\n", head.kind);
     for (const auto& [what, value] : head.facts) text += fmt::format("# {}: {}\n", what, value);
     if (head.shard) text += fmt::format("# shard: {}\n", shard_text(*head.shard));
+    std::string whole;
+    for (const TableColumn& column : head.columns)
+        if (column.whole) whole += (whole.empty() ? "" : ", ") + column.name;
+    if (!whole.empty()) text += fmt::format("# whole numbers: {}\n", whole);
     text += "# columns:";
     const char* separator = " ";
     for (const TableColumn& column : head.columns) {
@@ -84,7 +96,8 @@ std::optional<TableHead> read_csv_head(const std::string& text, std::size_t& len
     TableHead head;
     const std::string begin = "# lobatto ", columns = "columns";
     if (!text.starts_with(begin)) return std::nullopt;
-    std::vector<std::string> units;
+    std::vector<std::string> whole;
+    std::string units;
     for (std::size_t at = 0;;) {
         const std::size_t end = text.find('\n', at);
         if (end == std::string::npos) return std::nullopt;
@@ -99,18 +112,19 @@ std::optional<TableHead> read_csv_head(const std::string& text, std::size_t& len
             if (what == "shard")
                 head.shard = shard_of(value);
             else if (what == columns)
-                units = split(value, ", ");
+                units = value;
+            else if (what == "whole numbers")
+                whole = split(value, ", ");
             else
                 head.add(what, value);
         } else {
-            for (const std::string& name : split(line, ",")) head.columns.push_back({name, "", is_whole(name)});
+            for (const std::string& name : split(line, ","))
+                head.columns.push_back({name, "", std::find(whole.begin(), whole.end(), name) != whole.end()});
             length = at;
             break;
         }
     }
-    for (std::size_t c = 0; c < head.columns.size() && c < units.size(); ++c)
-        if (const std::size_t open = head.columns[c].name.size() + 2; units[c].size() > open && units[c].back() == ']')
-            head.columns[c].unit = units[c].substr(open, units[c].size() - open - 1);
+    read_units(units, head.columns);
     return head;
 }
 

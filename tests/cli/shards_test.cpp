@@ -100,6 +100,34 @@ TEST_CASE("shards, merged in any order, are the table of one process, byte for b
     }
 }
 
+TEST_CASE("a scene may have the names of the table's own columns, and units with commas") {
+    const test::SweepFolder place;
+    test::write_text(place.file("scene.toml"),
+                     "lagrangian = \"points'^2/2 + steps'^2/2 - points*steps\"\n[coordinates]\n"
+                     "points = { position = 0.5, velocity = 0, unit = \"m, steps\" }\n"
+                     "steps = { position = 0.25, velocity = 0, unit = \"a] b\" }\n[run]\nstep = 0.1\nuntil = 1\n");
+    const auto sweep = [&](const std::string& name, const std::vector<std::string>& more = {}) {
+        std::vector<std::string> words{
+            "sweep", place.file("scene.toml"), "--vary", "points=0:0.5:7", "--vary", "stages=1,2",
+            "-o",    place.file(name)};
+        words.insert(words.end(), more.begin(), more.end());
+        const test::Finished done = place.lobatto(words);
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+        return test::read_file(place.file(name));
+    };
+    for (const std::string& ending : endings()) {
+        CAPTURE(ending);
+        const std::string whole = sweep("whole" + ending);
+        sweep("1" + ending, {"--shard", "1/2"});
+        sweep("2" + ending, {"--shard", "2/2"});
+        const test::Finished merged =
+            place.lobatto({"merge", place.file("m" + ending), place.file("2" + ending), place.file("1" + ending)});
+        CHECK_MESSAGE(merged.exit_code == 0, merged.err);
+        CHECK(test::read_file(place.file("m" + ending)) == whole);
+        CHECK(sweep("whole" + ending, {"--resume"}) == whole);
+    }
+}
+
 TEST_CASE("parts that do not belong together are told apart, and missing ones are named") {
     const test::SweepFolder place;
     const auto part = [&](const std::string& name, const std::string& shard, const std::string& vary = "q=0:1:10") {

@@ -560,7 +560,7 @@ TEST_CASE("a machine that refuses to write is an error of exit code 4; a reader 
     const test::Finished head =
         test::run({"sh", "-c",
                    "'" LOBATTO_PROGRAM "' sweep '" + pendulum +
-                       "' --quiet --vary q=0:3:1000000 --until 1 -o /dev/stdout | head -11 | tail -1"});
+                       "' --quiet --vary q=0:3:1000000 --until 1 -o /dev/stdout | head -12 | tail -1"});
     CHECK(head.out == "index,q(0),status,steps,t,q,p_q,energy_error,error\n");
     CHECK(head.err == "lobatto: cannot write the table to /dev/stdout: Broken pipe. Its reader has gone\n");
 }
