@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "analysis/accuracy/companion.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
@@ -119,8 +120,10 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     const bool is_alone = !scene_.outputs.kept.empty() || !scene_.run.stops.empty() || scene_.is_cut();
     const std::int64_t together =
         scene_.coordinates.size() > 2 ? std::min<std::int64_t>(count, 8) : count / thread_count(options_.threads);
-    setting->kernel =
-        is_alone ? kernel_of(*source, Precision::double_) : ensemble_kernel_of(*source, Precision::double_, together);
+    Compiled compiled;
+    setting->kernel = is_alone ? kernel_of(*source, Precision::double_, &compiled)
+                               : ensemble_kernel_of(*source, Precision::double_, together, &compiled);
+    setting->compiled = std::filesystem::path(compiled.object).stem().string();
     setting->request = request_of(*setting);
     return setting;
 }

@@ -55,6 +55,7 @@ public:
         std::shared_ptr<const Derivation> derivation;
         std::shared_ptr<const KernelSource> source;
         std::optional<Kernel> kernel;
+        std::string compiled;     // names the kernel with its compiler and processor: the same, the same bits
         EnsembleRequest request;  // of all its trajectories
     };
     const Setting& first_setting() const { return *first_; }

@@ -10,6 +10,7 @@
 #include "cli/options/output_path.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/sweep_summary.hpp"
+#include "cli/print/tell.hpp"
 #include "cli/table/table_file.hpp"
 #include "cli/table/table_reader.hpp"
 #include "runtime/error.hpp"
@@ -50,6 +51,7 @@ public:
                     throw InputError(
                         fmt::format("{} and {} are of different sweeps: {}", by_number_.begin()->second, path, what));
             }
+            if (head.shard->compiled != head_.shard->compiled && rounds_otherwise_.empty()) rounds_otherwise_ = path;
             const auto [other, is_new] = by_number_.emplace(head.shard->number, path);
             if (!is_new)
                 throw InputError(fmt::format("{} and {} are both shard {}/{}; leave one of both out", other->second,
@@ -65,13 +67,15 @@ public:
         return whole;
     }
     std::size_t count() const { return by_number_.size(); }
+    // A part that was not computed as the others were; empty: there is none.
+    const std::string& rounds_otherwise() const { return rounds_otherwise_; }
     std::int64_t trajectories() const { return head_.shard->trajectories; }
 
     // All rows, in the order of the trajectories.
     void each_block(const std::function<void(const std::vector<TableCell>&, std::size_t rows)>& take) const {
         const std::size_t width = head_.columns.size();
         for (const auto& [number, path] : by_number_) {
-            const Shard shard{number, head_.shard->of, head_.shard->trajectories};
+            const Shard shard{number, head_.shard->of, head_.shard->trajectories, ""};
             TableReader part = reader(path);
             std::vector<TableCell> cells;
             std::int64_t next = shard.first();  // that may come
@@ -111,6 +115,7 @@ private:
     TableFormat format_;
     TableHead head_;
     std::map<std::int64_t, std::string> by_number_;
+    std::string rounds_otherwise_;
 };
 
 // The column of the statuses: its name may end with underscores.
@@ -142,6 +147,11 @@ void merge(const MergeOptions& options) {
         table.discard();
         throw;
     }
+    if (!parts.rounds_otherwise().empty())
+        tell(
+            "lobatto: warning: {} was computed on another kind of processor, or by another compiler, than the first of "
+            "the parts; last digits may differ from those of one process.\n",
+            parts.rounds_otherwise());
     if (options.quiet || options.output == standard_output) return;
     print_row("shards", fmt::format("{}", parts.count()));
     print_row("trajectories",

@@ -238,7 +238,7 @@ void sweep(const SweepOptions& options) {
     if (options.resume && is_stream)
         throw InputError("--resume: standard output is not read back; name a file with -o");
 
-    const Shard shard{number, of, study->starts().count()};
+    const Shard shard{number, of, study->starts().count(), study->first_setting().compiled};
     TableHead head = head_of(*study);
     if (!shard.is_whole()) head.shard = shard;
     const Scene& scene = study->scene();

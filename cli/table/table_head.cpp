@@ -20,16 +20,18 @@ std::string quoted(const std::string& name) {
 }
 
 std::string shard_text(const Shard& shard) {
-    return fmt::format("{}/{} of {} trajectories", shard.number, shard.of, shard.trajectories);
+    return fmt::format("{}/{} of {} trajectories, compiled kernel {}", shard.number, shard.of, shard.trajectories,
+                       shard.compiled);
 }
 
 std::optional<Shard> shard_of(const std::string& text) {
     Shard shard;
     char slash = 0;
-    std::string of;
+    std::string of, trajectories, compiled, kernel;
     std::istringstream words(text);
-    if (!(words >> shard.number >> slash >> shard.of >> of >> shard.trajectories) || slash != '/' || shard.of < 1 ||
-        shard.number < 1 || shard.number > shard.of)
+    if (!(words >> shard.number >> slash >> shard.of >> of >> shard.trajectories >> trajectories >> compiled >>
+          kernel >> shard.compiled) ||
+        slash != '/' || shard.of < 1 || shard.number < 1 || shard.number > shard.of)
         return std::nullopt;
     return shard;
 }

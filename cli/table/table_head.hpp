@@ -16,6 +16,7 @@ namespace lobatto {
 struct Shard {
     std::int64_t number = 1, of = 1;
     std::int64_t trajectories = 0;  // of the whole sweep
+    std::string compiled = {};      // names the compiled kernel: other processors and compilers round otherwise
 
     std::int64_t first() const { return boundary(number - 1); }
     std::int64_t last() const { return boundary(number); }  // one past the last

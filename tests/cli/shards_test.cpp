@@ -165,6 +165,22 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
     test::write_text(two, text.substr(0, text.rfind('\n', text.size() - 2) + 1));
     CHECK(refusal({one, two, three, four}, out) ==
           two + " is not complete: it has 2 of 3 trajectories. Continue it with --resume\n");
+    // One of another processor.
+    test::write_text(two, text);
+    const std::string label = ", compiled kernel ";
+    std::string elsewhere = text;
+    char& letter = elsewhere[elsewhere.find(label) + label.size()];
+    letter = letter == '0' ? '1' : '0';
+    test::write_text(two, elsewhere);
+    const test::Finished mixed = place.lobatto({"merge", out, one, two, three, four});
+    CHECK(mixed.exit_code == 0);
+    CHECK(mixed.err == "lobatto: warning: " + two +
+                           " was computed on another kind of processor, or by another compiler, than the first of the "
+                           "parts; last digits may differ from those of one process.\n");
+    CHECK(test::read_file(out) == test::read_file(place.file("whole.csv")));
+    CHECK(place.refusal("2.csv", {"--vary", "q=0:1:10", "--until", "1", "--shard", "2/4", "--resume"})
+              .find("it was computed on another kind of processor or by another compiler, which rounds otherwise") !=
+          std::string::npos);
     // Only the scene's text differs: nothing in the heads but what stands for all of it.
     test::write_text(place.file("pendulum.toml"), test::read_file(pendulum_file) + "# another text\n");
     place.lobatto(
