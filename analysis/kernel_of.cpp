@@ -63,8 +63,8 @@ Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* comp
     return built(source, translation_of(source, precision), compiled);
 }
 
-Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together) {
-    return built(source, translation_of(source, precision, std::max<std::int64_t>(together, 1)), nullptr);
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together, Compiled* compiled) {
+    return built(source, translation_of(source, precision, std::max<std::int64_t>(together, 1)), compiled);
 }
 
 }  // namespace lobatto

@@ -18,6 +18,7 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
 // standalone support.
 Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled = nullptr);
 // The same for ensembles, of which a thread has `together` trajectories: its table has lanes, where they are worth it.
-Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together);
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together,
+                          Compiled* compiled = nullptr);
 
 }  // namespace lobatto

@@ -51,6 +51,9 @@ void flush_output() {
 
 void describe(CommandLine& program) {
     program.version("lobatto " LOBATTO_VERSION);
+#ifdef LOBATTO_MPI  // each process would do the whole work of another command
+    add_sweep(program);
+#else
     add_new(program);
     add_check(program);
     add_derive(program);
@@ -59,6 +62,7 @@ void describe(CommandLine& program) {
     add_stability(program);
     add_roundoff(program);
     add_sweep(program);
+    add_merge(program);
     add_tradeoff(program);
     add_tune(program);
     add_verify(program);
@@ -68,6 +72,7 @@ void describe(CommandLine& program) {
     add_manual(program);
     add_gallery(program);
     add_paper(program);
+#endif
     // Last, because a command takes over the footer that its parent has at that moment.
     program.footer(
         "Example:\n"

@@ -50,7 +50,7 @@ void EnsembleCompanion::compute(std::int64_t first) {
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
                        rows = (request_.steps / every + 1) * looks_of(every),
                        count = std::min(std::max<std::int64_t>(numbers_at_once / ((4 + 2 * rows) * n), 64),
-                                        request_.count - first);
+                                        request_.first + request_.count - first);
     first_ = first;
     known_.assign(static_cast<std::size_t>(count), {});
     const std::int64_t whole = request_.steps / every * every;
@@ -61,6 +61,7 @@ void EnsembleCompanion::compute(std::int64_t first) {
 void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_t every) {
     const std::size_t n = groups_.size();
     EnsembleRequest companion = request_;
+    companion.first = 0;
     companion.count = std::ssize(known_);
     companion.start = [&](std::int64_t index, EnsembleStart& start) {
         request_.start(first_ + index, start);
@@ -82,7 +83,6 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
                                 : request_.step * static_cast<double>(every) / static_cast<double>(taken);
     companion.steps = steps / every * taken;
     companion.every = taken / looks;
-    companion.counts = nullptr;
     companion.stops = false;
     companion.reducer = nullptr;
     companion.progress = nullptr;

@@ -16,6 +16,7 @@ void add_check(CommandLine& program);
 void add_derive(CommandLine& program);
 void add_emit(CommandLine& program);
 void add_gallery(CommandLine& program);
+void add_merge(CommandLine& program);
 void add_run(CommandLine& program);
 void add_manual(CommandLine& program);
 void add_new(CommandLine& program);

@@ -122,7 +122,7 @@ void add_plot(CommandLine& program) {
     Command command =
         program.command("plot", "Draw the columns of trajectories and tables: SVG, PNG, or in the terminal");
     const auto options = std::make_shared<PlotCommand>();
-    command.option("FILES", options->files, "What runs and sweeps wrote: .csv or .npy; several in one picture")
+    command.option("FILES", options->files, "What runs and sweeps wrote: .csv, .npy or .h5; several in one picture")
         .required();
     command.option("--x", options->x, "The column along the x axis (default: the first one)").shown_as("COLUMN");
     command.option("--y", options->y, "Columns of one panel, with commas between; repeated: one more panel")

@@ -19,6 +19,7 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
+#include "cli/table/trajectory_output.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/run/decimal.hpp"
@@ -178,11 +179,18 @@ void print_events(const Scene& scene, const TrajectoryResult& result, const std:
 // Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
 std::string event_path(const RunOptions& options, const Scene& scene) {
     std::error_code ignored;
-    const bool beside = options.output.empty() || !std::filesystem::exists(options.output, ignored) ||
-                        std::filesystem::is_regular_file(options.output, ignored);
+    const bool beside = options.output.empty() || (options.output != standard_output &&
+                                                   (!std::filesystem::exists(options.output, ignored) ||
+                                                    std::filesystem::is_regular_file(options.output, ignored)));
     std::string path = output_path(beside ? options.output : "", result_name(scene.path) + ".csv");
-    if (path.ends_with(".csv")) path.resize(path.size() - 4);
+    for (const TableFormat format : {TableFormat::csv, TableFormat::npy, TableFormat::h5})
+        if (const std::string ending = ending_of(format); path.ends_with(ending))
+            path.resize(path.size() - ending.size());
     return path + ".events.csv";
+}
+
+TableFormat format_of(const RunOptions& options) {
+    return options.output.empty() ? TableFormat::csv : table_format(options.output);
 }
 
 // The files of a run: its trajectory, its events, and while it goes on its checkpoint.
@@ -191,7 +199,7 @@ public:
     Files(const RunOptions& options, const PreparedRun& run, const TrajectoryHeader& header,
           const std::optional<Checkpoint>& from)
         : path_(output_path(options.output, result_name(run.scene.path) + ".csv")),
-          trajectory_(path_, header, from ? from->files[0] : Written()) {
+          trajectory_(path_, format_of(options), run.scene, header, from ? from->files[0] : Written()) {
         if (!run.scene.reported().empty()) {
             event_path_ = event_path(options, run.scene);
             events_.emplace(event_path_, event_header_of(run.scene, header), from ? from->files[1] : Written());
@@ -199,7 +207,7 @@ public:
         if (keeps_checkpoints() && !from) remove_checkpoint(path_);  // of a run that has just lost its files
     }
 
-    bool keeps_checkpoints() const { return trajectory_.is_regular() && (!events_ || events_->is_regular()); }
+    bool keeps_checkpoints() const { return trajectory_.can_go_on() && (!events_ || events_->is_regular()); }
     const std::string& path() const { return path_; }
     const std::string& events_path() const { return event_path_; }
 
@@ -222,7 +230,7 @@ public:
 
 private:
     std::string path_, event_path_;
-    TrajectoryFile trajectory_;
+    TrajectoryOutput trajectory_;
     std::optional<TrajectoryFile> events_;
 };
 
@@ -263,7 +271,18 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, co
     }
 }
 
+// What a file of this kind cannot hold, or not go on with.
+void refuse_format(const RunOptions& options) {
+    const bool is_csv = options.output != standard_output && format_of(options) == TableFormat::csv;
+    if (options.resume && !is_csv)
+        throw InputError(fmt::format("--resume: {} cannot be continued, only a .csv can; leave --resume out",
+                                     options.output == standard_output ? "standard output" : options.output));
+}
+
 void run(const RunOptions& options) {
+    if (!options.output.empty()) keep_scene(options.scene, options.output);
+    refuse_format(options);
+    const bool quiet = options.quiet || options.output == standard_output;
     Scene read = read_scene(options.scene);
     options.method.apply(read);
     const PreparedRun run = prepare_run(std::move(read), options.overrides, options.general);
@@ -280,7 +299,7 @@ void run(const RunOptions& options) {
         keep_foreign(event_path(options, scene));
     }
     if (!options.resume) keep_strangers(path);
-    if (!options.quiet && !options.json)
+    if (!quiet && !options.json)
         fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, run.source.digest, run.derivation_seconds,
                    run.compiled.from_cache ? "found compiled in the cache"
                                            : fmt::format("compiled in {:.2f} s", run.compiled.seconds));
@@ -297,14 +316,14 @@ void run(const RunOptions& options) {
             observers.restore(from->observers);
             request.from = &from->halfway;
         }
-        if (!options.quiet && !options.json)
+        if (!quiet && !options.json)
             print_row("resumed", from ? fmt::format("at t = {:.6g}, after {} steps", from->halfway.result.time,
                                                     from->halfway.result.steps_done)
                                       : "nothing was left: from the start");
     }
     Files files(options, run, header, from);
     if (observers.companion && std::thread::hardware_concurrency() > 1) observers.companion->start();
-    const TrajectoryResult result = integrate_into(files, observers, identity, run, request, options.quiet);
+    const TrajectoryResult result = integrate_into(files, observers, identity, run, request, quiet);
     const RunVerdict verdict = verdict_of(run, request, result, observers, options.beyond_horizon);
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (options.json) {
@@ -312,7 +331,7 @@ void run(const RunOptions& options) {
         fmt::print("{}", json_of_run(run, request, result, observers, verdict,
                                      is_exact ? defect_of(run.kernel, scene.method.numbers, scene) : std::nullopt,
                                      {path, has_events ? files.events_path() : ""}));
-    } else if (!options.quiet) {
+    } else if (!quiet) {
         print_table(run, request, result, observers.watch);
         if (verdict.error) print_row("measured error", text_of(*verdict.error, scene));
         print_events(scene, result, observers.counts, files.events_path());
@@ -331,7 +350,10 @@ void add_run(CommandLine& program) {
         program.command("run", "Derive, compile and run a scene; write its trajectory and say how good it is");
     const auto options = std::make_shared<RunOptions>();
     command.option("SCENE", options->scene, "Scene file").required();
-    command.option("-o,--output", options->output, "Trajectory file (default: out/NAME.csv)").shown_as("FILE");
+    command
+        .option("-o,--output", options->output,
+                "Trajectory: .csv, .npy (NumPy) or .h5 (HDF5), or - for standard output (default: out/NAME.csv)")
+        .shown_as("FILE");
     options->method.add_to(command);
     command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
     add_step_option(command, options->overrides);

@@ -45,6 +45,7 @@ std::string result_name(const std::string& scene) {
 
 void keep_scene(const std::string& scene, const std::string& path) {
     std::error_code none;
+    if (path == standard_output) return;
     // Regular files only: a terminal is good as both.
     for (const char* ending : {"", ".partial", ".checkpoint"})
         if (std::filesystem::is_regular_file(path + ending, none) &&
@@ -56,13 +57,14 @@ void keep_scene(const std::string& scene, const std::string& path) {
 void keep_foreign(const std::string& path) {
     constexpr std::size_t looked_at = 4096;  // bytes: all text that Lobatto writes names it in its first lines
     std::error_code none;
-    if (!std::filesystem::is_regular_file(path, none)) return;
+    if (path == standard_output || !std::filesystem::is_regular_file(path, none)) return;
     std::string begin(looked_at, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), static_cast<std::streamsize>(looked_at));
     begin.resize(static_cast<std::size_t>(file.gcount()));
     std::transform(begin.begin(), begin.end(), begin.begin(), [](unsigned char c) { return std::tolower(c); });
-    if (!begin.empty() && begin.find("lobatto") == std::string::npos && !begin.starts_with("\x93numpy"))
+    if (!begin.empty() && begin.find("lobatto") == std::string::npos && !begin.starts_with("\x93numpy") &&
+        !begin.starts_with("\x89hdf"))
         throw InputError(fmt::format(
             "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));
 }

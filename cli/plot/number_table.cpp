@@ -13,6 +13,7 @@
 #include <iterator>
 #include <limits>
 
+#include "cli/table/hdf5_file.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/formula/suggest.hpp"
 #include "runtime/error.hpp"
@@ -187,6 +188,33 @@ NumberTable from_npy(const std::string& path, const std::string& text) {
     return table;
 }
 
+// By the library; what it cannot read is a wrong file, not a broken machine.
+NumberTable from_hdf5(const std::string& path) {
+    require_hdf5(path);
+    NumberTable table;
+    try {
+        const Hdf5Reader reader(path);
+        const auto rows = static_cast<std::size_t>(reader.rows());
+        std::vector<TableCell> cells(rows * reader.head().columns.size());
+        if (rows > 0) reader.read(0, rows, cells.data());
+        std::size_t c = 0;
+        for (const TableColumn& column : reader.head().columns) {
+            table.columns.push_back({column.name, column.unit, {}});
+            for (std::size_t i = 0; i < rows; ++i) {
+                const TableCell cell = cells[i * reader.head().columns.size() + c];
+                table.columns.back().values.push_back(column.whole ? static_cast<double>(whole_in(cell))
+                                                                   : real_in(cell));
+            }
+            ++c;
+        }
+        for (const auto& [what, value] : reader.head().facts)
+            if (what == "scene") table.title = value;
+    } catch (const MachineError& error) {
+        refuse(path, error.what());
+    }
+    return table;
+}
+
 // x[3] is the column x_3.
 std::string column_name(const std::string& name) {
     const std::size_t open = name.find('[');
@@ -214,7 +242,9 @@ const NumberTable::Column& NumberTable::column(const std::string& name) const {
 
 NumberTable read_number_table(const std::string& path) {
     const std::string text = contents_of(path);
-    NumberTable table = text.starts_with("\x93NUMPY") ? from_npy(path, text) : from_csv(path, text);
+    NumberTable table = text.starts_with("\x89HDF")     ? from_hdf5(path)
+                        : text.starts_with("\x93NUMPY") ? from_npy(path, text)
+                                                        : from_csv(path, text);
     table.path = path;
     if (table.columns.front().values.empty()) refuse(path, "there are no rows in it");
     return table;

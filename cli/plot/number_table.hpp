@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Tables of numbers that runs and sweeps have written, read back: CSV and NumPy's .npy.
+// Tables of numbers that runs and sweeps have written, read back: CSV, NumPy's .npy, HDF5.
 #pragma once
 
 #include <string>

@@ -126,7 +126,7 @@ private:
         const auto width = static_cast<std::size_t>(lanes_->width());
         for (std::size_t lane = 0; lane < width; ++lane) {  // those that are left over repeat the last
             if (lane < ended.size()) {
-                request_.start(first + static_cast<std::int64_t>(lane), start_);
+                request_.start(request_.first + first + static_cast<std::int64_t>(lane), start_);
                 if (request_.from_velocities) {
                     if (single_.prepare(start_.parameters, request_.step) == LOBATTO_OK)
                         start_.rate = single_.momentum(request_.time, start_.q, start_.rate);
@@ -306,64 +306,6 @@ private:
     bool closed_ = false;
 };
 
-class Sums {
-public:
-    void add(double x) {
-        least_ = count_ == 0 || x < least_ ? x : least_;
-        largest_ = count_ == 0 || x > largest_ ? x : largest_;
-        ++count_;
-        sum_ += x;
-        squares_ += static_cast<long double>(x) * x;
-    }
-    Spread spread() const {
-        if (count_ == 0) return {no_number, no_number, no_number, no_number};
-        const auto count = static_cast<long double>(count_);
-        return {least_, largest_, static_cast<double>(sum_ / count), static_cast<double>(std::sqrt(squares_ / count))};
-    }
-
-private:
-    std::int64_t count_ = 0;
-    double least_ = 0, largest_ = 0;
-    long double sum_ = 0, squares_ = 0;
-};
-
-// What is said of all of them.
-class Reduction {
-public:
-    explicit Reduction(std::size_t n) : n_(n), q_(n), p_(n) {}
-
-    void add(const EnsembleTrajectory& trajectory, const EnsembleRequest& request, EnsembleResult& result) {
-        ++result.trajectories;
-        ++result.count_of[static_cast<std::size_t>(trajectory.status)];
-        result.steps_done += trajectory.steps_done;
-        result.iterations += trajectory.iterations;
-        if (trajectory.status != LOBATTO_OK || (request.counts && !request.counts(trajectory))) return;
-        const double error = trajectory.energy_error_largest;
-        if (!std::isnan(error) && (result.energy_error_index < 0 || error > result.energy_error_largest)) {
-            result.energy_error_largest = error;
-            result.energy_error_index = trajectory.index;
-        }
-        const double* const state = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns + 1;
-        for (std::size_t k = 0; k < n_; ++k) {
-            q_[k].add(state[k]);
-            p_[k].add(state[n_ + k]);
-        }
-        if (!std::isnan(trajectory.energy_error_final)) energy_error_.add(trajectory.energy_error_final);
-    }
-    void finish(EnsembleResult& result) const {
-        for (std::size_t k = 0; k < n_; ++k) {
-            result.q.push_back(q_[k].spread());
-            result.p.push_back(p_[k].spread());
-        }
-        result.energy_error = energy_error_.spread();
-    }
-
-private:
-    std::size_t n_;
-    std::vector<Sums> q_, p_;
-    Sums energy_error_;
-};
-
 EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
     EnsembleTrajectory trajectory;
     trajectory.index = index;
@@ -402,7 +344,6 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
 
     Shared shared;
     Window window(plan);
-    Reduction reduction(static_cast<std::size_t>(kernel->coordinates));
     const auto work = [&] {
         try {
             Worker worker(kernel, request, shared);
@@ -441,14 +382,16 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
         const Group group = window.next(meanwhile);
         result.processor_seconds += group.processor_seconds;
         for (const Ended& ended : group.trajectories) {
-            const EnsembleTrajectory trajectory = view(result.trajectories, ended);
-            reduction.add(trajectory, request, result);
+            const EnsembleTrajectory trajectory = view(request.first + result.trajectories, ended);
+            ++result.trajectories;
+            ++result.count_of[static_cast<std::size_t>(trajectory.status)];
+            result.steps_done += trajectory.steps_done;
+            result.iterations += trajectory.iterations;
             if (request.sink) request.sink(trajectory);
         }
         result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);
         meanwhile();
     }
-    reduction.finish(result);
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return result;
 }

@@ -53,43 +53,31 @@ public:
 };
 
 struct EnsembleRequest {
-    std::int64_t count = 0;  // trajectories
+    std::int64_t first = 0;  // number of the first trajectory
+    std::int64_t count = 0;  // trajectories from there on
     // Fills the start of a trajectory; called once for each, in any order, from several threads at once.
     std::function<void(std::int64_t index, EnsembleStart& start)> start;
     bool from_velocities = false;  // momenta are computed with the parameters of each trajectory
     double time = 0;
-    double step = 0;                                    // h; may be negative
-    double tolerance = 0;                               // of a step's iteration; 0: to rounding
-    std::int64_t steps = 0;                             // >= 0, of each trajectory; count * steps < 2^63
-    Arrivals arrivals;                                  // of kernels with a clock
-    std::int64_t every = 0;                             // keep every such state; 0: the last one alone
-    bool stops = false;                                 // the kernel's stops end trajectories
-    std::function<std::unique_ptr<Reducer>()> reducer;  // one a thread; nothing: none. Of kernels without lanes
-    int threads = 0;                                    // that compute; 0: as many as the machine runs at once
-    // Whether a trajectory that reached the end counts in the statistics; nothing: all do. Called before the sink.
-    std::function<bool(const EnsembleTrajectory&)> counts;
+    double step = 0;                                        // h; may be negative
+    double tolerance = 0;                                   // of a step's iteration; 0: to rounding
+    std::int64_t steps = 0;                                 // >= 0, of each trajectory; count * steps < 2^63
+    Arrivals arrivals;                                      // of kernels with a clock
+    std::int64_t every = 0;                                 // keep every such state; 0: the last one alone
+    bool stops = false;                                     // the kernel's stops end trajectories
+    std::function<std::unique_ptr<Reducer>()> reducer;      // one a thread; nothing: none. Of kernels without lanes
+    int threads = 0;                                        // that compute; 0: as many as the machine runs at once
     std::function<void(const EnsembleTrajectory&)> sink;    // in the order of the indices, in the thread of the caller
     std::function<void(std::int64_t steps_done)> progress;  // of all trajectories; about ten times a second, likewise
     const volatile int* interrupted = nullptr;              // stop once it is not zero; what is complete is handed over
 };
 
-// How a number is spread over the trajectories that reached the end and count; not numbers when there is none.
-struct Spread {
-    double least, largest, mean, rms;
-};
-
-// Sums are taken in the order of the trajectories.
 struct EnsembleResult {
     bool interrupted = false;
     std::int64_t trajectories = 0;                          // handed over: all, unless interrupted
     std::array<std::int64_t, LOBATTO_STATUSES> count_of{};  // of each lobatto_status
     std::int64_t steps_done = 0;                            // of all trajectories
     std::int64_t iterations = 0;
-    std::vector<Spread> q, p;  // at the end, n each
-    Spread energy_error{};     // H - H(0) at the end
-    // Of those that reached the end, the largest |H - H(0)| of kept states and whose it is; -1: none has an energy.
-    double energy_error_largest = 0;
-    std::int64_t energy_error_index = -1;
     int threads = 0, lanes = 0;    // that computed; lanes 1: one trajectory at a time
     double processor_seconds = 0;  // advancing and keeping states, of all threads together
     double seconds = 0;            // that passed meanwhile

@@ -86,7 +86,11 @@ PartialFile::PartialFile(const std::string& path, const std::string& what, std::
                          const std::string& otherwise, Place place)
     : path_(path), what_(what), otherwise_(otherwise) {
     struct stat status {};
-    if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    if (path == standard_output) {
+        partial_ = path_ = "standard output";
+        descriptor_ = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0);
+        if (descriptor_ < 0) fail(path_, errno);
+    } else if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
         partial_ = path_;
         descriptor_ = open(path.c_str(), O_WRONLY | O_CLOEXEC);
         if (descriptor_ < 0) fail(path_, errno);

@@ -8,6 +8,7 @@
 
 namespace lobatto {
 
+inline const char* const standard_output = "-";  // as a path
 inline const char* const elsewhere = "choose another place with -o";
 
 // MachineError: "cannot write `what` to PATH: No space left on device. Free some space, or `otherwise`".
@@ -20,8 +21,8 @@ void write_whole(const std::string& path, const std::string& what, std::string_v
 
 // Until `finish` what is written stands in NAME.partial beside it, so that a killed run leaves a readable NAME.partial
 // and an earlier NAME untouched. Two runs cannot write the same file at once. A destination that exists and is no
-// regular file (a pipe, a device) is written to directly. A NAME.partial that is not of Lobatto's making is never
-// touched: MachineError.
+// regular file (a pipe, a device), and standard output, "-", is written to directly. A NAME.partial that is not of
+// Lobatto's making is never touched: MachineError.
 class PartialFile {
 public:
     // Whether it goes on with what a killed run left in NAME.partial, or takes the first NAME.partial, NAME.partial.1

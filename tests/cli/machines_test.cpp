@@ -56,6 +56,24 @@ TEST_CASE("run --json: numbers for everything that run prints, also of a run tha
     answer_of("run", {"run", scene("pythagorean"), "-o", output});
 }
 
+TEST_CASE("sweep --json tells of every setting, and why trajectories failed") {
+    const test::TemporaryFolder folder;
+    const std::string table = folder / "t.csv";
+    const auto swept = answer_of("sweep", {"sweep", scene("pendulum"), "--vary", "q=0.5:1:3", "--vary", "step=0.1,0.05",
+                                           "--until", "5", "-o", table});
+    CHECK(swept["settings"].size() == 2);
+    CHECK(swept["rows"] == 6);
+    CHECK(swept["settings"][1]["measured_error"]["value"].get<double>() < 1e-6);
+    const auto failed = answer_of("sweep",
+                                  {"sweep", scene("kepler"), "--vary", "y'=0.01,2", "--step", "0.3", "--points", "2",
+                                   "--until", "20", "-o", table},
+                                  3);
+    CHECK(failed["ending"] == "failed");
+    CHECK(failed["failures"].size() >= 1);
+    CHECK(test::run({LOBATTO_PROGRAM, "sweep", scene("pendulum"), "--vary", "q=1,2", "--json", "-o", "-"}).exit_code ==
+          2);
+}
+
 TEST_SUITE("slow") {
     TEST_CASE("the reports of the other commands keep their schemas") {
         const test::TemporaryFolder folder;

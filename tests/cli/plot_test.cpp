@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "cli/table/hdf5_file.hpp"
 #include "generator/formula/source.hpp"
 #include "tests/support.hpp"
 
@@ -105,6 +106,21 @@ TEST_CASE("tables of NumPy are read: records, and rows of columns") {
     for (const double value : {1.0, 2.0, 3.0, 4.5}) bytes.append(reinterpret_cast<const char*>(&value), 8);
     test::write_text(folder / "a.npy", bytes);
     CHECK(read_number_table(folder / "a.npy").column("1").values == std::vector<double>{2, 4.5});
+}
+
+TEST_CASE("tables of HDF5 are read, where the program has its library") {
+    if (!has_hdf5()) return;
+    const test::TemporaryFolder folder;
+    const std::string path = folder / "k.h5";
+    REQUIRE(test::run({LOBATTO_PROGRAM, "run", tree + "/scenes/kepler.toml", "--until", "1", "-o", path, "--quiet"})
+                .exit_code == 0);
+    const NumberTable table = read_number_table(path);
+    CHECK(table.title == "A planet around the sun");
+    CHECK(table.column("x").values.front() == 0.4);
+    CHECK(table.column("t").values.size() == 51);
+    CHECK(plot({path, "--x", "x", "--y", "y", "-o", folder / "k.svg"}).exit_code == 0);
+    test::write_text(folder / "torn.h5", test::read_file(path).substr(0, 700));
+    CHECK(plot({folder / "torn.h5"}).exit_code == 2);
 }
 
 TEST_CASE("what cannot be drawn is told with its reason and the mend") {

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/sweep/judges.hpp"
+
+#include <cmath>
+
+namespace lobatto {
+
+Judges::Judges(const Scene& scene, const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+               const EnsembleRequest& request, bool measures, bool accepts_lost)
+    : request_(request),
+      watch_(derivation, source, kernel, request),
+      domains_(scene, derivation.system),
+      accepts_lost_(accepts_lost) {
+    if (measures) companion_.emplace(derivation, kernel, request);
+}
+
+Verdict Judges::judge(const EnsembleTrajectory& trajectory) {
+    Verdict verdict{static_cast<int>(trajectory.status), std::nan("")};
+    if (verdict.status != LOBATTO_OK) return verdict;
+    if (watch_.departs(trajectory)) verdict.status = departed;
+    if (companion_) {
+        const EnsembleCompanion::Error error = companion_->of(trajectory);
+        verdict.error = error.relative;
+        if (error.lost && !accepts_lost_ && verdict.status == LOBATTO_OK) verdict.status = unresolved;
+    }
+    if (!is_defined(trajectory)) verdict.status = undefined;
+    if (verdict.status == LOBATTO_OK) watch_.observe(trajectory);
+    return verdict;
+}
+
+// Whether formulas have values at the start and where states are kept, also those that kernels have lost.
+bool Judges::is_defined(const EnsembleTrajectory& trajectory) const {
+    EnsembleStart start;
+    request_.start(trajectory.index, start);
+    return domains_.hold_at_start(request_.time, start.parameters, start.q, start.rate) &&
+           domains_.left_at(start.parameters, trajectory.kept) < 0;
+}
+
+}  // namespace lobatto

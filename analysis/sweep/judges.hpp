@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What is said of each trajectory of a sweep when it has ended: whether it failed, and its error.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "analysis/accuracy/domains.hpp"
+#include "analysis/accuracy/ensemble_companion.hpp"
+#include "analysis/accuracy/sweep_watch.hpp"
+#include "generator/emit/kernel.hpp"
+#include "generator/mechanics/derivation.hpp"
+#include "runtime/run/ensemble.hpp"
+
+namespace lobatto {
+
+// How a trajectory of a sweep ended: a lobatto_status, or one of those that judges add in places that are free.
+enum SweepStatus { departed = 7, unresolved = 8, undefined = 10 };
+// In words, by number.
+constexpr std::array sweep_statuses = {"reached the end",
+                                       "not converged",
+                                       "not finite",
+                                       "singular Jacobian",
+                                       "singular mass matrix",
+                                       "t + h equals t",
+                                       "not supported by the kernel",
+                                       "energy off: beyond stability, or past a singularity",
+                                       "not resolved: the error is as large as the motion",
+                                       "start off the constraints",
+                                       "a formula has no value there",
+                                       "stopped",
+                                       "impacts accumulate"};
+static_assert(sweep_statuses.size() == LOBATTO_STATUSES);
+
+struct Verdict {
+    int status = LOBATTO_OK;
+    double error = 0;  // at the end, relative to the amplitude; not a number: not measured
+};
+
+// Judges the trajectories, in their order: by their energies, by their companions, by where formulas have values.
+class Judges {
+public:
+    // What is handed over outlives it. `measures`: errors, by companions; `accepts_lost`: trajectories of which nothing
+    // is left are no failures.
+    Judges(const Scene& scene, const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+           const EnsembleRequest& request, bool measures, bool accepts_lost);
+
+    Verdict judge(const EnsembleTrajectory& trajectory);
+
+    // Of the steps that were looked at; empty: nothing.
+    std::string warning() const { return watch_.warning(); }
+
+private:
+    bool is_defined(const EnsembleTrajectory& trajectory) const;
+
+    const EnsembleRequest& request_;
+    SweepWatch watch_;
+    Domains domains_;
+    std::optional<EnsembleCompanion> companion_;
+    bool accepts_lost_;
+};
+
+}  // namespace lobatto

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/sweep/starts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "analysis/method_choice.hpp"
+#include "generator/mechanics/start.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr double most_trajectories = 1e12;
+constexpr std::int64_t most_settings = 10'000;
+
+using Role = VariedName::Role;
+
+[[noreturn]] void varied_twice(const std::string& vary, const std::string& name) {
+    const std::string message = fmt::format("'{}' is varied twice; give all its values at once", name);
+    if (vary.empty()) throw InputError(message);
+    Source("--vary", vary).fail({1, 1}, message);
+}
+
+bool is_family(Role role) {
+    return role == Role::points || role == Role::stages || role == Role::splitting;
+}
+
+}  // namespace
+
+SweepStarts::SweepStarts(const Scene& scene, const StartsRequest& request, std::recursive_mutex* algebra)
+    : scene_(scene), seed_(request.seed), algebra_(algebra == nullptr ? &own_ : algebra) {
+    std::vector<Axis> axes;
+    for (const std::string& argument : request.vary) axes.push_back(read_axis(scene, argument));
+    add_axes(axes, request.zip, true);
+    const std::size_t settings = dimensions_.size();
+    if (request.table) add_table(*request.table);
+    if (!request.file.empty()) add_table(read_starts(scene, request.file));
+    add_axes(axes, request.zip, false);
+    add_draws(request);
+    count_all();
+    of_setting_ = settings == 0 ? count_ : dimensions_[settings - 1].stride;
+    if (settings > 0 && count_ / of_setting_ > most_settings)
+        throw InputError(
+            fmt::format("--vary: {} settings of the method; each is a sweep of its own, so at most {}: "
+                        "give fewer values",
+                        count_ / of_setting_, most_settings));
+    if (scene.run.assemble) {
+        if (scene.start == Start::momentum)
+            throw InputError(fmt::format(
+                "{}: sweeps assemble starts by their velocities: give velocities in place of momenta", scene.path));
+        assembled_ = build_system(scene);
+    }
+    find_dependents();
+}
+
+// The lists of settings, or the others. Those that run together are one dimension, which counts as one of settings
+// when one of them is.
+void SweepStarts::add_axes(std::vector<Axis>& axes, bool zip, bool settings) {
+    const bool any_setting =
+        std::any_of(axes.begin(), axes.end(), [](const Axis& axis) { return axis.of.is_setting(); });
+    if (zip && axes.size() < 2)
+        throw InputError("--zip: lists that run together are two or more; give --vary twice, or leave --zip out");
+    const auto shortest_first = [](const Axis& a, const Axis& b) { return a.count() < b.count(); };
+    if (zip) {
+        const auto [shortest, longest] = std::minmax_element(axes.begin(), axes.end(), shortest_first);
+        if (shortest->count() != longest->count())
+            throw InputError(
+                fmt::format("--zip: lists that run together are equally long, but {} has {} values and {} has {}",
+                            shortest->of.name, shortest->count(), longest->of.name, longest->count()));
+    }
+    for (Axis& axis : axes) {
+        if ((zip ? any_setting : axis.of.is_setting()) != settings) continue;
+        if (!zip || &axis == &axes.front()) dimensions_.push_back({axis.count()});
+        sources_.emplace_back("vary", axis.of.name + " = " + axis.written);
+        Values values{dimensions_.size() - 1, std::nullopt, {}, std::nullopt};
+        const VariedName name = axis.of;
+        const std::string written = axis.written;
+        values.axis = std::move(axis);
+        add(name, written, std::move(values));
+    }
+    if (zip && settings == any_setting) sources_.emplace_back("zip", "lists run together");
+}
+
+void SweepStarts::add_table(StartTable table) {
+    dimensions_.push_back({table.rows});
+    if (!table.digest.empty()) sources_.emplace_back("starts", fmt::format("{} rows of {}", table.rows, table.digest));
+    for (std::size_t c = 0; c < table.names.size(); ++c) {
+        const auto fail = [&](const std::string& message) {
+            throw InputError(table.path.empty() ? message : fmt::format("--starts: {}: {}", table.path, message));
+        };
+        const VariedName name = varied_name(scene_, table.names[c], "column", fail);
+        if (name.is_setting())
+            fail(fmt::format("'{}' is a setting of the method and no start; give its values with --vary", name.name));
+        add(name, table.path, {dimensions_.size() - 1, std::nullopt, std::move(table.columns[c]), std::nullopt});
+    }
+}
+
+void SweepStarts::add_draws(const StartsRequest& request) {
+    if (request.random && (*request.random < 1 || static_cast<double>(*request.random) > most_trajectories))
+        throw InputError(fmt::format("--random: {} is not a number of rows; give one from 1 to {:.0e}", *request.random,
+                                     most_trajectories));
+    if (request.random && request.draw.empty())
+        throw InputError("--random: nothing is drawn; say what, such as --draw \"q ~ normal(0, 0.1)\"");
+    if (!request.random && !request.draw.empty())
+        throw InputError("--draw: say how many rows are drawn, such as --random 1000 --seed 1");
+    if (!request.random) return;
+    dimensions_.push_back({*request.random});
+    sources_.emplace_back("random", fmt::format("{} rows of each combination, seed {}", *request.random, request.seed));
+    for (const std::string& argument : request.draw) {
+        const Draw draw = read_draw(scene_, argument);
+        sources_.emplace_back("draw", draw.of.name + " ~ " + draw.written);
+        add(draw.of, draw.written, {dimensions_.size() - 1, std::nullopt, {}, draw});
+    }
+}
+
+void SweepStarts::add(const VariedName& name, const std::string& written, Values values) {
+    for (const Column& other : columns_) {
+        if (other.of.role == name.role && other.of.index == name.index)
+            varied_twice(values.axis ? name.name + "=" + values.axis->written : "", name.name);
+        if (is_family(other.of.role) && is_family(name.role))
+            throw InputError(
+                fmt::format("--vary: {} and {} are of two families; vary one of both", other.of.name, name.name));
+    }
+    columns_.push_back({name, written});
+    values_.push_back(std::move(values));
+}
+
+void SweepStarts::count_all() {
+    double trajectories = 1;
+    for (const Dimension& dimension : dimensions_) trajectories *= static_cast<double>(dimension.count);
+    if (trajectories > most_trajectories)
+        throw InputError(
+            fmt::format("--vary: all combinations make {:.3g} trajectories; at most {:.0e}: give fewer values",
+                        trajectories, most_trajectories));
+    for (std::size_t d = dimensions_.size(); d-- > 0;) {
+        dimensions_[d].stride = count_;
+        count_ *= dimensions_[d].count;
+    }
+}
+
+bool SweepStarts::varies(VariedName::Role role, std::size_t index) const {
+    return std::any_of(columns_.begin(), columns_.end(),
+                       [&](const Column& column) { return column.of.role == role && column.of.index == index; });
+}
+
+// The start of the scene; what is varied, or follows from it, is replaced for each trajectory.
+void SweepStarts::find_dependents() {
+    for (const Parameter& parameter : scene_.parameters)
+        base_.parameters.push_back(scene_.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
+    const auto put = [&](Role role, std::size_t k, const GiNaC::ex& value, const std::string& what) {
+        bool depends = false;
+        for (const Column& column : columns_)
+            depends =
+                depends || (column.of.role == Role::parameter && value.has(scene_.parameters[column.of.index].symbol));
+        const bool given = varies(role, k);
+        if (depends && !given) dependents_.push_back({role == Role::position, k});
+        return depends || given ? std::numeric_limits<double>::quiet_NaN()  // always replaced
+                                : scene_.evaluate(value, what + scene_.coordinates[k].name).to_double();
+    };
+    const char* const rate = scene_.start == Start::velocity ? "the initial velocity of " : "the initial momentum of ";
+    for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
+        base_.q.push_back(put(Role::position, k, scene_.initial_position[k], "the initial position of "));
+        base_.rate.push_back(put(Role::rate, k, scene_.initial_rate[k], rate));
+    }
+}
+
+std::int64_t SweepStarts::place(std::int64_t trajectory, std::size_t column) const {
+    const Dimension& dimension = dimensions_[values_[column].dimension];
+    return trajectory / dimension.stride % dimension.count;
+}
+
+double SweepStarts::value(std::int64_t trajectory, std::size_t column) const {
+    const Values& values = values_[column];
+    // The same starts for each setting, so that settings can be compared.
+    if (values.draw) return values.draw->value(seed_, trajectory % of_setting_);
+    const auto at = static_cast<std::size_t>(place(trajectory, column));
+    return values.axis ? values.axis->values[at] : values.listed[at];
+}
+
+GiNaC::numeric SweepStarts::exact(std::int64_t trajectory, std::size_t column) const {
+    const Values& values = values_[column];
+    return values.axis ? values.axis->exact(place(trajectory, column)) : GiNaC::numeric(value(trajectory, column));
+}
+
+Scene SweepStarts::with_settings(Scene scene, std::int64_t trajectory) const {
+    MethodChoice method;
+    for (std::size_t c = 0; c < columns_.size(); ++c) {
+        if (!columns_[c].of.is_setting()) continue;
+        const double number = value(trajectory, c);
+        switch (columns_[c].of.role) {
+            case Role::step:
+                scene.run.step = exact(trajectory, c);
+                break;
+            case Role::points:
+                method.points = static_cast<int>(number);
+                break;
+            case Role::stages:
+                method.stages = static_cast<int>(number);
+                break;
+            case Role::splitting:
+                method.splitting = static_cast<int>(number);
+                break;
+            default:
+                method.tolerance = number;
+        }
+    }
+    method.apply(scene);
+    return scene;
+}
+
+void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
+    start = base_;
+    for (std::size_t c = 0; c < columns_.size(); ++c) {
+        const VariedName& name = columns_[c].of;
+        if (name.is_setting()) continue;
+        std::vector<double>& numbers = name.role == Role::parameter  ? start.parameters
+                                       : name.role == Role::position ? start.q
+                                                                     : start.rate;
+        numbers[name.index] = value(trajectory, c);
+    }
+    if (dependents_.empty() && !assembled_) return;
+    const std::lock_guard lock(*algebra_);
+    std::vector<GiNaC::ex> parameters;
+    for (const Parameter& parameter : scene_.parameters) parameters.push_back(parameter.value);
+    for (std::size_t c = 0; c < columns_.size(); ++c)
+        if (columns_[c].of.role == Role::parameter) parameters[columns_[c].of.index] = exact(trajectory, c);
+    for (const auto& [position, k] : dependents_) {
+        double& number = (position ? start.q : start.rate)[k];
+        try {
+            number = scene_.evaluate((position ? scene_.initial_position : scene_.initial_rate)[k], "", parameters)
+                         .to_double();
+        } catch (const InputError&) {  // a root of a negative number, for example
+            number = std::numeric_limits<double>::quiet_NaN();
+        }
+    }
+    if (assembled_) assemble(parameters, start);
+}
+
+// (D47) The nearest start that keeps the constraints; not a number where there is none.
+void SweepStarts::assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start) const {
+    Scene scene = scene_;
+    for (std::size_t i = 0; i < parameters.size(); ++i) scene.parameters[i].value = parameters[i];
+    for (std::size_t k = 0; k < start.q.size(); ++k) {
+        if (!std::isfinite(start.q[k]) || !std::isfinite(start.rate[k])) return;
+        scene.initial_position[k] = GiNaC::numeric(start.q[k]);
+        scene.initial_rate[k] = GiNaC::numeric(start.rate[k]);
+    }
+    try {
+        const StartOnConstraints found = start_on_constraints(scene, *assembled_);
+        for (std::size_t k = 0; k < start.q.size(); ++k) {
+            start.q[k] = cln::double_approx(found.q[k]);
+            start.rate[k] = cln::double_approx(found.v[k]);
+        }
+    } catch (const InputError&) {
+        start.q.assign(start.q.size(), std::numeric_limits<double>::quiet_NaN());
+    }
+}
+
+std::string SweepStarts::text_of(std::int64_t trajectory, bool settings_alone) const {
+    std::string text;
+    for (std::size_t c = 0; c < columns_.size(); ++c)
+        if (!settings_alone || columns_[c].of.is_setting())
+            text += fmt::format("{}{} = {:.6g}", text.empty() ? "" : ", ", columns_[c].of.name, value(trajectory, c));
+    return text;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/sweep/study.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/reductions.hpp"
+#include "generator/mechanics/start.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/run/output.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// The first prime number from here on: a motion with so many steps in its period, or a part of them, is rare.
+std::int64_t prime_from(std::int64_t number) {
+    const auto is_prime = [](std::int64_t candidate) {
+        for (std::int64_t factor = 2; factor <= candidate / factor; ++factor)
+            if (candidate % factor == 0) return false;
+        return true;
+    };
+    while (!is_prime(number)) ++number;
+    return number;
+}
+
+// How often states are kept: as often as is asked for, and some 61 times for the companions to be compared with.
+std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures) {
+    constexpr std::int64_t comparisons = 61, most_tried = 1000;  // no part of times that one writes
+    if (!measures || steps == 0) return every;
+    if (every == 0 || every > steps)
+        return prime_from(std::max(fewest_driven_steps, (steps + comparisons - 1) / comparisons));
+    const std::int64_t wanted = std::min(comparisons * every / steps, every / fewest_driven_steps);
+    for (std::int64_t parts = std::max<std::int64_t>(1, wanted); parts <= std::min(every, wanted + most_tried); ++parts)
+        if (every % parts == 0) return every / parts;
+    return every;
+}
+
+// Of so many states one is kept, 0: the last alone. With a clock `every` is the time between them.
+std::int64_t states_kept(const Overrides& overrides, const Scene& scene) {
+    const std::int64_t every = overrides.every.value_or(0);
+    return scene.clock ? std::min<std::int64_t>(every, 1) : every;
+}
+
+// Formulas in more than one thread: one at a time.
+std::unique_lock<std::recursive_mutex> locked(std::recursive_mutex* algebra) {
+    return algebra == nullptr ? std::unique_lock<std::recursive_mutex>() : std::unique_lock(*algebra);
+}
+
+}  // namespace
+
+void StudyTimes::add(const StudyTimes& more) {
+    interrupted = interrupted || more.interrupted;
+    steps_done += more.steps_done;
+    processor_seconds += more.processor_seconds;
+    seconds += more.seconds;
+    threads = std::max(threads, more.threads);
+    lanes = std::max(lanes, more.lanes);
+}
+
+SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options,
+                       std::recursive_mutex* algebra)
+    : as_written_(std::move(scene)), options_(options), algebra_(algebra) {
+    if (!as_written_.outputs.kept.empty() && options.overrides.every)
+        throw InputError("--every: what is kept of a trajectory is one row; leave out --every, or --keep");
+    as_written_.outputs.watch_kept();
+    scene_ = as_written_;  // one kernel serves all values
+    scene_.outputs.dense = 0;
+    apply(options.overrides, scene_);
+    if (options.steps && scene_.clock)
+        throw InputError(
+            "--steps: with a clock nobody knows beforehand how many steps a trajectory takes; give the end time with "
+            "--until");
+    if (options.steps && *options.steps < 0)
+        throw InputError(fmt::format("--steps: {} is not a number of steps", *options.steps));
+    starts_ = std::make_unique<SweepStarts>(scene_, starts, algebra);
+    for (std::int64_t number = 0; number < starts_->settings(); ++number) {
+        Scene of_setting = starts_->with_settings(scene_, number * starts_->count_of_setting());
+        steps_.push_back(steps_of_setting(of_setting).count);
+    }
+    rows_ = std::make_unique<SweepRows>(scene_, *starts_, states_kept(options.overrides, scene_), options.measures);
+    first_ = prepare(0);
+}
+
+Steps SweepStudy::steps_of_setting(Scene& scene) const {
+    if (options_.steps) {
+        step_of(scene, options_.overrides);
+        scene.run.until = scene.run.step * GiNaC::numeric(static_cast<long>(*options_.steps));
+    }
+    return lobatto::steps_of(scene, options_.overrides);
+}
+
+std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
+    const std::int64_t first = number * starts_->count_of_setting();
+    auto setting = std::make_unique<Setting>();
+    setting->number = number;
+    setting->scene = starts_->with_settings(scene_, first);
+    setting->steps = steps_of_setting(setting->scene);
+    const Method& method = setting->scene.method;
+    auto& [derivation, source] = derived_[{static_cast<int>(method.family), method.points}];
+    if (!derivation) {
+        // Steps and values are the kernel's arguments: the scene is derived as it was written.
+        const auto& known = derived_.begin()->second.first;
+        auto fresh = std::make_shared<Derivation>(known ? with_method(*known, method)
+                                                        : derive(starts_->with_settings(as_written_, first)));
+        if (!known && !options_.overrides.set.empty()) check_domains(scene_, fresh->system);
+        if (EnergyWatch::can_watch(*fresh) || !scene_.outputs.kept.empty()) fresh->scene.outputs.energy = true;
+        source = std::make_shared<const KernelSource>(emit(*fresh));
+        derivation = std::move(fresh);
+    }
+    setting->derivation = derivation;
+    setting->source = source;
+    // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
+    // number of them changes what a trajectory becomes. Stops, impacts and what is kept are of single trajectories.
+    const std::int64_t count = starts_->count_of_setting();
+    const bool is_alone = !scene_.outputs.kept.empty() || !scene_.run.stops.empty() || scene_.is_cut();
+    const std::int64_t together =
+        scene_.coordinates.size() > 2 ? std::min<std::int64_t>(count, 8) : count / thread_count(options_.threads);
+    Compiled compiled;
+    setting->kernel = is_alone ? kernel_of(*source, Precision::double_, &compiled)
+                               : ensemble_kernel_of(*source, Precision::double_, together, &compiled);
+    setting->compiled = std::filesystem::path(compiled.object).stem().string();
+    setting->request = request_of(*setting);
+    return setting;
+}
+
+EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
+    const Scene& scene = setting.scene;
+    EnsembleRequest request;
+    request.first = setting.number * starts_->count_of_setting();
+    request.count = starts_->count_of_setting();
+    request.start = [this](std::int64_t index, EnsembleStart& start) { starts_->start(index, start); };
+    request.from_velocities = scene.start == Start::velocity;
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = setting.steps.count;
+    request.tolerance = scene.method.tolerance;
+    request.arrivals = arrivals_of(scene, setting.steps.count);
+    request.arrivals.keeps_chain = false;
+    request.every = looked_at(states_kept(options_.overrides, scene), setting.steps.count, options_.measures);
+    request.threads = options_.threads;
+    request.stops = !scene.run.stops.empty();
+    if (!scene.outputs.kept.empty())
+        request.reducer = [this, &scene] {
+            const auto lock = locked(algebra_);
+            return std::make_unique<Reductions>(scene);
+        };
+    return request;
+}
+
+void SweepStudy::enter(std::int64_t number) {
+    if (current_ && current_->number == number) return;
+    const auto lock = locked(algebra_);
+    note_warning();
+    judges_.reset();
+    current_ = prepare(number);
+    const Setting& setting = *current_;
+    judges_.emplace(setting.scene, *setting.derivation, *setting.source, *setting.kernel, setting.request,
+                    options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon);
+}
+
+StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink& sink,
+                               const std::function<void(std::int64_t)>& progress, const volatile int* interrupted) {
+    StudyTimes times;
+    std::int64_t steps_gone = 0;
+    const std::int64_t of_setting = starts_->count_of_setting();
+    while (first < last && !times.interrupted) {
+        enter(first / of_setting);
+        EnsembleRequest& request = current_->request;
+        request.first = first;
+        request.count = std::min(last, (first / of_setting + 1) * of_setting) - first;
+        request.interrupted = interrupted;
+        if (progress) request.progress = [&](std::int64_t done) { progress(steps_gone + done); };
+        request.sink = [&](const EnsembleTrajectory& trajectory) {
+            sink(trajectory, judges_->judge(trajectory), request);
+        };
+        const EnsembleResult result = integrate(*current_->kernel, request);
+        steps_gone += request.count * request.steps;
+        first += request.count;
+        times.add({result.interrupted, result.steps_done, result.processor_seconds, result.seconds, result.threads,
+                   (*current_->kernel)->lanes == 0 ? 0 : result.lanes});
+    }
+    return times;
+}
+
+void SweepStudy::note_warning() {
+    const std::string warning = judges_ ? judges_->warning() : "";
+    if (warning.empty()) return;
+    const std::string setting = starts_->text_of(current_->number * starts_->count_of_setting(), true);
+    warnings_.push_back(setting.empty() ? warning : setting + ": " + warning);
+}
+
+std::vector<std::string> SweepStudy::end() {
+    note_warning();
+    judges_.reset();
+    current_.reset();
+    return std::exchange(warnings_, {});
+}
+
+double SweepStudy::steps_of(std::int64_t first, std::int64_t last) const {
+    const std::int64_t of_setting = starts_->count_of_setting();
+    double steps = 0;
+    for (std::int64_t number = first / of_setting; number * of_setting < last; ++number) {
+        const std::int64_t begin = std::max(first, number * of_setting),
+                           end = std::min(last, (number + 1) * of_setting);
+        steps += static_cast<double>(end - begin) * static_cast<double>(steps_[static_cast<std::size_t>(number)]);
+    }
+    return steps;
+}
+
+std::string SweepStudy::identity() const {
+    std::string text = scene_.source.content() + '\n';
+    for (const Reduction& kept : scene_.outputs.kept) text += "keep " + kept.text + '\n';
+    for (const auto& [what, value] : starts_->sources()) text += what + ' ' + value + '\n';
+    const Overrides& given = options_.overrides;
+    for (const std::string& set : given.set) text += "set " + set + '\n';
+    text += fmt::format("step {}\nuntil {}\nsteps {}\nevery {}\nmethod {}\ntolerance {}\nmeasured {}\nbeyond {}\n",
+                        given.step, given.until, options_.steps.value_or(-1), given.every.value_or(0),
+                        as_written_.method.name(), exact_text(as_written_.method.tolerance), options_.measures,
+                        options_.beyond_horizon);
+    return text;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What is said of a sweep as a whole: how many failed and why, how numbers are spread, what was worst.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "analysis/sweep/rows.hpp"
+
+namespace lobatto {
+
+// How a number is spread over the trajectories that succeeded; not numbers when there is none.
+struct Spread {
+    double least, largest, mean, rms;
+};
+
+class Sums {
+public:
+    void add(double x);  // what is no number is left out
+    std::int64_t count() const { return count_; }
+    Spread spread() const;
+
+private:
+    std::int64_t count_ = 0;
+    double least_ = 0, largest_ = 0;
+    long double sum_ = 0, squares_ = 0;
+};
+
+// The largest of some numbers, and of which trajectory it is; index -1: there was none.
+struct Worst {
+    double value = 0;
+    std::int64_t index = -1;
+    void see(double x, std::int64_t of);
+};
+
+// Of the trajectories of one setting of the method.
+struct SettingTally {
+    std::int64_t trajectories = 0, failed = 0, steps_done = 0;
+    Worst energy_error, error;
+};
+
+class SweepTally {
+public:
+    SweepTally(std::size_t coordinates, std::int64_t count_of_setting);
+
+    // Figures in the order of the trajectories; `state`: q, p at the end.
+    void add(const SweepFigures& figures, const double* state);
+
+    std::int64_t trajectories() const { return trajectories_; }
+    std::int64_t failed() const { return trajectories_ - count_of_[LOBATTO_OK]; }
+    std::int64_t count_of(int status) const { return count_of_[static_cast<std::size_t>(status)]; }
+    const std::vector<SweepFigures>& first_failures() const { return failures_; }  // five at most
+    // Of all that succeeded.
+    Spread q(std::size_t k) const { return q_[k].spread(); }
+    Spread p(std::size_t k) const { return p_[k].spread(); }
+    const Sums& energy_error() const { return energy_error_; }
+    const std::vector<SettingTally>& settings() const { return settings_; }
+    Worst worst_error() const;
+
+private:
+    std::size_t n_;
+    std::int64_t count_of_setting_, trajectories_ = 0;
+    std::array<std::int64_t, LOBATTO_STATUSES> count_of_{};
+    std::vector<SweepFigures> failures_;
+    std::vector<Sums> q_, p_;
+    Sums energy_error_;
+    std::vector<SettingTally> settings_;
+};
+
+}  // namespace lobatto

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "cli/print/sweep_summary.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "analysis/accuracy/companion.hpp"
+#include "cli/print/summary.hpp"
+#include "cli/print/tell.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t coordinates_told = 3, settings_told = 40;  // at most
+
+std::string spread_text(const Spread& spread) {
+    return fmt::format("{:.6g} to {:.6g}, mean {:.6g}, rms {:.6g}", spread.least, spread.largest, spread.mean,
+                       spread.rms);
+}
+
+// Which parameters that vary decide the step or the end time: those of the scene count, for all trajectories.
+void print_fixed_times(const Scene& scene, const SweepStarts& starts) {
+    for (const SweepStarts::Column& column : starts.columns()) {
+        if (column.of.role != VariedName::Role::parameter) continue;
+        const Parameter& parameter = scene.parameters[column.of.index];
+        if (scene.run.step.has(parameter.symbol) || scene.run.until.has(parameter.symbol))
+            fmt::print("The step and the end time are those of {} = {:.6g} for all trajectories.\n", parameter.written,
+                       scene.evaluate(parameter.value, parameter.name).to_double());
+    }
+}
+
+// A row for each setting: a study of convergence.
+void print_settings(const SweepStudy& study, const SweepTally& tally) {
+    const SweepStarts& starts = study.starts();
+    const std::size_t count = tally.settings().size();
+    for (std::size_t number = 0; number < std::min(count, settings_told); ++number) {
+        const SettingTally& setting = tally.settings()[number];
+        if (setting.trajectories == 0) continue;
+        std::string text = counted(setting.steps_done, "step", "steps");
+        if (setting.failed > 0) text += fmt::format(", {} of {} failed", setting.failed, setting.trajectories);
+        if (study.scene().outputs.energy && setting.energy_error.index >= 0)
+            text += fmt::format(", energy error {:.2g} at most", setting.energy_error.value);
+        if (setting.error.index >= 0)
+            text += fmt::format(", measured error {:.1e} of the amplitude at most", setting.error.value);
+        print_row(starts.text_of(static_cast<std::int64_t>(number) * starts.count_of_setting(), true), text);
+    }
+    if (count > settings_told) print_row("…", counted(static_cast<std::int64_t>(count), "setting", "settings"));
+}
+
+void print_state(const Scene& scene, const SweepTally& tally) {
+    if (tally.failed() == tally.trajectories() || scene.coordinates.size() > coordinates_told) return;
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k)
+        print_row(scene.coordinates[k].name + " at the end", spread_text(tally.q(k)));
+    for (std::size_t k = 0; k < scene.coordinates.size() && scene.outputs.momenta; ++k)
+        print_row("p_" + scene.coordinates[k].name + " at the end", spread_text(tally.p(k)));
+}
+
+}  // namespace
+
+std::string counted(std::int64_t count, const std::string& one, const std::string& many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
+void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTimes& times, std::int64_t asked) {
+    const Scene& scene = study.scene();
+    const SweepStarts& starts = study.starts();
+    const bool is_one = starts.settings() == 1;
+    const std::string of_all = times.interrupted ? fmt::format(" of {}", asked) : "";
+    print_row("trajectories", fmt::format("{}{}{}", tally.trajectories(), of_all,
+                                          tally.failed() == 0 ? "" : fmt::format(", {} failed", tally.failed())));
+    if (is_one) {
+        const EnsembleRequest& request = study.first_setting().request;
+        print_row("steps", fmt::format("{} each, h = {:.6g}, to t = {:.6g}", request.steps, request.step,
+                                       static_cast<double>(request.steps) * request.step));
+    }
+    if (times.threads > 0)
+        print_row("threads",
+                  fmt::format("{}, {} each", times.threads,
+                              times.lanes == 0 ? "one trajectory at a time" : counted(times.lanes, "lane", "lanes")));
+    if (times.steps_done > 0) {
+        const auto steps = static_cast<double>(times.steps_done);
+        print_row("speed", fmt::format("{:.3g} steps per second", steps / times.seconds));
+        print_row("time per step", duration(times.processor_seconds / steps) + " of a processor, for one trajectory");
+    }
+    if (!is_one) {
+        print_settings(study, tally);
+        return;
+    }
+    const SettingTally none, &all = tally.settings().empty() ? none : tally.settings().back();
+    if (scene.outputs.energy && all.energy_error.index >= 0) {
+        const bool conserves = study.first_setting().derivation->conserves_energy();
+        print_row(conserves ? "energy error" : "energy change",
+                  fmt::format("{:.2g} at most, of trajectory {}, {}", all.energy_error.value, all.energy_error.index,
+                              starts.text_of(all.energy_error.index)));
+        const Spread spread = tally.energy_error().spread();
+        print_row("  at the end", fmt::format("{:.2g} to {:.2g}, mean {:.2g}, rms {:.2g}", spread.least, spread.largest,
+                                              spread.mean, spread.rms));
+    }
+    if (all.error.index >= 0)
+        print_row("measured error", fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}",
+                                                all.error.value, all.error.index, starts.text_of(all.error.index)));
+    print_state(scene, tally);
+}
+
+void print_sweep_notes(const SweepStudy& study) {
+    if (study.starts().settings() == 1 && !study.first_setting().steps.reaches_end)
+        fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
+    print_fixed_times(study.scene(), study.starts());
+}
+
+std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
+    std::vector<std::string> reasons;
+    for (std::size_t status = 1; status < sweep_statuses.size(); ++status)
+        if (const std::int64_t count = tally.count_of(static_cast<int>(status)); count > 0)
+            reasons.push_back(fmt::format("{} {}", count, sweep_statuses[status]));
+    const std::vector<SweepFigures>& first = tally.first_failures();
+    std::string text =
+        fmt::format("{}: {} of {} failed: {}. The others went on. {}:", study.scene().path, tally.failed(),
+                    counted(tally.trajectories(), "trajectory", "trajectories"), fmt::join(reasons, ", "),
+                    tally.failed() > std::ssize(first) ? "The first of them" : "They are");
+    for (const SweepFigures& failure : first) {
+        text += fmt::format("\n  trajectory {}, {}: {}", failure.index, study.starts().text_of(failure.index),
+                            sweep_statuses[static_cast<std::size_t>(failure.status)]);
+        if (failure.status < departed)
+            text += fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
+    }
+    return text + "\nTry a smaller --step, or leave these values out.";
+}
+
+void warn_of_errors(const SweepStudy& study, const SweepTally& tally) {
+    const Worst worst = tally.worst_error();
+    if (worst.index >= 0 && worst.value > large_error)
+        tell(
+            "lobatto: warning: the error of trajectory {}, {}, is {:.2g} of the amplitude; take a smaller step, or "
+            "more points.\n",
+            worst.index, study.starts().text_of(worst.index), worst.value);
+}
+
+namespace {
+
+nlohmann::ordered_json json_of(const Worst& worst) {
+    if (worst.index < 0 || !std::isfinite(worst.value)) return nullptr;
+    return {{"value", worst.value}, {"trajectory", worst.index}};
+}
+
+}  // namespace
+
+std::string json_of_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTimes& times,
+                          const SweptTable& table) {
+    using Json = nlohmann::ordered_json;
+    Json json = {{"format", 1},
+                 {"command", "sweep"},
+                 {"scene", study.scene().path},
+                 {"title", study.scene().title},
+                 {"ending", times.interrupted    ? "interrupted"
+                            : tally.failed() > 0 ? "failed"
+                                                 : "done"},
+                 {"asked", table.asked},
+                 {"trajectories", tally.trajectories()},
+                 {"failed", tally.failed()}};
+    json["failures"] = Json::array();
+    for (std::size_t status = 1; status < sweep_statuses.size(); ++status)
+        if (const std::int64_t count = tally.count_of(static_cast<int>(status)); count > 0)
+            json["failures"].push_back({{"status", status}, {"reason", sweep_statuses[status]}, {"count", count}});
+    json["settings"] = Json::array();
+    for (const SettingTally& one : tally.settings())
+        json["settings"].push_back({{"trajectories", one.trajectories},
+                                    {"failed", one.failed},
+                                    {"steps", one.steps_done},
+                                    {"energy_error", json_of(one.energy_error)},
+                                    {"measured_error", json_of(one.error)}});
+    json["steps"] = times.steps_done;
+    json["seconds"] = times.seconds;
+    json["processor_seconds"] = times.processor_seconds;
+    json["threads"] = times.threads;
+    json["lanes"] = times.lanes;
+    json["warnings"] = table.warnings;
+    json["table"] = table.path;
+    json["rows"] = table.rows;
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace lobatto

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Ranks of MPI.
+#include <mpi.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <climits>
+#include <thread>
+
+#include "cli/ranks/ranks.hpp"
+#include "runtime/error.hpp"
+#include "runtime/run/ensemble.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// A wait costs a processor nothing: MPI's own would turn in a loop.
+constexpr std::chrono::microseconds moment{200};
+
+class MpiRanks : public Ranks {
+public:
+    MpiRanks() {
+        int provided = 0;
+        MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
+        MPI_Comm_rank(MPI_COMM_WORLD, &number_);
+        MPI_Comm_size(MPI_COMM_WORLD, &count_);
+        MPI_Comm here = MPI_COMM_NULL;
+        MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &here);
+        MPI_Comm_size(here, &on_machine_);
+        MPI_Comm_free(&here);
+    }
+    ~MpiRanks() override { MPI_Finalize(); }
+    MpiRanks(const MpiRanks&) = delete;
+    MpiRanks& operator=(const MpiRanks&) = delete;
+
+    int number() const override { return number_; }
+    int count() const override { return count_; }
+
+    // The processors that mpirun has bound this process to or, where it has not, its share of the machine.
+    int threads() const override {
+        const int all = static_cast<int>(::sysconf(_SC_NPROCESSORS_ONLN)), bound = thread_count(0);
+        return bound < all ? bound : std::max(1, all / on_machine_);
+    }
+
+    void send(int to, const std::string& message) override {
+        if (message.size() > INT_MAX)
+            throw MachineError(
+                "the rows of one trajectory are more than a message of MPI can hold; give a larger --every");
+        MPI_Send(message.data(), static_cast<int>(message.size()), MPI_BYTE, to, 0, MPI_COMM_WORLD);
+    }
+
+    std::optional<std::pair<int, std::string>> receive() override {
+        int is_there = 0;
+        MPI_Status status;
+        MPI_Iprobe(MPI_ANY_SOURCE, 0, MPI_COMM_WORLD, &is_there, &status);
+        if (is_there == 0) return std::nullopt;
+        int size = 0;
+        MPI_Get_count(&status, MPI_BYTE, &size);
+        std::string message(static_cast<std::size_t>(size), '\0');
+        MPI_Recv(message.data(), size, MPI_BYTE, status.MPI_SOURCE, 0, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        return std::pair(status.MPI_SOURCE, std::move(message));
+    }
+
+    void pause() override { std::this_thread::sleep_for(moment); }
+
+private:
+    int number_ = 0, count_ = 1, on_machine_ = 1;
+};
+
+}  // namespace
+
+std::unique_ptr<Ranks> join_ranks() {
+    auto ranks = std::make_unique<MpiRanks>();
+    if (ranks->count() > 1) return ranks;
+    return nullptr;
+}
+
+}  // namespace lobatto

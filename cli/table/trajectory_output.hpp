@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The trajectory of a run: as CSV, which can be continued and holds numbers of any kind, or as a table.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/table/table_file.hpp"
+#include "generator/scene/scene.hpp"
+#include "runtime/run/output.hpp"
+
+namespace lobatto {
+
+class TrajectoryOutput {
+public:
+    // `kept`: as TrajectoryFile; of CSV. InputError where the numbers of the scene do not fit into 64 bits and the
+    // format has no more.
+    TrajectoryOutput(const std::string& path, TableFormat format, const Scene& scene, const TrajectoryHeader& header,
+                     const Written& kept);
+
+    void write(const Records& records);
+    void finish();
+    bool can_go_on() const { return text_ && text_->is_regular(); }
+    void sync() { text_->sync(); }                        // of one that can go on
+    Written written() const { return text_->written(); }  // likewise
+
+private:
+    std::optional<TrajectoryFile> text_;
+    std::optional<TableFile> table_;
+    std::size_t columns_ = 0, multipliers_ = 0;  // of a row: of the state, and after it
+    bool energy_ = false;
+    std::vector<TableCell> cells_;
+};
+
+}  // namespace lobatto
