@@ -81,6 +81,12 @@ std::string why(double step, bool too_coarse) {
         step / 2);
 }
 
+// Mixed, so that states whose mixed numbers are multiples of something are at no equal distances: those of a motion
+// whose period they met would all be at one place, perhaps at rest.
+std::int64_t mixed_number(std::int64_t number) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(number) * 0x9e3779b97f4a7c15 >> 33);
+}
+
 }  // namespace
 
 bool EnergyWatch::can_watch(const Derivation& derivation) {
@@ -108,19 +114,33 @@ void EnergyWatch::observe(const Records& records) {
             else
                 energy_error_ = error;
         }
-        if ((seen_ - 1) / rows_a_step_ % stride_ != 0) continue;
+        const std::int64_t number = (seen_ - 1) / rows_a_step_;
+        if (mixed_number(number) % stride_ != 0) continue;
         some_.emplace_back(row, row + columns_);
-        if (some_.size() < 2 * most_states) continue;
-        for (std::size_t j = 0; j < most_states; ++j) some_[j] = some_[2 * j];  // every other one
-        some_.resize(most_states);
-        stride_ *= 2;
+        numbers_.push_back(number);
+        while (some_.size() >= 2 * most_states) {
+            stride_ *= 2;
+            std::size_t kept = 0;  // about half of them; the start always
+            for (std::size_t j = 0; j < some_.size(); ++j)
+                if (mixed_number(numbers_[j]) % stride_ == 0) {
+                    some_[kept] = some_[j];
+                    numbers_[kept++] = numbers_[j];
+                }
+            some_.resize(kept);
+            numbers_.resize(kept);
+        }
     }
 }
 
 std::vector<double> EnergyWatch::save() const {
-    std::vector<double> all{
-        static_cast<double>(seen_), static_cast<double>(stride_),        energy_start_, energy_error_,
-        static_cast<double>(lost_), static_cast<double>(leaving_.size())};
+    std::vector<double> all{static_cast<double>(seen_),
+                            static_cast<double>(stride_),
+                            energy_start_,
+                            energy_error_,
+                            static_cast<double>(lost_),
+                            static_cast<double>(leaving_.size()),
+                            static_cast<double>(numbers_.size())};
+    all.insert(all.end(), numbers_.begin(), numbers_.end());
     for (const States& states : {leaving_, some_})
         for (const std::vector<double>& row : states) all.insert(all.end(), row.begin(), row.end());
     return all;
@@ -134,6 +154,8 @@ void EnergyWatch::restore(const std::vector<double>& saved) {
     energy_error_ = *at++;
     lost_ = *at++ != 0;
     const auto leaving = static_cast<std::size_t>(std::llround(*at++));
+    numbers_.resize(static_cast<std::size_t>(std::llround(*at++)));
+    for (std::int64_t& number : numbers_) number = std::llround(*at++);
     for (; at < saved.end(); at += static_cast<std::ptrdiff_t>(columns_))
         (leaving_.size() < leaving ? leaving_ : some_).emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
 }

@@ -38,8 +38,9 @@ private:
     std::int64_t rows_a_step_;  // the energies of states between the steps are not conserved as well
     std::int64_t seen_ = 0, stride_ = 1;
     double energy_start_ = 0, energy_error_ = 0;
-    bool lost_ = false;      // an energy in double that is no number
-    States some_, leaving_;  // the first of `leaving_` is the start
+    bool lost_ = false;                  // an energy in double that is no number
+    States some_, leaving_;              // the first of `leaving_` is the start
+    std::vector<std::int64_t> numbers_;  // of `some_`, counted in steps
 };
 
 }  // namespace lobatto

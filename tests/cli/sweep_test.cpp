@@ -476,6 +476,19 @@ TEST_CASE("trajectories that leave their Lagrangian are told from those that sta
     CHECK(place.sweep({scene, "--vary", "q=0.1,0.2", "--step", "0.16"}).err.empty());
 }
 
+TEST_CASE("a motion that is looked at after whole periods, at rest, has not left its Lagrangian") {
+    // Its period is 1.6, 32 steps: before, all states that were looked at had a kinetic energy of 1e-5 of the largest.
+    const Place place;
+    const std::string vary = "q=2.4502362559063977", until = "20";
+    CHECK(place.sweep({pendulum, "--vary", vary, "--until", until}).exit_code == 0);
+    const std::string scene = place.file("pendulum.toml");
+    std::string text = test::read_file(pendulum);
+    text.replace(text.find("\"pi/2\""), 6, "2.4502362559063977");
+    test::write_text(scene, text);
+    const test::Finished run = place.lobatto({"run", scene, "--until", until, "-o", place.file("run.csv")});
+    CHECK_MESSAGE(run.exit_code == 0, run.err);
+}
+
 TEST_CASE("the step and the end are the same for all, and it is said when a varied parameter stands in them") {
     const Place place;
     const std::string note = "\nThe step and the end time are those of omega = 6.28319 for all trajectories.\n";
