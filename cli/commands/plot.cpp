@@ -136,7 +136,7 @@ void add_plot(CommandLine& program) {
         command.option("-o,--output", options->output, "Picture, .svg or .png (default: out/NAME.svg)")
             .shown_as("FILE");
     command.flag("--terminal", options->terminal, "Draw in characters, on standard output").excludes(output);
-    command.footer("Example:\n  lobatto plot out/pendulum.csv --x q --y p_q");
+    command.footer("Example:\n  lobatto run scenes/pendulum.toml\n  lobatto plot out/pendulum.csv --x q --y p_q");
     command.does([options] { plot(*options); });
 }
 

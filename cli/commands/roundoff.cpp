@@ -173,7 +173,7 @@ void add_roundoff(CommandLine& program) {
                  "Without the steps in long double, which take most of the time: energies alone, against H(0)");
     command.flag("--no-picture", options->no_picture, "The table alone, without gnuplot");
     add_json_option(command, options->json);
-    command.footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 1000000 --points 6 --step 0.05");
+    command.footer("Example:\n  lobatto roundoff scenes/kepler.toml --steps 200000 --points 6 --step 0.05");
     command.does([options] { roundoff(*options); });
 }
 

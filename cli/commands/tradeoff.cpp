@@ -110,7 +110,7 @@ void add_tradeoff(CommandLine& program) {
     add_until_option(command, options->overrides);
     add_set_option(command, options->overrides);
     add_json_option(command, options->json);
-    command.footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 30s");
+    command.footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 10s");
     command.does([options] { tradeoff(*options); });
 }
 
