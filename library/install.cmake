@@ -27,13 +27,14 @@ install(FILES ${PROJECT_SOURCE_DIR}/LICENSE.md DESTINATION ${CMAKE_INSTALL_DOCDI
 set(MANUAL_DIR ${PROJECT_BINARY_DIR}/manual)
 cmake_policy(SET CMP0087 NEW)
 install(CODE "
-    file(MAKE_DIRECTORY ${MANUAL_DIR})
-    set(lobatto $<TARGET_FILE:lobatto>)
-    execute_process(COMMAND \${lobatto} manual -o ${MANUAL_DIR}/man1 OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
-    execute_process(COMMAND \${lobatto} schema -o ${MANUAL_DIR}/scene.schema.json COMMAND_ERROR_IS_FATAL ANY)
+    set(lobatto [[$<TARGET_FILE:lobatto>]])
+    set(folder [[${MANUAL_DIR}]])
+    file(MAKE_DIRECTORY \"\${folder}\")
+    execute_process(COMMAND \"\${lobatto}\" manual -o \"\${folder}/man1\" OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND \"\${lobatto}\" schema -o \"\${folder}/scene.schema.json\" COMMAND_ERROR_IS_FATAL ANY)
     foreach(shell bash zsh fish)
-        execute_process(COMMAND \${lobatto} manual --completions \${shell} OUTPUT_FILE ${MANUAL_DIR}/lobatto.\${shell}
-            COMMAND_ERROR_IS_FATAL ANY)
+        execute_process(COMMAND \"\${lobatto}\" manual --completions \${shell}
+            OUTPUT_FILE \"\${folder}/lobatto.\${shell}\" COMMAND_ERROR_IS_FATAL ANY)
     endforeach()")
 install(DIRECTORY ${MANUAL_DIR}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR})
 install(FILES ${MANUAL_DIR}/lobatto.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME lobatto)

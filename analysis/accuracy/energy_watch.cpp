@@ -12,12 +12,13 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::size_t most_states = 8;  // for the mean kinetic energy
-constexpr double departed = 0.5;        // of it
-constexpr double walk = 2;              // times the rms of a random walk
-constexpr int fewest_states = 3;        // of a mean of some
-constexpr double coarse = 0.05;         // third differences of the energy over second ones
-constexpr double most_energy = 1e300;   // sums of it stay numbers
+constexpr std::size_t most_states = 8;                          // for the mean kinetic energy
+constexpr std::int64_t longest_stride = std::int64_t{1} << 31;  // mixed numbers have 31 bits
+constexpr double departed = 0.5;                                // of it
+constexpr double walk = 2;                                      // times the rms of a random walk
+constexpr int fewest_states = 3;                                // of a mean of some
+constexpr double coarse = 0.05;                                 // third differences of the energy over second ones
+constexpr double most_energy = 1e300;                           // sums of it stay numbers
 constexpr double a_rounding = 0x1p-52;  // of what the energy is computed from: below it no double can tell
 
 struct State {
@@ -115,10 +116,10 @@ void EnergyWatch::observe(const Records& records) {
                 energy_error_ = error;
         }
         const std::int64_t number = (seen_ - 1) / rows_a_step_;
-        if (mixed_number(number) % stride_ != 0) continue;
+        if (mixed_number(number) % stride_ != 0 || some_.size() >= 2 * most_states) continue;
         some_.emplace_back(row, row + columns_);
         numbers_.push_back(number);
-        while (some_.size() >= 2 * most_states) {
+        while (some_.size() >= 2 * most_states && stride_ < longest_stride) {
             stride_ *= 2;
             std::size_t kept = 0;  // about half of them; the start always
             for (std::size_t j = 0; j < some_.size(); ++j)

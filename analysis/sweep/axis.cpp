@@ -43,6 +43,8 @@ public:
             source_.fail({1, 1}, message);
         });
         axis_.written = argument_.substr(equals + 1);
+        for (char& c : axis_.written)
+            if (static_cast<unsigned char>(c) < 0x20) c = ' ';  // it becomes a line of the table's head
         read_values(equals + 1);
         check_settings(equals + 1);
         return std::move(axis_);

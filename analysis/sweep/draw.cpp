@@ -84,6 +84,8 @@ public:
                                            "larger than the first",
                                            draw.first, draw.second));
         draw.written = argument_.substr(at, close + 1 - at);
+        for (char& c : draw.written)
+            if (static_cast<unsigned char>(c) < 0x20) c = ' ';  // it becomes a line of the table's head
         return draw;
     }
 

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/sweep/rows.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
+
+#include "generator/formula/source.hpp"
 
 namespace lobatto {
 
@@ -78,7 +82,12 @@ SweepRows::SweepRows(const Scene& scene, const SweepStarts& starts, std::int64_t
     steps_ = add_own("steps", true);
     if (!scene.run.stops.empty()) stop_ = add_own("stop", true);
     time_ = add("t");
-    for (const Reduction& kept : scene.outputs.kept) add(name_of_column(kept.text));
+    for (const Reduction& kept : scene.outputs.kept) {
+        const std::string name = name_of_column(kept.text);
+        if (std::any_of(columns_.begin(), columns_.end(), [&](const TableColumn& one) { return one.name == name; }))
+            throw InputError(fmt::format("{}: keep: '{}' is listed twice; keep one", scene.path, kept.text));
+        add(name);
+    }
     if (scene.outputs.kept.empty()) {
         q_ = columns_.size();
         for (const Coordinate& coordinate : scene.coordinates) add(coordinate.name, coordinate.unit);
@@ -136,8 +145,8 @@ SweepFigures SweepRows::read(const TableCell* row, double* state) const {
         state[k] = real(q_ == none ? none : q_ + k);
         state[n_ + k] = real(p_ == none ? none : p_ + k);
     }
-    return {whole_in(row[0]), whole_in(row[status_]), whole_in(row[steps_]),   real(time_),
-            real(error_),     real(energy_),          std::fabs(real(energy_))};
+    return {whole_in(row[0]), whole_in(row[status_]), whole_in(row[steps_]), real(time_), real(error_), real(energy_),
+            not_said};
 }
 
 }  // namespace lobatto

@@ -136,6 +136,8 @@ public:
         const std::size_t length =
             is_long ? byte(8) | byte(9) << 8 | byte(10) << 16 | byte(11) << 24 : byte(8) | byte(9) << 8;
         if (bytes_.size() < before + length) fail("it is shorter than its head says");
+        constexpr std::size_t longest_head = 60'000;
+        if (length > longest_head) fail(fmt::format("its head has {} bytes; at most {}", length, longest_head));
         const std::string head = bytes_.substr(before, length);
         begin_ = before + length;
         std::smatch found;
@@ -144,7 +146,7 @@ public:
         const std::string sizes = found[1];
         static const std::regex whole_number("[0-9]+");
         for (std::sregex_iterator i(sizes.begin(), sizes.end(), whole_number), end; i != end; ++i)
-            shape.push_back(std::stoull(i->str()));
+            shape.push_back(size_of(i->str()));
         const bool by_columns = std::regex_search(head, std::regex("'fortran_order': *True"));
         if (std::regex_search(head, found, std::regex("'descr': *'([^']*)'")))
             read_plain(shape, type_of(found[1]), by_columns);
@@ -157,6 +159,15 @@ private:
         throw InputError(fmt::format("--starts: {}: {}", table_.path, why));
     }
 
+    // A number of things in the file, which has as many bytes at least.
+    std::size_t size_of(const std::string& digits) const {
+        std::size_t size = 0;
+        const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), size);
+        if (read.ec != std::errc() || read.ptr != digits.data() + digits.size() || size > bytes_.size())
+            fail("it is shorter than its head says");
+        return size;
+    }
+
     NpyType type_of(const std::string& text) const {
         static const std::regex known("[<|=](f[48]|[iu][1248]|b1)");
         if (!std::regex_match(text, known))
@@ -165,7 +176,7 @@ private:
     }
 
     void expect(std::size_t rows, std::size_t row_bytes) const {
-        if (bytes_.size() - begin_ < rows * row_bytes) fail("it is shorter than its head says");
+        if (row_bytes == 0 || rows > (bytes_.size() - begin_) / row_bytes) fail("it is shorter than its head says");
     }
 
     void read_plain(const std::vector<std::size_t>& shape, const NpyType& type, bool by_columns) {
@@ -203,7 +214,7 @@ private:
             const std::string name = (*i)[2], type = (*i)[3];
             if ((*i)[4].matched) fail(fmt::format("the column {} has arrays in place of numbers", name));
             if (name.empty() && type.starts_with("|V")) {  // bytes of columns that were left out
-                row_bytes += std::stoull(type.substr(2));
+                row_bytes += size_of(type.substr(2));
                 continue;
             }
             table_.names.push_back(name);

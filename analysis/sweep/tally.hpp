@@ -57,6 +57,8 @@ public:
     const Sums& energy_error() const { return energy_error_; }
     const std::vector<SettingTally>& settings() const { return settings_; }
     Worst worst_error() const;
+    // Whether some rows were read back: they do not tell the largest energy error between their times.
+    bool was_resumed() const { return was_resumed_; }
 
 private:
     std::size_t n_;
@@ -65,6 +67,7 @@ private:
     std::vector<SweepFigures> failures_;
     std::vector<Sums> q_, p_;
     Sums energy_error_;
+    bool was_resumed_ = false;
     std::vector<SettingTally> settings_;
 };
 

@@ -124,8 +124,9 @@ void keep_checking(const CheckCommand& options) {
         } catch (const ComputationError& error) {
             tell("lobatto: {}\n", error.what());
         }
-        fmt::print(std::cout, "\n(waiting for {} to be saved; Ctrl-C ends)\n\n", options.scene);
-        std::cout.flush();
+        if (!std::cout.flush())
+            throw MachineError("cannot write to standard output. Is its reader gone, or the disk full?");
+        tell("\n(waiting for {} to be saved; Ctrl-C ends)\n\n", options.scene);
         while (*interruption.flag() == 0 && state_of(options.scene) == seen) std::this_thread::sleep_for(pause);
     }
     throw ExitCode{interrupted_exit};

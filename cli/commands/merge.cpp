@@ -133,6 +133,7 @@ void merge(const MergeOptions& options) {
         if (std::filesystem::equivalent(part, options.output, none))
             throw InputError(fmt::format("{}: the table would overwrite this part; give it another name", part));
     keep_foreign(options.output);
+    if (format == TableFormat::npy) keep_foreign(options.output + ".json");
     const TableHead head = parts.head();
     const std::size_t width = head.columns.size(), status = status_column(head);
     TableFile table(options.output, format, head);

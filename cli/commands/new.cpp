@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <filesystem>
 
@@ -12,6 +13,7 @@
 #include "cli/print/embedded.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/formula/suggest.hpp"
+#include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 
@@ -61,7 +63,11 @@ void make_new(const NewCommand& options) {
     std::string path = options.name.empty() ? options.kind : options.name;
     if (!path.ends_with(".toml")) path += ".toml";
     const std::string title = title_of(path);
-    if (title.empty() || !is_printable(title) || title.find_first_of("\"\\") != std::string::npos)
+    const bool has_letter =
+        std::any_of(title.begin(), title.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c > 0x7f; });
+    if (!has_letter || title.front() == '.' || !is_printable(title) ||
+        std::filesystem::path(path).filename().string().front() == '-' ||
+        title.find_first_of("\"\\") != std::string::npos)
         throw InputError(fmt::format("lobatto new: '{}' cannot be the name of a scene; use letters and digits", path));
     std::error_code ignored;
     if (std::filesystem::exists(path, ignored))
@@ -71,7 +77,7 @@ void make_new(const NewCommand& options) {
     text.replace(text.find(mark), mark.size(), title);
     write_whole(path, "the scene", text, "choose another name");
     fmt::print("{} is a scene of kind {}. Open it in an editor, and try\n  lobatto run {}\n  lobatto view {}\n", path,
-               options.kind, path, path);
+               options.kind, shell_word(path), shell_word(path));
 }
 
 }  // namespace

@@ -69,6 +69,7 @@ std::string plot_path(const PlotCommand& options) {
     if (!path.ends_with(".svg") && !path.ends_with(".png"))
         throw InputError(fmt::format("-o: {} is neither a .svg nor a .png", path));
     for (const std::string& file : options.files) keep_scene(file, path);
+    keep_foreign(path);
     return path;
 }
 

@@ -282,7 +282,9 @@ void refuse_format(const RunOptions& options) {
 void run(const RunOptions& options) {
     if (!options.output.empty()) keep_scene(options.scene, options.output);
     refuse_format(options);
-    const bool quiet = options.quiet || options.output == standard_output;
+    const bool quiet = options.quiet || is_standard_output(options.output);
+    if (options.json && is_standard_output(options.output))
+        throw InputError("--json: standard output has the trajectory; name a file with -o");
     Scene read = read_scene(options.scene);
     options.method.apply(read);
     const PreparedRun run = prepare_run(std::move(read), options.overrides, options.general);

@@ -19,10 +19,12 @@ void add_schema(CommandLine& program) {
         "taplo "
         "(Even Better TOML).\n\nExample:\n  lobatto schema -o scene.schema.json");
     command.does([output] {
-        if (output->empty())
+        if (output->empty()) {
             fmt::print("{}", scene_schema());
-        else
+        } else {
+            keep_foreign(*output);
             write_whole(*output, "the schema", scene_schema());
+        }
     });
 }
 

@@ -161,7 +161,7 @@ Results results_of(const SweepOptions& options, const SweepStudy& study, const s
             const SweepFigures figures = study.rows().read(row, state.data());
             results.tally.add(figures, state.data());
         });
-        if (!options.quiet)
+        if (!options.quiet && !options.json)
             print_row("resumed",
                       resumed ? fmt::format("after {}", counted(resumed->next - first, "trajectory", "trajectories"))
                               : "nothing was left: from the start");
@@ -228,7 +228,7 @@ void sweep(const SweepOptions& options) {
     std::optional<CrewLeader> crew;
     if (ranks) crew.emplace(*ranks);
 
-    const bool is_stream = options.output == standard_output;
+    const bool is_stream = is_standard_output(options.output);
     const bool quiet = options.quiet || options.json || is_stream;
     const auto [number, of] = shard_of(options.starts.shard);
     if (!options.output.empty()) keep_scene(options.scene, options.output);
@@ -249,6 +249,7 @@ void sweep(const SweepOptions& options) {
     const std::string path = output_path(options.output, name + ending_of(format));
     keep_scene(scene.path, path);
     keep_foreign(path);
+    if (format == TableFormat::npy) keep_foreign(path + ".json");
     if (!quiet) fmt::print("{}: kernel {}\n", scene.path, study->first_setting().source->digest);
     Results results = results_of(options, *study, path, head, shard.first());
     std::vector<std::string> warnings;

@@ -138,7 +138,14 @@ std::vector<ViewChart> charts_of(const std::vector<Viewed>& all) {
 void view(const ViewCommand& options) {
     const std::string path = output_path(options.output, result_name(options.scenes.front()) + ".html");
     for (const std::string& scene : options.scenes) keep_scene(scene, path);
-    if (!options.video.empty()) check_video_name(options.video);
+    if (!options.video.empty()) {
+        check_video_name(options.video);
+        if (is_standard_output(path)) throw InputError("--video: the browser reads the page; name a file with -o");
+        if (options.video == path) throw InputError("--video: the page and the video need two names");
+        keep_foreign(options.video);
+    }
+    if (options.json && is_standard_output(path))
+        throw InputError("--json: standard output has the page; name a file with -o");
     keep_foreign(path);
     const std::vector<Viewed> all = motions_of(options);
     if (std::any_of(all.begin(), all.end(), [](const Viewed& one) { return one.is_interrupted; }))
@@ -159,8 +166,10 @@ void view(const ViewCommand& options) {
     if (options.json) {
         std::vector<Drawn> drawn;
         for (std::size_t i = 0; i < all.size(); ++i)
-            drawn.push_back(
-                {options.scenes[i / (1 + options.beside.size())], all[i].motion.label, all[i].motion.note, ""});
+            drawn.push_back({options.scenes[i / (1 + options.beside.size())], all[i].motion.label, all[i].motion.note,
+                             "", all[i].failure});
+        if (!options.video.empty())
+            drawn.push_back({options.scenes.front(), all.front().title, "video", options.video, ""});
         fmt::print("{}", json_of_drawn("view", path, drawn));
     } else if (!options.quiet) {
         for (const Viewed& one : all)
@@ -170,8 +179,7 @@ void view(const ViewCommand& options) {
         if (!options.video.empty()) print_row("video", options.video);
     }
     for (const Viewed& one : all)
-        if (!one.failure.empty())
-            tell("lobatto: warning: {}: the motion on the page ends early: {}\n", one.title, one.failure);
+        if (!one.failure.empty()) tell("lobatto: warning: {}: {}\n", one.title, one.failure);
 }
 
 }  // namespace

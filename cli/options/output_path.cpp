@@ -43,6 +43,10 @@ std::string result_name(const std::string& scene) {
     return std::filesystem::path(scene).stem().string();
 }
 
+bool is_standard_output(const std::string& path) {
+    return path == standard_output || path == "/dev/stdout" || path == "/dev/fd/1" || path == "/proc/self/fd/1";
+}
+
 void keep_scene(const std::string& scene, const std::string& path) {
     std::error_code none;
     if (path == standard_output) return;
@@ -63,8 +67,11 @@ void keep_foreign(const std::string& path) {
     file.read(begin.data(), static_cast<std::streamsize>(looked_at));
     begin.resize(static_cast<std::size_t>(file.gcount()));
     std::transform(begin.begin(), begin.end(), begin.begin(), [](unsigned char c) { return std::tolower(c); });
-    if (!begin.empty() && begin.find("lobatto") == std::string::npos && !begin.starts_with("\x93numpy") &&
-        !begin.starts_with("\x89hdf"))
+    // Files that can name nobody are replaced by files of their kind.
+    const bool names_nobody = begin.starts_with("\x93numpy") || begin.starts_with("\x89hdf") ||
+                              begin.starts_with("\x89png") || begin.starts_with("gif8") || begin.find("ftyp") == 4;
+    if (!begin.empty() && begin.find("lobatto") == std::string::npos && begin.find("gnuplot") == std::string::npos &&
+        !names_nobody)
         throw InputError(fmt::format(
             "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));
 }

@@ -17,6 +17,9 @@ std::string output_folder(const std::string& given, const std::string& name);
 // How the scene's results are named by default: as its file, without the ending.
 std::string result_name(const std::string& scene);
 
+// "-", and what stands for the same.
+bool is_standard_output(const std::string& path);
+
 // InputError when `path`, where a result is to go, is the scene itself.
 void keep_scene(const std::string& scene, const std::string& path);
 

@@ -48,8 +48,9 @@ Curve thinned(const Curve& curve) {
         const std::size_t begin = piece * count / pieces, end = (piece + 1) * count / pieces;
         std::size_t low = begin, high = begin;
         for (std::size_t i = begin; outline && i < end; ++i) {
-            if (curve.y[i] < curve.y[low]) low = i;
-            if (curve.y[i] > curve.y[high]) high = i;
+            if (!std::isfinite(curve.y[i])) continue;
+            if (!std::isfinite(curve.y[low]) || curve.y[i] < curve.y[low]) low = i;
+            if (!std::isfinite(curve.y[high]) || curve.y[i] > curve.y[high]) high = i;
         }
         take(begin);
         if (low != begin) take(std::min(low, high));
@@ -97,10 +98,15 @@ bool are_lengths(const NumberTable::Column& x, const NumberTable::Column& y) {
            x.name.substr(1) == y.name.substr(1) && x.name != y.name;
 }
 
-void refuse_log(const NumberTable& table, const NumberTable::Column& column) {
-    if (std::none_of(column.values.begin(), column.values.end(), [](double value) { return value > 0; }))
-        throw InputError(fmt::format("{}: no value of {} is above 0, so that a logarithmic axis shows nothing",
-                                     table.path, column.name));
+// Something of a curve must be seen.
+void refuse_empty(const NumberTable& table, const NumberTable::Column& x, const NumberTable::Column& y,
+                  const PlotRequest& request) {
+    const auto is_seen = [](double value, bool log) { return std::isfinite(value) && (!log || value > 0); };
+    for (std::size_t i = 0; i < x.values.size(); ++i)
+        if (is_seen(x.values[i], request.log_x) && is_seen(y.values[i], request.log_y)) return;
+    throw InputError(fmt::format("{}: nothing of {} over {} can be drawn: there is no row with two numbers{}",
+                                 table.path, y.name, x.name,
+                                 request.log_x || request.log_y ? " above 0, where an axis is logarithmic" : ""));
 }
 
 }  // namespace
@@ -125,8 +131,7 @@ std::string plot_script(const std::vector<NumberTable>& tables, const std::vecto
             const NumberTable::Column& x = tables[k].column(request.x);
             for (const std::string& name : panel) {
                 const NumberTable::Column& y = tables[k].column(name);
-                if (request.log_x) refuse_log(tables[k], x);
-                if (request.log_y) refuse_log(tables[k], y);
+                refuse_empty(tables[k], x, y, request);
                 std::string title = panel.size() > 1 ? y.name : "";
                 if (tables.size() > 1)
                     title += (title.empty() ? "" : ", ") + std::filesystem::path(tables[k].path).stem().string();

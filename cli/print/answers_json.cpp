@@ -188,7 +188,8 @@ std::string json_of_drawn(const std::string& command, const std::string& page, c
         answer["drawn"].push_back({{"scene", one.scene},
                                    {"title", one.title},
                                    {"note", one.note},
-                                   {"file", one.file.empty() ? Answer(nullptr) : Answer(one.file)}});
+                                   {"file", one.file.empty() ? Answer(nullptr) : Answer(one.file)},
+                                   {"failure", one.failure.empty() ? Answer(nullptr) : Answer(one.failure)}});
     return text_of(answer);
 }
 

@@ -33,6 +33,7 @@ std::string json_of_emitted(const std::string& scene, const std::vector<std::str
 // A page of motions, or a folder of pictures: what each is of, and where it stands.
 struct Drawn {
     std::string scene, title, note, file;
+    std::string failure = "";  // why not to trust it
 };
 std::string json_of_drawn(const std::string& command, const std::string& page, const std::vector<Drawn>& drawn);
 

@@ -116,7 +116,11 @@ std::string drawn_in_characters(const std::string& script, int columns, int rows
 
 std::string gnuplot_text(const std::string& text) {
     std::string result = "'";
-    for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
+    for (const char c : text) {
+        const bool is_control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+        // A line's end would end the text, and the rest be a command.
+        result += c == '\'' ? "''" : std::string(1, is_control ? ' ' : c);
+    }
     return result + "'";
 }
 

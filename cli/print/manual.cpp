@@ -82,8 +82,9 @@ std::string for_bash(const std::vector<CommandHelp>& commands) {
         options += fmt::format("        {}) options=\"{}\" ;;\n", command.name, joined_names(command));
         for (const CommandHelp::Item& item : command.items)
             if (!item.words.empty())
-                words += fmt::format("        {}:{}) COMPREPLY=($(compgen -W \"{}\" -- \"$word\")); return ;;\n",
-                                     command.name, item.names.back(), fmt::join(item.words, " "));
+                words += fmt::format(
+                    "        {}:{}) mapfile -t COMPREPLY < <(IFS=,; compgen -W \"{}\" -- \"$word\"); return ;;\n",
+                    command.name, item.names.back(), fmt::join(item.words, ","));
     }
     return "# Completions of lobatto for bash.\n"
            "_lobatto() {\n"
@@ -105,7 +106,7 @@ std::string for_bash(const std::vector<CommandHelp>& commands) {
            "    if [[ $word == -* ]]; then\n"
            "        COMPREPLY=($(compgen -W \"$options\" -- \"$word\"))\n"
            "    else\n"
-           "        COMPREPLY=($(compgen -f -- \"$word\"))\n"
+           "        mapfile -t COMPREPLY < <(compgen -f -- \"$word\")\n"
            "    fi\n"
            "}\n"
            "complete -o filenames -F _lobatto lobatto ./lobatto\n";

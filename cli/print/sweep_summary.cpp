@@ -92,9 +92,10 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
     const SettingTally none, &all = tally.settings().empty() ? none : tally.settings().back();
     if (scene.outputs.energy && all.energy_error.index >= 0) {
         const bool conserves = study.first_setting().derivation->conserves_energy();
-        print_row(conserves ? "energy error" : "energy change",
-                  fmt::format("{:.2g} at most, of trajectory {}, {}", all.energy_error.value, all.energy_error.index,
-                              starts.text_of(all.energy_error.index)));
+        print_row(
+            conserves ? "energy error" : "energy change",
+            fmt::format("{:.2g} at most, of trajectory {}, {}{}", all.energy_error.value, all.energy_error.index,
+                        starts.text_of(all.energy_error.index), tally.was_resumed() ? "; of those computed now" : ""));
         const Spread spread = tally.energy_error().spread();
         print_row("  at the end", fmt::format("{:.2g} to {:.2g}, mean {:.2g}, rms {:.2g}", spread.least, spread.largest,
                                               spread.mean, spread.rms));

@@ -143,7 +143,6 @@ void require_hdf5(const std::string&) {}
 
 void write_hdf5(const std::string& path, const TableHead& head, std::int64_t rows,
                 const std::function<std::string(std::int64_t, std::size_t)>& records) {
-    be_quiet();
     const std::string new_path = path + ".new";
     char begin[4] = {};
     if (std::ifstream there(new_path, std::ios::binary); there.read(begin, 4) && std::string(begin, 4) != "\x89HDF")
@@ -151,6 +150,7 @@ void write_hdf5(const std::string& path, const TableHead& head, std::int64_t row
             fmt::format("cannot write the table to {}: {} is there, and Lobatto did not write it. Move it "
                         "away, or choose another place with -o",
                         path, new_path));
+    be_quiet();
     try {
         Hdf5Writer(path).write(new_path, head, rows, records);
     } catch (...) {

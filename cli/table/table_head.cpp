@@ -31,7 +31,7 @@ std::optional<Shard> shard_of(const std::string& text) {
     std::istringstream words(text);
     if (!(words >> shard.number >> slash >> shard.of >> of >> shard.trajectories >> trajectories >> compiled >>
           kernel >> shard.compiled) ||
-        slash != '/' || shard.of < 1 || shard.number < 1 || shard.number > shard.of)
+        slash != '/' || shard.of < 1 || shard.number < 1 || shard.number > shard.of || shard.of > 1'000'000)
         return std::nullopt;
     return shard;
 }
@@ -56,7 +56,7 @@ void read_units(const std::string& text, std::vector<TableColumn>& columns) {
     std::size_t at = 0;
     for (std::size_t c = 0; c < columns.size(); ++c) {
         const std::string next = c + 1 < columns.size() ? ", " + columns[c + 1].name : "";
-        at += columns[c].name.size();
+        at = std::min(at + columns[c].name.size(), text.size());
         if (text.compare(at, 2, " [") == 0) {
             const std::size_t end = next.empty() ? text.size() - 1 : std::min(text.find("]" + next, at), text.size());
             columns[c].unit = text.substr(at + 2, end - at - 2);

@@ -8,12 +8,13 @@
 #include <cstring>
 #include <iterator>
 
+#include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
 
 void TableReader::fail(const std::string& why) const {
-    throw MachineError(fmt::format("cannot read {}: {}", path_, why));
+    throw InputError(fmt::format("{}: cannot read it: {}", path_, why));
 }
 
 TableReader::TableReader(const std::string& path, TableFormat format, const std::string& json)
@@ -47,6 +48,7 @@ TableReader::TableReader(const std::string& path, TableFormat format, const std:
         if (!file_ || begin.compare(0, same, ours, 0, same) != 0)
             fail(fmt::format("it has other columns than {} says", json));
     }
+    if (head->columns.empty()) fail("it has no columns");
     head_ = *head;
     head_bytes_ = at_ = static_cast<std::int64_t>(length);
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "analysis/tape.hpp"
@@ -231,7 +232,11 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
     LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(scene, steps_of(scene, overrides).count, stepper);
     States states(1 + 2 * request.q.size(), most_frames);
-    request.sink = [&](const Records& records) { states.add(records); };
+    EnergyWatch energy(derivation, kernel);
+    request.sink = [&](const Records& records) {
+        states.add(records);
+        energy.observe(records);
+    };
     request.events = [&](const EventRecords& events) {
         for (std::int64_t i = 0; i < events.count && viewed.motion.events.size() < most_events; ++i) {
             const double* const row = events.rows + i * events.columns;
@@ -245,7 +250,10 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
     const TrajectoryResult result = integrate(kernel, request);
     viewed.is_interrupted = result.interrupted;
     states.finish();
-    if (result.status != LOBATTO_OK) viewed.failure = explain_stop(result, request);
+    if (result.status != LOBATTO_OK)
+        viewed.failure = "the motion on the page ends early: " + explain_stop(result, request);
+    else if (const std::string wrong = energy.departure(derivation, kernel, request); !wrong.empty())
+        viewed.failure = "the motion on the page is wrong: " + wrong;
 
     ViewMotion& motion = viewed.motion;
     motion.label = label;

@@ -6,12 +6,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
+#include "cli/options/command_line.hpp"
+#include "cli/print/interruption.hpp"
 #include "generator/formula/source.hpp"
 #include "runtime/build/process.hpp"
 #include "runtime/error.hpp"
@@ -57,7 +62,19 @@ ProcessResult run_into(const std::string& output, const std::string& folder, std
     request.arguments.insert(request.arguments.end(), command.begin(), command.end());
     request.folder = folder;
     request.seconds_limit = longest_work;
-    return run_process(request);
+    ProcessResult result = run_process(request);
+    if (*Interruption::flag() != 0) throw ExitCode{interrupted_exit};
+    return result;
+}
+
+// As a part of an address.
+std::string in_address(const std::string& path) {
+    std::string text;
+    for (const char c : path) {
+        const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || std::strchr("/._~-", c) != nullptr;
+        text += is_plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    }
+    return text;
 }
 
 // The page after its script has run.
@@ -75,7 +92,8 @@ std::string page_with_frames(const std::string& page, const Frames& frames, int 
                                          fmt::format("--window-size={},{}", width, height),
                                          "--dump-dom"};
         if (::geteuid() == 0) command.push_back("--no-sandbox");  // which the administrator cannot have
-        command.push_back(fmt::format("file://{}#frames={},{}", fs::absolute(page).string(), count, frames_a_second));
+        command.push_back(
+            fmt::format("file://{}#frames={},{}", in_address(fs::absolute(page).string()), count, frames_a_second));
         const ProcessResult result = run_into(dom, frames.path(), command);
         if (result.exit_code == not_found) continue;
         if (!result.succeeded())
@@ -131,6 +149,7 @@ void check_video_name(const std::string& path) {
 }
 
 void write_video(const std::string& page, const std::string& path, double seconds) {
+    const Interruption interruption;  // the frames go, whatever happens
     const Frames frames;
     const int count = std::max(1, static_cast<int>(seconds * frames_a_second));
     if (write_frames(page_with_frames(page, frames, count), frames) != count)

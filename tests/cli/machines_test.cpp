@@ -70,6 +70,12 @@ TEST_CASE("sweep --json tells of every setting, and why trajectories failed") {
                                   3);
     CHECK(failed["ending"] == "failed");
     CHECK(failed["failures"].size() >= 1);
+    // Where rows are read back it is JSON all the same.
+    answer_of("sweep", {"sweep", scene("pendulum"), "--vary", "q=0.5:1:3", "--until", "5", "--resume", "-o",
+                        folder / "again.csv"});
+    answer_of("sweep", {"sweep", scene("pendulum"), "--vary", "q=0.5:1:3", "--until", "5", "--resume", "-o",
+                        folder / "again.csv"});
+    CHECK(test::run({LOBATTO_PROGRAM, "run", scene("pendulum"), "--json", "-o", "-"}).exit_code == 2);
     CHECK(test::run({LOBATTO_PROGRAM, "sweep", scene("pendulum"), "--vary", "q=1,2", "--json", "-o", "-"}).exit_code ==
           2);
 }
@@ -117,6 +123,17 @@ TEST_SUITE("slow") {
         for (const auto& statement : paper["statements"]) CHECK(statement["resolved"] == true);
         for (const auto& table : paper["tables"]) CHECK(table["reproduced"] == true);
     }
+}
+
+TEST_CASE("view says that a motion on its page is wrong, as run does") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "fall.toml",
+                     "lagrangian = \"x'^2/2 + 1/x\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nstep = "
+                     "0.1\nuntil = 10\n");
+    const auto page = answer_of("view", {"view", folder / "fall.toml", "-o", folder / "fall.html"});
+    CHECK(page["drawn"][0]["failure"].is_string());
+    const auto good = answer_of("view", {"view", scene("pendulum"), "--until", "5", "-o", folder / "good.html"});
+    CHECK(good["drawn"][0]["failure"].is_null());
 }
 
 TEST_CASE("a schema that is broken says where") {

@@ -46,6 +46,8 @@ TEST_CASE("a new scene never replaces a file, and an unknown kind is told with t
     CHECK(unknown.err.find("Did you mean 'pendulum'?") != std::string::npos);
     CHECK(make(folder, "pendulum", "a\"b").exit_code == 2);
     CHECK(make(folder, "pendulum", "no/such/folder/x").exit_code == 4);
+    for (const char* name : {".toml", "-x", "_", "---"}) CHECK(make(folder, "pendulum", name).exit_code == 2);
+    CHECK(make(folder, "pendulum", "a b").out.find("'") != std::string::npos);
     CHECK(test::run({LOBATTO_PROGRAM, "new"}).exit_code == 2);
 }
 

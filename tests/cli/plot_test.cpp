@@ -4,8 +4,11 @@
 
 #include <doctest/doctest.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 
+#include "cli/print/drawing.hpp"
 #include "cli/table/hdf5_file.hpp"
 #include "generator/formula/source.hpp"
 #include "tests/support.hpp"
@@ -123,6 +126,27 @@ TEST_CASE("tables of HDF5 are read, where the program has its library") {
     CHECK(plot({folder / "torn.h5"}).exit_code == 2);
 }
 
+TEST_CASE("names of files and columns are no commands of gnuplot") {
+    const test::TemporaryFolder folder;
+    const std::string pwned = folder / "pwned", run = ran(folder, "kepler");
+    const std::string name = folder / "a\nsystem(\"touch pwned\")\n#.csv";
+    std::filesystem::copy_file(run, name);
+    CHECK(plot({name, run, "--y", "x", "-o", folder / "o.svg"}).exit_code == 0);
+    CHECK(gnuplot_text("a\nb'c") == "'a b''c'");
+    CHECK_FALSE(std::filesystem::exists(pwned));
+    CHECK_FALSE(std::filesystem::exists("pwned"));
+}
+
+TEST_CASE("of a long curve with gaps every number between them counts") {
+    NumberTable table{"x.csv", "", {{"t", "", {}}, {"y", "", {}}}};
+    for (int i = 0; i < 60000; ++i) {
+        table.columns[0].values.push_back(i);
+        table.columns[1].values.push_back(i % 200 == 199 ? static_cast<double>(i) : std::nan(""));
+    }
+    const std::string script = plot_script({table}, {}, {"t", {{"y"}}}, true);
+    for (int i = 199; i < 60000; i += 200) CHECK(script.find(fmt::format("\n{0},{0}\n", i)) != std::string::npos);
+}
+
 TEST_CASE("what cannot be drawn is told with its reason and the mend") {
     const test::TemporaryFolder folder;
     const std::string run = ran(folder, "pendulum");
@@ -146,6 +170,11 @@ TEST_CASE("what cannot be drawn is told with its reason and the mend") {
     CHECK(plot({folder / "empty.csv"}).exit_code == 2);
     test::write_text(folder / "negative.csv", "a,b\n1,-2\n2,-3\n");
     CHECK(plot({folder / "negative.csv", "--y", "b", "--log", "y"}).err.find("above 0") != std::string::npos);
+    test::write_text(folder / "nan.csv", "a,b\n1,nan\n2,inf\n");
+    CHECK(plot({folder / "nan.csv"}).exit_code == 2);
+    CHECK(plot({folder.string()}).err.find("it is a folder") != std::string::npos);
+    test::write_text(folder / "theirs.svg", "<svg>a drawing</svg>");
+    CHECK(plot({run, "-o", folder / "theirs.svg"}).err.find("Lobatto did not write it") != std::string::npos);
     test::write_text(folder / "torn.npy", "\x93NUMPY\x01");
     CHECK(plot({folder / "torn.npy"}).exit_code == 2);
     CHECK(plot({"--log", "z", run}).err.find("x,y,xy") != std::string::npos);
