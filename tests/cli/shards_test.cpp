@@ -259,6 +259,6 @@ TEST_CASE("an interrupted sweep goes on from its table, and says of all what a w
     std::string text = test::read_file(place.file("new.csv"));
     text[text.size() - 3] = 'x';
     test::write_text(place.file("new.csv"), text);
-    const std::string said = place.refusal("new.csv", {"--vary", "q=1,2", "--until", "1", "--resume"}, 4);
+    const std::string said = place.refusal("new.csv", {"--vary", "q=1,2", "--until", "1", "--resume"});
     CHECK(said.find("it is damaged: '") != std::string::npos);
 }
