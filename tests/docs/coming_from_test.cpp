@@ -88,7 +88,9 @@ TEST_CASE("each scene of docs/coming_from.md runs and ends where its reference s
         REQUIRE(done.exit_code == 0);
         CHECK(done.err.empty());  // no warning either
         const std::map<std::string, double> end = end_of(test::read_file(folder / "system.csv"));
-        for (const auto& [name, value] : one.reference) {
+        for (const auto& entry : one.reference) {
+            const std::string name = entry.first;
+            const double value = entry.second;
             INFO(name);
             REQUIRE(end.count(name) == 1);
             CHECK(std::fabs(end.at(name) - value) < one.bound);

@@ -100,8 +100,9 @@ TEST_CASE("what the schema refuses the reader refuses too") {
         {"point = [\"q\", 0]", "point = [\"q\", 0], line = [[0, 0], [1, 1]]"},
         {"point = [\"q\", 0]", "trail = true"},
     };
-    for (const auto& [line, other] : broken) {
-        CAPTURE(std::string(other));
+    for (const auto& one : broken) {
+        const std::string line = one.first, other = one.second;
+        CAPTURE(other);
         const Source source("x.toml", with(line, other));
         CHECK(complaint(source) != "");
         CHECK(test::message_of<InputError>([&] { read_scene(source); }) != "");
