@@ -17,8 +17,8 @@
 
 #include "analysis/tradeoff/search.hpp"
 #include "cli/print/drawing.hpp"
-#include "cli/print/tradeoff_pictures.hpp"
-#include "cli/print/tradeoff_report.hpp"
+#include "cli/tradeoff/pictures.hpp"
+#include "cli/tradeoff/report.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/run/partial_file.hpp"
 

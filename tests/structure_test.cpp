@@ -108,11 +108,12 @@ const std::vector<Room> rooms = {
     {"cli/table", {"analysis", "generator", "runtime"}},
     {"cli/ranks", {"analysis", "generator", "runtime"}},
     {"cli/paper", {"analysis", "generator", "runtime", "cli/print"}},
+    {"cli/tradeoff", {"analysis", "runtime", "cli/print"}},
     {"cli/view", {"analysis", "generator", "runtime", "cli/options", "cli/print"}},
     {"cli/plot", {"generator/formula", "runtime", "cli/print", "cli/table"}},
     {"cli/commands",
      {"analysis", "generator", "runtime", "cli/options", "cli/paper", "cli/plot", "cli/print", "cli/ranks", "cli/table",
-      "cli/view"}},
+      "cli/tradeoff", "cli/view"}},
     {"cli", {"cli/commands", "cli/print", "generator/formula", "runtime"}},
 };
 

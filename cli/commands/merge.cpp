@@ -122,6 +122,8 @@ private:
 std::size_t status_column(const TableHead& head) {
     const auto is_status = [](const TableColumn& column) { return column.whole && column.name.starts_with("status"); };
     const auto found = std::find_if(head.columns.begin(), head.columns.end(), is_status);
+    if (found == head.columns.end())
+        throw InputError("the parts have no column of statuses: they are no tables of sweeps");
     return static_cast<std::size_t>(found - head.columns.begin());
 }
 

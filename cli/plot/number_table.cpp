@@ -4,20 +4,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <charconv>
-#include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
+#include <optional>
+#include <stdexcept>
 
 #include "cli/table/hdf5_file.hpp"
 #include "generator/formula/source.hpp"
 #include "generator/formula/suggest.hpp"
 #include "runtime/error.hpp"
+#include "runtime/run/npy.hpp"
+#include "runtime/run/partial_file.hpp"
 
 namespace lobatto {
 
@@ -25,16 +24,6 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
     throw InputError(fmt::format("{}: {}", path, why));
-}
-
-std::string contents_of(const std::string& path) {
-    std::error_code none;
-    if (std::filesystem::is_directory(path, none)) refuse(path, "it is a folder");
-    std::ifstream file(path, std::ios::binary);
-    if (!file) refuse(path, fmt::format("cannot read it: {}", std::strerror(errno)));
-    std::string text(std::istreambuf_iterator<char>(file), {});
-    if (file.bad()) refuse(path, fmt::format("cannot read it: {}", std::strerror(errno)));
-    return text;
 }
 
 std::vector<std::string_view> cells_of(std::string_view line) {
@@ -109,87 +98,17 @@ NumberTable from_csv(const std::string& path, const std::string& text) {
     return table;
 }
 
-// What is left of the dictionary at the head of a .npy.
-struct Head {
-    std::string_view text;
-
-    // What stands behind 'key':.
-    std::string_view after(const std::string& key) const {
-        const std::size_t at = text.find("'" + key + "':");
-        return at == std::string_view::npos ? std::string_view() : text.substr(at + key.size() + 3);
-    }
-};
-
-// The texts in quotes up to the closing bracket.
-std::vector<std::string> quoted_in(std::string_view text) {
-    std::vector<std::string> all;
-    for (std::size_t i = 0; i < text.size() && text[i] != ']'; ++i)
-        if (text[i] == '\'' || text[i] == '"') {
-            const std::size_t end = text.find(text[i], i + 1);
-            if (end == std::string_view::npos) break;
-            all.emplace_back(text.substr(i + 1, end - i - 1));
-            i = end;
-        }
-    return all;
-}
-
-std::vector<std::size_t> shape_in(std::string_view text) {
-    std::vector<std::size_t> shape;
-    const std::size_t close = text.find(')');
-    for (std::size_t i = 0; i < close && i < text.size();) {
-        std::size_t value = 0;
-        const auto read = std::from_chars(text.data() + i, text.data() + close, value);
-        if (read.ec == std::errc()) shape.push_back(value);
-        i = read.ec == std::errc() ? static_cast<std::size_t>(read.ptr - text.data()) : i + 1;
-    }
-    return shape;
-}
-
-double number_at(const std::string& text, std::size_t at, bool whole) {
-    std::uint64_t bits = 0;
-    for (std::size_t byte = 0; byte < 8; ++byte)
-        bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(text[at + byte])) << (8 * byte);
-    return whole ? static_cast<double>(static_cast<std::int64_t>(bits)) : std::bit_cast<double>(bits);
-}
-
-// One-dimensional arrays of records of 8-byte numbers, and two-dimensional ones of them.
+// Columns without names are called 0, 1, ...
 NumberTable from_npy(const std::string& path, const std::string& text) {
-    const auto byte = [&](std::size_t at) { return static_cast<std::size_t>(static_cast<unsigned char>(text[at])); };
-    if (text.size() < 12) refuse(path, "the head of a .npy is missing");
-    const bool is_long = byte(6) > 1;
-    std::size_t length = byte(8) | byte(9) << 8;
-    if (is_long) length |= byte(10) << 16 | byte(11) << 24;
-    const std::size_t begin = (is_long ? 12U : 10U) + length;
-    if (begin > text.size()) refuse(path, "the head of a .npy is torn");
-    const Head head{std::string_view(text).substr(is_long ? 12 : 10, length)};
-    const std::string_view type = head.after("descr");
-    std::vector<std::size_t> shape = shape_in(head.after("shape"));
-    if (shape.size() == 2 && shape[1] > (text.size() - begin) / 8) refuse(path, "it is shorter than its head says");
     NumberTable table;
-    std::vector<bool> whole;
-    std::vector<std::string> words = quoted_in(type);
-    const bool records = type.find('[') < type.find('\'');
-    if (!records && shape.size() == 2 && !words.empty()) {  // columns are called 0, 1, ...
-        std::vector<std::string> named;
-        for (std::size_t k = 0; k < shape[1]; ++k) {
-            named.push_back(std::to_string(k));
-            named.push_back(words.front());
-        }
-        words = named;
-        shape.pop_back();
+    try {
+        NpyArray array = read_npy(text);
+        for (std::size_t k = 0; k < array.columns.size(); ++k)
+            table.columns.push_back(
+                {k < array.names.size() ? array.names[k] : std::to_string(k), "", std::move(array.columns[k])});
+    } catch (const std::invalid_argument& error) {
+        refuse(path, error.what());
     }
-    for (std::size_t i = 0; i + 1 < words.size(); i += 2) {
-        if (words[i + 1] != "<f8" && words[i + 1] != "<i8")
-            refuse(path, fmt::format("its numbers are of type {}; only <f8 and <i8 are read", words[i + 1]));
-        table.columns.push_back({words[i], "", {}});
-        whole.push_back(words[i + 1] == "<i8");
-    }
-    if (table.columns.empty() || shape.size() != 1 || head.after("fortran_order").find("True") < 8)
-        refuse(path, "it is no array of records, and no array of rows and columns");
-    const std::size_t width = 8 * table.columns.size(), rows = std::min(shape[0], (text.size() - begin) / width);
-    for (std::size_t i = 0; i < rows; ++i)
-        for (std::size_t k = 0; k < table.columns.size(); ++k)
-            table.columns[k].values.push_back(number_at(text, begin + i * width + 8 * k, whole[k]));
     return table;
 }
 
@@ -246,7 +165,9 @@ const NumberTable::Column& NumberTable::column(const std::string& name) const {
 }
 
 NumberTable read_number_table(const std::string& path) {
-    const std::string text = contents_of(path);
+    const std::optional<std::string> whole = read_whole(path);
+    if (!whole) refuse(path, fmt::format("cannot read it: {}", std::strerror(errno)));
+    const std::string& text = *whole;
     NumberTable table = text.starts_with("\x89HDF")     ? from_hdf5(path)
                         : text.starts_with("\x93NUMPY") ? from_npy(path, text)
                                                         : from_csv(path, text);

@@ -4,15 +4,12 @@
 
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "runtime/build/process.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
+#include "runtime/run/scratch_folder.hpp"
 
 namespace lobatto {
 
@@ -36,32 +33,11 @@ set key outside top center horizontal maxrows 1 reverse Left samplen 2 width -1
 
 constexpr int not_found = 127;  // exit code of env
 
-// A new folder for the files of one drawing, under a name that no text of others is part of; goes with its contents.
-class Workplace {
-public:
-    Workplace(const std::string& folder, const std::string& picture, const std::string& otherwise)
-        : path_(folder + "/.lobatto-drawing-XXXXXX") {
-        if (::mkdtemp(path_.data()) == nullptr) fail_to_write("the picture", picture, errno, otherwise);
-    }
-    ~Workplace() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    Workplace(const Workplace&) = delete;
-    Workplace& operator=(const Workplace&) = delete;
-
-    std::string operator/(const char* file) const { return path_ + "/" + file; }
-    std::string name() const { return std::filesystem::path(path_).filename(); }
-
-private:
-    std::string path_;
-};
-
 // What gnuplot makes of a script for one of its terminals. `path`: of the picture, for errors.
 std::string drawn(const std::string& folder, const std::string& path, const std::string& terminal,
                   const std::string& script, const std::string& without) {
     const std::string otherwise = without.empty() ? elsewhere : without;
-    const Workplace workplace(folder, path, otherwise);
+    const ScratchFolder workplace(folder + "/.lobatto-drawing-", "the picture", path, otherwise);
     write_whole(
         workplace / "script", "the picture's script",
         fmt::format("set terminal {}{}set output \"{}/picture\"\n{}", terminal, style, workplace.name(), script),
@@ -74,8 +50,7 @@ std::string drawn(const std::string& folder, const std::string& path, const std:
     if (result.exit_code == not_found)
         throw MachineError(fmt::format("cannot draw {}: gnuplot is missing. Install it (apt install gnuplot-nox){}",
                                        path, without.empty() ? "" : ", or " + without));
-    std::ifstream file(workplace / "picture", std::ios::binary);
-    std::string picture(std::istreambuf_iterator<char>(file), {});
+    const std::string picture = read_whole(workplace / "picture").value_or("");
     // On a full disk gnuplot leaves a part of it, and is content.
     const bool is_whole = terminal.starts_with("svg")   ? picture.ends_with("</svg>\n\n")
                           : terminal.starts_with("png") ? picture.find("IEND") != std::string::npos

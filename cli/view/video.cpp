@@ -7,13 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "cli/options/command_line.hpp"
 #include "cli/print/interruption.hpp"
@@ -21,6 +18,7 @@
 #include "runtime/build/process.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
+#include "runtime/run/scratch_folder.hpp"
 
 namespace lobatto {
 
@@ -30,30 +28,6 @@ namespace fs = std::filesystem;
 
 constexpr int frames_a_second = 30, width = 1280, height = 860, not_found = 127;
 constexpr double longest_work = 600;  // seconds
-
-// A folder for the frames; goes with them.
-class Frames {
-public:
-    Frames() : path_((fs::temp_directory_path() / "lobatto-video-XXXXXX").string()) {
-        if (::mkdtemp(path_.data()) == nullptr) fail_to_write("the frames", path_, errno);
-    }
-    ~Frames() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    Frames(const Frames&) = delete;
-    Frames& operator=(const Frames&) = delete;
-    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-    const std::string& path() const { return path_; }
-
-private:
-    std::string path_;
-};
-
-std::string contents_of(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // The exit code; what it says on standard output goes into a file, as a page with its frames is long.
 ProcessResult run_into(const std::string& output, const std::string& folder, std::vector<std::string> command) {
@@ -78,7 +52,7 @@ std::string in_address(const std::string& path) {
 }
 
 // The page after its script has run.
-std::string page_with_frames(const std::string& page, const Frames& frames, int count) {
+std::string page_with_frames(const std::string& page, const ScratchFolder& frames, int count) {
     const std::string dom = frames / "page.html";
     for (const char* browser : {"chromium", "google-chrome", "chromium-browser"}) {
         std::vector<std::string> command{browser,
@@ -99,7 +73,7 @@ std::string page_with_frames(const std::string& page, const Frames& frames, int 
         if (!result.succeeded())
             throw MachineError(
                 fmt::format("{} could not draw the frames of the video: {}", browser, result.output.substr(0, 400)));
-        return contents_of(dom);
+        return read_whole(dom).value_or("");
     }
     throw MachineError("--video: frames are drawn by a browser, and there is none. Install it (apt install chromium)");
 }
@@ -125,7 +99,7 @@ std::string from_base64(std::string_view text) {
 }
 
 // One file each: 00000.jpg, 00001.jpg, ... How many.
-int write_frames(const std::string& page, const Frames& frames) {
+int write_frames(const std::string& page, const ScratchFolder& frames) {
     const std::string mark = "<pre id=\"frames\">";
     const std::size_t begin = page.find(mark);
     if (begin == std::string::npos) return 0;
@@ -150,7 +124,7 @@ void check_video_name(const std::string& path) {
 
 void write_video(const std::string& page, const std::string& path, double seconds) {
     const Interruption interruption;  // the frames go, whatever happens
-    const Frames frames;
+    const ScratchFolder frames((fs::temp_directory_path() / "lobatto-video-").string(), "the frames of", path);
     const int count = std::max(1, static_cast<int>(seconds * frames_a_second));
     if (write_frames(page_with_frames(page, frames, count), frames) != count)
         throw MachineError("--video: the browser did not draw all frames. Is there enough memory and room in /tmp?");
@@ -169,7 +143,7 @@ void write_video(const std::string& page, const std::string& path, double second
     if (result.exit_code == not_found)
         throw MachineError("--video: ffmpeg is missing. Install it (apt install ffmpeg)");
     if (!result.succeeded()) throw MachineError(fmt::format("ffmpeg could not write {}: {}", path, result.output));
-    write_whole(path, "the video", contents_of(video), "choose another name");
+    write_whole(path, "the video", read_whole(video).value_or(""), "choose another name");
 }
 
 }  // namespace lobatto

@@ -16,6 +16,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -55,6 +58,18 @@ bool is_foreign(int descriptor) {
 }
 
 }  // namespace
+
+std::optional<std::string> read_whole(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) return std::nullopt;
+    std::error_code none;
+    if (std::filesystem::is_directory(path, none)) {
+        errno = EISDIR;
+        return std::nullopt;
+    }
+    std::string content(std::istreambuf_iterator<char>(file), {});
+    return file.bad() ? std::nullopt : std::optional(std::move(content));
+}
 
 void fail_to_write(const std::string& what, const std::string& path, int error, const std::string& otherwise) {
     std::string only = otherwise;

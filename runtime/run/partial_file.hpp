@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,6 +19,9 @@ inline const char* const elsewhere = "choose another place with -o";
 // A whole file at once: on the disk under its name, or not at all and nothing beside it. Throws as PartialFile.
 void write_whole(const std::string& path, const std::string& what, std::string_view content,
                  const std::string& otherwise = elsewhere);
+
+// All of a file; nothing where it cannot be read, and errno says why.
+std::optional<std::string> read_whole(const std::string& path);
 
 // Until `finish` what is written stands in NAME.partial beside it, so that a killed run leaves a readable NAME.partial
 // and an earlier NAME untouched. Two runs cannot write the same file at once. A destination that exists and is no

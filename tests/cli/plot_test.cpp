@@ -172,7 +172,7 @@ TEST_CASE("what cannot be drawn is told with its reason and the mend") {
     CHECK(plot({folder / "negative.csv", "--y", "b", "--log", "y"}).err.find("above 0") != std::string::npos);
     test::write_text(folder / "nan.csv", "a,b\n1,nan\n2,inf\n");
     CHECK(plot({folder / "nan.csv"}).exit_code == 2);
-    CHECK(plot({folder.string()}).err.find("it is a folder") != std::string::npos);
+    CHECK(plot({folder.string()}).err.find("Is a directory") != std::string::npos);
     test::write_text(folder / "theirs.svg", "<svg>a drawing</svg>");
     CHECK(plot({run, "-o", folder / "theirs.svg"}).err.find("Lobatto did not write it") != std::string::npos);
     test::write_text(folder / "torn.npy", "\x93NUMPY\x01");

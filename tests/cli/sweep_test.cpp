@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "runtime/run/output.hpp"
+#include "tests/cli/tables.hpp"
 #include "tests/support.hpp"
 
 using namespace lobatto;
@@ -52,15 +53,6 @@ using Strings = std::vector<std::string>;
 
 bool contains(const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
-}
-
-std::vector<double> column(const TrajectoryTable& table, const std::string& name) {
-    const auto found = std::find(table.columns.begin(), table.columns.end(), name);
-    REQUIRE(found != table.columns.end());
-    std::vector<double> values;
-    for (const std::vector<double>& row : table.rows)
-        values.push_back(row[static_cast<std::size_t>(found - table.columns.begin())]);
-    return values;
 }
 
 // A .npy of one-dimensional records, read by the rules of its format.
@@ -130,16 +122,16 @@ TEST_CASE("what is kept of a trajectory is one row of numbers") {
     CHECK(table.columns[5] == "first(q = 0)");
     for (std::size_t i = 0; i < 3; ++i) {
         const double A = 1 + static_cast<double>(i);
-        CHECK(std::fabs(column(table, "first(q = 0)")[i] - std::numbers::pi / 4) < 1e-13);
-        CHECK(std::isnan(column(table, "first(q = 5)")[i]));
-        CHECK(column(table, "count(q' = 0 rising)")[i] == 2);
-        CHECK(std::fabs(column(table, "max(q)")[i] - A) < 1e-12);
-        CHECK(std::fabs(column(table, "min(q + 1)")[i] - (1 - A)) < 1e-12);
-        CHECK(std::fabs(column(table, "mean(q^2)")[i] - A * A / 2) < 1e-12);
-        CHECK(std::fabs(column(table, "last(p_q)")[i]) < 1e-11);
-        CHECK(std::fabs(column(table, "max(H)")[i] - 2 * A * A) < 1e-11);
-        CHECK(std::fabs(column(table, "mean(p_q*q')")[i] - 2 * A * A) < 1e-11);
-        CHECK(column(table, "t")[i] == 2 * std::numbers::pi);
+        CHECK(std::fabs(test::column_of(table, "first(q = 0)")[i] - std::numbers::pi / 4) < 1e-13);
+        CHECK(std::isnan(test::column_of(table, "first(q = 5)")[i]));
+        CHECK(test::column_of(table, "count(q' = 0 rising)")[i] == 2);
+        CHECK(std::fabs(test::column_of(table, "max(q)")[i] - A) < 1e-12);
+        CHECK(std::fabs(test::column_of(table, "min(q + 1)")[i] - (1 - A)) < 1e-12);
+        CHECK(std::fabs(test::column_of(table, "mean(q^2)")[i] - A * A / 2) < 1e-12);
+        CHECK(std::fabs(test::column_of(table, "last(p_q)")[i]) < 1e-11);
+        CHECK(std::fabs(test::column_of(table, "max(H)")[i] - 2 * A * A) < 1e-11);
+        CHECK(std::fabs(test::column_of(table, "mean(p_q*q')")[i] - 2 * A * A) < 1e-11);
+        CHECK(test::column_of(table, "t")[i] == 2 * std::numbers::pi);
     }
     const auto refusal = [&](const std::string& keep) {
         const test::Finished done = place.sweep({scene, "--vary", "q=1,2", "--keep", keep});
@@ -160,18 +152,18 @@ TEST_CASE("a trajectory that meets a stop ends there, alone, and the others go o
                      "points = 8\n[run]\nstep = 0.1\nuntil = 5\nstop = [\"q = pi\", \"q = -pi\"]\n");
     const TrajectoryTable table =
         place.table({scene, "--vary", "q'=1,-2.5,3", "--keep", "first(q = 1)", "--threads", "2"});
-    CHECK(column(table, "stop") == std::vector<double>{0, 2, 1});
-    CHECK(column(table, "status") == std::vector<double>{0, 0, 0});
+    CHECK(test::column_of(table, "stop") == std::vector<double>{0, 2, 1});
+    CHECK(test::column_of(table, "status") == std::vector<double>{0, 0, 0});
     // A turn takes 2 K(k) k with k = 2/q'(0).
-    CHECK(column(table, "t")[0] == 5);
-    CHECK(std::fabs(column(table, "t")[1] - 0.8 * std::comp_ellint_1(0.8)) < 1e-12);
-    CHECK(std::fabs(column(table, "t")[2] - 2.0 / 3 * std::comp_ellint_1(2.0 / 3)) < 1e-12);
-    for (const double error : column(table, "error")) CHECK(error < 1e-9);
+    CHECK(test::column_of(table, "t")[0] == 5);
+    CHECK(std::fabs(test::column_of(table, "t")[1] - 0.8 * std::comp_ellint_1(0.8)) < 1e-12);
+    CHECK(std::fabs(test::column_of(table, "t")[2] - 2.0 / 3 * std::comp_ellint_1(2.0 / 3)) < 1e-12);
+    for (const double error : test::column_of(table, "error")) CHECK(error < 1e-9);
     // The states at the ends, without --keep.
     const TrajectoryTable states = place.table({scene, "--vary", "q'=1,-2.5,3"});
-    CHECK(std::fabs(column(states, "q")[1] + std::numbers::pi) < 1e-13);
-    CHECK(std::fabs(column(states, "p_q")[2] - std::sqrt(5.0)) < 1e-12);
-    CHECK(column(states, "stop") == std::vector<double>{0, 2, 1});
+    CHECK(std::fabs(test::column_of(states, "q")[1] + std::numbers::pi) < 1e-13);
+    CHECK(std::fabs(test::column_of(states, "p_q")[2] - std::sqrt(5.0)) < 1e-12);
+    CHECK(test::column_of(states, "stop") == std::vector<double>{0, 2, 1});
 }
 
 TEST_CASE("a sweep says what it did and where its table is") {
@@ -218,12 +210,13 @@ TEST_CASE("the grid has all combinations, the last name fastest, both ends exact
                    "1:100:3:log\n# status: 0 reached the end, 1 not converged, "));
     CHECK(contains(test::read_file(place.file()), "\n# columns: index, q'(0), omega [rad/s], q(0) [rad], status, "));
     // Values are exact before they are rounded: 0.1 + 0.2 is no double sum.
-    CHECK(column(place.table({pendulum, "--vary", "q=0:0.5:6", "--steps", "0"}), "q(0)") ==
+    CHECK(test::column_of(place.table({pendulum, "--vary", "q=0:0.5:6", "--steps", "0"}), "q(0)") ==
           std::vector<double>{0, 0.1, 0.2, 0.3, 0.4, 0.5});
-    CHECK(column(place.table({pendulum, "--vary", "q=-2:-8:3:log", "--steps", "0"}), "q(0)") ==
+    CHECK(test::column_of(place.table({pendulum, "--vary", "q=-2:-8:3:log", "--steps", "0"}), "q(0)") ==
           std::vector<double>{-2, -4, -8});
-    CHECK(column(place.table({pendulum, "--vary", "q=2:2:1", "--steps", "0"}), "q(0)") == std::vector<double>{2});
-    CHECK(column(place.table({pendulum, "--vary", "q=mod(7, 4),1", "--steps", "0"}), "q(0)") ==
+    CHECK(test::column_of(place.table({pendulum, "--vary", "q=2:2:1", "--steps", "0"}), "q(0)") ==
+          std::vector<double>{2});
+    CHECK(test::column_of(place.table({pendulum, "--vary", "q=mod(7, 4),1", "--steps", "0"}), "q(0)") ==
           std::vector<double>{3, 1});
 }
 
@@ -239,7 +232,7 @@ TEST_CASE("each trajectory of a sweep is that of a run, with momenta of its own 
     CHECK(done.err == "");
     const TrajectoryTable table = read_trajectory(place.file());
     REQUIRE(table.rows.size() == 9 * 4);
-    const std::vector<double> m = column(table, "m");
+    const std::vector<double> m = test::column_of(table, "m");
     for (std::size_t i = 0; i < 9; ++i) {
         const std::string path = place.file("run.csv");
         REQUIRE(
@@ -393,8 +386,8 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     const test::Finished done = place.sweep({scene, "--vary", "x=-9:1:11", "--every", "4"});
     CHECK(done.exit_code == 3);
     const TrajectoryTable table = read_trajectory(place.file());
-    const std::vector<double> index = column(table, "index"), status = column(table, "status"), t = column(table, "t"),
-                              steps = column(table, "steps");
+    const std::vector<double> index = test::column_of(table, "index"), status = test::column_of(table, "status"),
+                              t = test::column_of(table, "t"), steps = test::column_of(table, "steps");
     std::map<double, double> end;
     std::int64_t failed = 0;
     for (std::size_t i = 0; i < index.size(); ++i) {
@@ -428,8 +421,8 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
               place.file() + ".\n");
     const TrajectoryTable starts = read_trajectory(place.file());
     REQUIRE(starts.rows.size() == 3);
-    CHECK(column(starts, "status") == std::vector<double>{0, 4, 2});
-    CHECK(std::isnan(column(starts, "x")[2]));
+    CHECK(test::column_of(starts, "status") == std::vector<double>{0, 4, 2});
+    CHECK(std::isnan(test::column_of(starts, "x")[2]));
 }
 
 TEST_CASE("trajectories that leave their Lagrangian are told from those that stay, also where no energy is asked for") {
@@ -449,7 +442,7 @@ TEST_CASE("trajectories that leave their Lagrangian are told from those that sta
             contains(done.err, ": 1 of 3 trajectories failed: 1 energy off: beyond stability, or past a singularity."));
         CHECK(contains(done.err, "\n  trajectory 1, y' = 0: energy off: beyond stability, or past a singularity\n"));
         const TrajectoryTable table = read_trajectory(place.file());
-        CHECK(column(table, "status") == std::vector<double>{0, 7, 0});
+        CHECK(test::column_of(table, "status") == std::vector<double>{0, 7, 0});
     }
     // At rest, and nearly so: no kinetic energy, and nothing wrong.
     test::write_text(scene,
@@ -589,8 +582,9 @@ TEST_CASE("a sweep measures the error of every trajectory; what is not resolved 
     CHECK(contains(done.err, "3 of 6 trajectories failed: 3 not resolved: the error is as large as the motion"));
     CHECK(contains(done.out, "measured error"));
     const TrajectoryTable table = read_trajectory(place.file());
-    CHECK(column(table, "status") == std::vector<double>{0, 0, 0, 8, 8, 8});
-    const std::vector<double> w = column(table, "w"), q = column(table, "q"), error = column(table, "error");
+    CHECK(test::column_of(table, "status") == std::vector<double>{0, 0, 0, 8, 8, 8});
+    const std::vector<double> w = test::column_of(table, "w"), q = test::column_of(table, "q"),
+                              error = test::column_of(table, "error");
     for (const std::size_t i : {1, 2}) {
         const double truth = std::fabs(q[i] - std::cos(10 * w[i]));
         CHECK(error[i] > truth / 2);
@@ -613,7 +607,7 @@ TEST_CASE("a sweep looks at motions on their way, and at pulses between its step
                      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
                      "[method]\nfamily = \"gauss\"\nstages = 4\n[run]\nstep = 0.1\nuntil = 1000\n");
     CHECK(place.sweep({pendulum, "--vary", "q=1,3.1415926,3.5"}).exit_code == 3);
-    CHECK(column(read_trajectory(place.file()), "status") == std::vector<double>{0, 8, 0});
+    CHECK(test::column_of(read_trajectory(place.file()), "status") == std::vector<double>{0, 8, 0});
     // A kick of 0.1 sqrt(pi) that falls between all nodes; none when it comes after the end.
     const std::string pulse = place.file("pulse.toml");
     test::write_text(pulse,
@@ -621,7 +615,7 @@ TEST_CASE("a sweep looks at motions on their way, and at pulses between its step
                      "q = { position = 1, velocity = 0 }\n[parameters]\nc = 5\n[run]\nstep = 0.1\nuntil = 10\n");
     place.sweep({pulse, "--vary", "c=5.015,5.05,20"});
     const TrajectoryTable table = read_trajectory(place.file());
-    const std::vector<double> q = column(table, "q"), error = column(table, "error");
+    const std::vector<double> q = test::column_of(table, "q"), error = test::column_of(table, "error");
     for (const std::size_t i : {0, 1}) {
         CHECK(std::fabs(q[i] - std::cos(10)) < 1e-6);  // not seen
         CHECK(error[i] > 0.1);
@@ -630,7 +624,7 @@ TEST_CASE("a sweep looks at motions on their way, and at pulses between its step
     CHECK(error[2] < 1e-10);
     // What is looked at does not change what is written.
     REQUIRE(place.sweep({pendulum, "--vary", "q=1,2", "--every", "3000"}).exit_code == 0);
-    CHECK(column(read_trajectory(place.file()), "steps") ==
+    CHECK(test::column_of(read_trajectory(place.file()), "steps") ==
           std::vector<double>{0, 3000, 6000, 9000, 10000, 0, 3000, 6000, 9000, 10000});
 }
 
@@ -643,7 +637,7 @@ TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by st
                      "[coordinates]\nq = { position = 1, velocity = 0 }\n[parameters]\nc = 0.1\n"
                      "[run]\nstep = 0.1\nuntil = 20\n");
     place.sweep({well, "--vary", "q=1,0.05"});
-    const std::vector<double> error = column(read_trajectory(place.file()), "error");
+    const std::vector<double> error = test::column_of(read_trajectory(place.file()), "error");
     CHECK(!(error[0] < 0.05));
     CHECK(error[1] < 1e-7);
     // 40 steps are one period. Before, the error of q = 0.001 was 0.1, relative to how far rounding moves the states.
@@ -653,7 +647,7 @@ TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by st
                      "[run]\nstep = \"2*pi/40\"\nuntil = \"200*pi\"\n");
     for (const char* every : {"1000", "400", "40"}) {
         const TrajectoryTable table = place.table({still, "--vary", "q=0.001,0.01", "--every", every});
-        const std::vector<double> errors = column(table, "error"), status = column(table, "status");
+        const std::vector<double> errors = test::column_of(table, "error"), status = test::column_of(table, "status");
         for (std::size_t i = 0; i < errors.size(); ++i)
             if (!std::isnan(errors[i])) CHECK(errors[i] < 1e-9);
         CHECK(*std::max_element(status.begin(), status.end()) == 0);
@@ -670,7 +664,7 @@ TEST_CASE("a trajectory whose formulas have no value, though they cancel, is no 
         INFO(done.err);
         CHECK(done.exit_code == 3);
         CHECK(contains(done.err, "a formula has no value there"));
-        return column(read_trajectory(place.file()), "status");
+        return test::column_of(read_trajectory(place.file()), "status");
     };
     const std::string plain = "m*q'^2/2 - k*q^2/2";
     for (const char* position : {"\"sqrt(m - 2)^2\"", "\"(m - k)/(m - k)\"", "\"0*log(m - k) + 1\"",

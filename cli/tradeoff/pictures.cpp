@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "cli/print/tradeoff_pictures.hpp"
+#include "cli/tradeoff/pictures.hpp"
 
 #include <fmt/format.h>
 

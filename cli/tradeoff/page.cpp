@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "cli/print/tradeoff_page.hpp"
+#include "cli/tradeoff/page.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string_view>
 
-#include "cli/print/tradeoff_report.hpp"
+#include "cli/tradeoff/report.hpp"
 #include "runtime/build/compiler.hpp"
+#include "runtime/run/partial_file.hpp"
 
 namespace lobatto {
 
@@ -48,11 +47,6 @@ std::string data_address(const std::string& svg) {
         address += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
     }
     return address;
-}
-
-std::string file_text(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
 }
 
 // The first "model name" of the processor.
@@ -104,7 +98,7 @@ std::string report_page(const Experiment& experiment, const std::string& folder,
     std::string figures, findings;
     for (const std::string& name : pictures)
         figures += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption>{}</figcaption></figure>\n", name,
-                               data_address(file_text(folder + "/" + name + ".svg")), captions.at(name));
+                               data_address(read_whole(folder + "/" + name + ".svg").value_or("")), captions.at(name));
     for (const Finding& finding : experiment.derivation().findings)
         findings +=
             fmt::format("<tr><td class=\"text\">{}</td><td class=\"text\">{}</td><td class=\"text\">{}</td></tr>\n",
