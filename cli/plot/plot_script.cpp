@@ -177,7 +177,8 @@ std::string plot_script(const std::vector<NumberTable>& tables, const std::vecto
     body.insert(second, "unset title\n");
     return data + head +
            fmt::format(
-               "set key at graph 1,1.02 right bottom horizontal maxrows 1\nset multiplot layout {},1 margins 0.15,0.97,{},{} "
+               "set key at graph 1,1.02 right bottom horizontal maxrows 1\nset multiplot layout {},1 margins "
+               "0.15,0.97,{},{} "
                "spacing 0,{}\n",
                request.y.size(), 0.28 / static_cast<double>(request.y.size()),
                1 - 0.2 / static_cast<double>(request.y.size()), 0.12 / static_cast<double>(request.y.size())) +
