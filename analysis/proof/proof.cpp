@@ -149,7 +149,8 @@ ProofRow reversal(const std::string& precision, const Return& result, double con
 
 // What the compiled steps leave in the equations that they were derived from, whatever iteration found them.
 void taken_steps(std::vector<ProofRow>& rows, const Derivation& derivation, const Kernel& kernel,
-                 const Kernel& exact_kernel, const Start<double>& start, const Start<__float128>& exact) {
+                 const Kernel& exact_kernel, const Start<double>& start, const Start<__float128>& exact,
+                 const std::function<void(const std::string&, double)>& say) {
     constexpr double bound = 64;  // roundings
     const std::string claim = "steps solve the discrete Euler-Lagrange equations: ",
                       meaning =
@@ -163,7 +164,9 @@ void taken_steps(std::vector<ProofRow>& rows, const Derivation& derivation, cons
         [&] { return trajectory_leaves(derivation, kernel, start.parameters, start.q, start.p, start.step); });
     add(claim, "one trajectory, quadruple", bound, meaning,
         [&] { return trajectory_leaves(derivation, exact_kernel, exact.parameters, exact.q, exact.p, exact.step); });
+    say("compiling an ensemble", 0.5);
     const Kernel ensemble = ensemble_kernel_of(emit(derivation), Precision::double_, 64);
+    say("checking steps of an ensemble", 0.7);
     if (ensemble->lanes == 0)
         rows.push_back({claim + "ensembles", "no lanes", "as one trajectory", true, ""});
     else
@@ -287,8 +290,9 @@ void symplecticity_on_constraints(std::vector<ProofRow>& rows, const Kernel& exa
 
 }  // namespace
 
-Proof prove(const Scene& written, const MethodChoice& method, const std::function<void(const std::string&)>& say) {
-    say("deriving and compiling");
+Proof prove(const Scene& written, const MethodChoice& method,
+            const std::function<void(const std::string&, double)>& say) {
+    say("deriving and compiling", 0);
     Scene scene = in_clock_time(written);  // a clock is another Lagrangian, whose steps are equal
     scene.clock.reset();
     method.apply(scene);
@@ -308,11 +312,12 @@ Proof prove(const Scene& written, const MethodChoice& method, const std::functio
     EmitOptions emit_options;
     const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
     emit_options.precision = Precision::quadruple;
+    say("compiling in quadruple precision", 0.2);
     const Kernel exact_kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
 
     Proof proof{scene.title, scene.method.name(), {}, {}};
     std::vector<ProofRow>& rows = proof.rows;
-    say("checking quadrature, equations and programs");
+    say("checking quadrature, equations and programs", 0.4);
     for (const auto& checks : {check_quadrature(derivation.quadrature), check_equations(derivation),
                                check_programs(with_walls, optimised_programs(with_walls).programs)})
         for (const Check& check : checks) rows.push_back(row_of(check));
@@ -324,8 +329,9 @@ Proof prove(const Scene& written, const MethodChoice& method, const std::functio
     if (written.clock)
         rows.push_back({"steps, from here on", "of the clock " + written.clock->text, "equal in its time", true, ""});
     if (scene.is_cut()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
-    say("checking steps");
-    taken_steps(rows, derivation, kernel, exact_kernel, start, exact);
+    say("checking steps", 0.45);
+    taken_steps(rows, derivation, kernel, exact_kernel, start, exact, say);
+    say("checking symplecticity and reversal", 0.85);
     const auto states = states_along(kernel, start);
     const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
                                     [](const GiNaC::ex& force) { return !force.is_zero(); });
@@ -338,12 +344,12 @@ Proof prove(const Scene& written, const MethodChoice& method, const std::functio
     const double of_decimals =
         scene.method.family == Family::splitting ? 100 * std::pow(10.0, -splitting_of(scene.method.points).digits) : 0;
     Convergence& convergence = proof.convergence;
-    say("measuring the order of convergence");
+    say("measuring the order of convergence", 0.93);
     rows.push_back(decided("order of convergence", [&] {
         convergence = measure_order(exact_kernel, quadruple_start, start.step, of_decimals);
         return order(convergence, exact_kernel, quadruple_start);
     }));
-    say("checking momenta and energy over long runs");
+    say("checking momenta and energy over long runs", 0.97);
     momenta(rows, kernel, start, scene);
     const std::string energy_claim = "H in double against quadruple";
     const double defect = energy_defect(kernel, exact_kernel, start.parameters, start.step, states);

@@ -25,9 +25,9 @@ struct Proof {
 };
 
 // InputError, ComputationError where not even a first step can be taken.
-// `say` hears what is being checked.
+// `say` hears what is being checked, and about which part of all work is behind.
 Proof prove(
     const Scene& written, const MethodChoice& method,
-    const std::function<void(const std::string&)>& say = [](const std::string&) {});
+    const std::function<void(const std::string&, double)>& say = [](const std::string&, double) {});
 
 }  // namespace lobatto

@@ -41,7 +41,8 @@ void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
 
 void verify(const VerifyOptions& options) {
     Say say;
-    const Proof proof = prove(read_scene(options.scene), options.method, [&](const std::string& what) { say(what); });
+    const Proof proof = prove(read_scene(options.scene), options.method,
+                              [&](const std::string& what, double done) { say(what, done); });
     say.clear();
     if (options.json) {
         fmt::print("{}", json_of_proof(options.scene, proof));

@@ -193,7 +193,8 @@ const char* const logarithmic = "set logscale xy\nset format y \"10^{%L}\"\n";
 
 }  // namespace
 
-std::vector<Figure> draw_figures(const std::string& folder) {
+std::vector<Figure> draw_figures(const std::string& folder,
+                                 const std::function<void(const std::string&, double)>& say) {
     std::vector<Figure> figures;
     figures.push_back({"figure1",
                        "Figure 1: harmonic oscillator, N = 3 meshes",
@@ -206,6 +207,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
     draw_figure(folder, "figure1",
                 motion_script("figure1", "time t (one period T = 1)", "1.02", "-2.1:2.1", "-2.1:2.1"), 640);
 
+    say("figure 2: the oscillator over 1e5 periods", 0.05);
     Evolution oscillator = evolution(PaperSystem::oscillator, 1e5, 1, {2.50e-11, 5.45e-14, 1.35e-13});
     figures.push_back(
         {"figure2", "Figure 2: harmonic oscillator, energy error over 1e5 periods",
@@ -246,6 +248,7 @@ std::vector<Figure> draw_figures(const std::string& folder) {
                               "-1.9:1.9"),
                 640);
 
+    say("figure 4: the pendulum over 5000 periods", 0.5);
     Evolution pendulum =
         evolution(PaperSystem::pendulum, 5e3, 4 * std::numbers::pi_v<long double> * std::numbers::pi_v<long double>,
                   {7.99e-13, 5.39e-11, 5.33e-15});

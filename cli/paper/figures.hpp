@@ -2,6 +2,7 @@
 // The paper's figures 1 to 4: data as CSV, drawings as SVG by gnuplot.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,7 @@ struct Figure {
 };
 
 // Runs the experiments, writes NAME.csv and NAME.svg into `folder`. MachineError when gnuplot is missing or fails.
-std::vector<Figure> draw_figures(const std::string& folder);
+// `say` hears which one, and which part of the work is behind.
+std::vector<Figure> draw_figures(const std::string& folder, const std::function<void(const std::string&, double)>& say);
 
 }  // namespace lobatto

@@ -173,7 +173,8 @@ std::string plot_script(const std::vector<NumberTable>& tables, const std::vecto
     if (request.y.size() == 1) return data + head + panels;
     std::string body = panels;
     // One title above all panels.
-    const std::size_t second = body.find("plot ") == std::string::npos ? 0 : body.find("\n", body.find("plot ")) + 1;
+    const std::size_t begin = body.find("plot ");
+    const std::size_t second = begin == std::string::npos ? 0 : body.find('\n', begin) + 1;
     body.insert(second, "unset title\n");
     return data + head +
            fmt::format(

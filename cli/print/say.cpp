@@ -12,11 +12,16 @@ namespace lobatto {
 Say::Say(double seconds)
     : on_terminal_(isatty(STDERR_FILENO) == 1), seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
 
-void Say::operator()(const std::string& what) {
+void Say::operator()(const std::string& what, double done) {
     if (!on_terminal_) return;
     shown_ = true;
-    const double left = seconds_ - std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    tell("\r\033[K{} ...{}", what, seconds_ > 0 && left > 1 ? fmt::format(" ({:.0f} s left at most)", left) : "");
+    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    std::string left;
+    if (done > 0 && elapsed * (1 - done) > done)
+        left = fmt::format(" (about {:.0f} s left)", elapsed * (1 - done) / done);
+    else if (seconds_ - elapsed > 1)
+        left = fmt::format(" ({:.0f} s left at most)", seconds_ - elapsed);
+    tell("\r\033[K{} ...{}", what, left);
     std::fflush(stderr);
 }
 

@@ -15,7 +15,8 @@ public:
     Say(const Say&) = delete;
     Say& operator=(const Say&) = delete;
 
-    void operator()(const std::string& what);
+    // `done`: the part of all work that is behind, 0 where it is not known; tells about how long the rest takes.
+    void operator()(const std::string& what, double done = 0);
     void clear();
 
 private:

@@ -328,7 +328,6 @@ private:
         const std::vector<Element>& elements = derivation_.structure.elements.repeated;
         for (int number = 0; number < static_cast<int>(elements.size()); ++number) {
             const Element& element = elements[static_cast<std::size_t>(number)];
-            const std::string name = element_text(number);
             const auto pairs = pairs_of(element);
             for (std::size_t row = 0; row < element.rows.size(); ++row) {
                 const auto variable = [&](std::size_t j) { return element.rows[row][j]; };
@@ -344,8 +343,7 @@ private:
                             add(element_target(slope, static_cast<std::size_t>(variable(j))),
                                 output.effect == Effect::subtract ? -value : value);
                         for (std::size_t column = 0; column < pairs.size() && j == 0; ++column)
-                            if (output.target == second + "[" + name + "_entry[r * " + std::to_string(pairs.size()) +
-                                                     " + " + std::to_string(column) + "]]")
+                            if (output.target == second + "[" + entry_of_row(derivation_, number, pairs, column) + "]")
                                 add(element_target(second, entry.at({variable(pairs[column].first),
                                                                      variable(pairs[column].second)})),
                                     value);

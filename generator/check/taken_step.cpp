@@ -34,6 +34,8 @@ public:
         Numbers rounding(n_, cln::cl_R(0)), size(n_, cln::cl_R(0));
         for (const Numbers& positions : path_)
             for (std::size_t k = 0; k < n_; ++k) size[k] = cln::max(size[k], cln::abs(positions[k]));
+        Numbers size0 = step_.p0, size1 = step_.p1;  // of the momenta at the ends
+        if (!system_.constraints.empty()) add_sizes_of_others(size, size0, size1);
         Noise noise(12);
         const auto rounded = [&](const cln::cl_R& value, const cln::cl_R& of) {
             return value + cln::cl_R((cln::plusp(noise.next()) ? 1 : -1)) * of * step_.epsilon;
@@ -51,8 +53,8 @@ public:
                 for (std::size_t k = 0; k < n_; ++k) positions[k] = rounded(positions[k], size[k]);
             if (is_solved_) moved = path_between(moved.front(), moved.back());
             for (std::size_t k = 0; k < n_; ++k) {
-                p0[k] = rounded(p0[k], p0[k]);
-                p1[k] = rounded(p1[k], p1[k]);
+                p0[k] = rounded(p0[k], size0[k]);
+                p1[k] = rounded(p1[k], size1[k]);
             }
             const Numbers there = equations(moved, p0, p1);
             for (std::size_t i = 0; i < there.size(); ++i)
@@ -66,6 +68,27 @@ public:
     }
 
 private:
+    // Constraints pull on all coordinates at once, so that each is rounded beside the others, in the metric of the
+    // mass: M_kk x_k^2 beside the sum of M_jj d_j^2, p_k^2 / M_kk beside the sum of p_j^2 / M_jj; d: how far it goes in
+    // a step.
+    void add_sizes_of_others(Numbers& position, Numbers& momentum0, Numbers& momentum1) {
+        std::vector<GiNaC::ex> diagonal;
+        for (int k = 0; k < static_cast<int>(n_); ++k) diagonal.push_back(system_.momentum_v(k, k));
+        const Numbers mass = formulas_(diagonal);
+        cln::cl_R moved = 0, pushed = 0;
+        for (std::size_t k = 0; k < n_; ++k) {
+            if (!cln::plusp(mass[k])) continue;
+            moved = moved + mass[k] * cln::square(path_.back()[k] - path_.front()[k]);
+            pushed = pushed + (cln::square(momentum0[k]) + cln::square(momentum1[k])) / mass[k];
+        }
+        for (std::size_t k = 0; k < n_; ++k) {
+            if (!cln::plusp(mass[k])) continue;
+            position[k] = cln::max(position[k], cln::sqrt(moved / mass[k]));
+            for (Numbers* const momentum : {&momentum0, &momentum1})
+                (*momentum)[k] = cln::max(cln::abs((*momentum)[k]), cln::sqrt(pushed * mass[k]));
+        }
+    }
+
     // dL_d/dQ_j, with the momenta at the ends: all of them vanish for a step (D28). With constraints, what of them no
     // multiplier takes away; then the constraints at each control point (D45), and the multipliers that the momentum at
     // the end would need to keep them on (D46).

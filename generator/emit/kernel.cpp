@@ -410,6 +410,7 @@ std::string stepper_of(const Scene& scene, const Structure& structure) {
 std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
     std::set<std::string> parts = {stepper_of(derivation.scene, derivation.structure)};
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
+    if (has_full_matrix(derivation)) parts.insert("base/full_matrix.hpp");
     if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
             case Op::sin:

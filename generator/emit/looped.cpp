@@ -6,6 +6,7 @@
 
 #include "generator/emit/looped.hpp"
 #include "generator/emit/tables.hpp"
+#include "generator/mechanics/all_pairs.hpp"
 
 namespace lobatto {
 
@@ -50,20 +51,26 @@ std::string LoopedText::tables() const {
         for (const auto& entry : d_.structure.constant_mass().entries)
             place.emplace(entry, static_cast<int>(place.size()));
     }
+    const bool full = has_full_matrix(d_);
     for (int number = 0; number < elements_; ++number) {
         const Element& element = element_of(number);
         const std::string name = element_text(number);
+        const std::optional<AllPairs> pairs = all_pairs(element);
         std::vector<int> variables, positions;
-        const auto pairs = pairs_of(element);
+        const auto entries = full ? std::vector<std::pair<std::size_t, std::size_t>>() : pairs_of(element);
         for (const auto& row : element.rows) {
-            variables.insert(variables.end(), row.begin(), row.end());
-            for (const auto& [i, j] : pairs) positions.push_back(place.at({row[i], row[j]}));
+            if (!pairs) variables.insert(variables.end(), row.begin(), row.end());
+            for (const auto& [i, j] : entries) positions.push_back(place.at({row[i], row[j]}));
         }
-        text += wrapped(fmt::format("    // {} = {} for {} rows of x (numbers in {}): which ones, and which entries of "
-                                    "the second derivatives they add to.",
-                                    name, canonical_text(element.term), element.rows.size(), general_ ? "z" : "q"),
-                        "    //     ");
-        text += integer_table(name + "_x", variables) + integer_table(name + "_entry", positions);
+        const std::string formula = fmt::format("    // {} = {} for ", name, canonical_text(element.term));
+        text += wrapped(
+            pairs ? formula + fmt::format("all pairs of {} bodies.", pairs->bodies)
+                  : formula + fmt::format("{} rows of x (numbers in {}): which ones{}.", element.rows.size(),
+                                          general_ ? "z" : "q",
+                                          full ? "" : ", and which entries of the second derivatives they add to"),
+            "    //     ");
+        if (!pairs) text += integer_table(name + "_x", variables);
+        if (!full) text += integer_table(name + "_entry", positions);
         if (neighbours_) {
             std::vector<int> runs;
             for (const RowRun& run : runs_of(element)) runs.insert(runs.end(), {run.begin, run.count});
@@ -74,8 +81,8 @@ std::string LoopedText::tables() const {
         }
         if (!element.a.empty() && !has_parameters(element)) {
             std::vector<GiNaC::ex> values;
-            for (std::size_t j = 0; j < element.a.size(); ++j)
-                for (const auto& row : element.coefficients) values.push_back(row[j]);
+            for (const std::vector<GiNaC::ex>& table : coefficient_tables(element))
+                values.insert(values.end(), table.begin(), table.end());
             text += number_table(name + "_a", values, precision_);
         }
     }
@@ -93,8 +100,8 @@ std::string LoopedText::fields() const {
     for (int number = 0; number < elements_; ++number) {
         const Element& element = element_of(number);
         if (!element.a.empty() && has_parameters(element))
-            text +=
-                fmt::format("        number {}_a[{}];\n", element_text(number), element.rows.size() * element.a.size());
+            text += fmt::format("        number {}_a[{}];\n", element_text(number),
+                                element.a.size() * coefficient_tables(element).front().size());
     }
     return text;
 }
@@ -144,11 +151,16 @@ std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
         const bool exists =
             std::any_of(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.part == wanted; });
         if (!exists || program(name_of(wanted)).outputs.empty()) continue;
+        const std::optional<AllPairs> pairs = all_pairs(element);
         const std::string inside = statements(name_of(wanted), "    ");
         std::string begin;
         for (std::size_t j = 0; j < element.x.size(); ++j) {
             const std::string index = fmt::format("i{}", j), value = fmt::format("x{}", j);
-            const std::string place = fmt::format("{}_x[r * {} + {}]", name, element.x.size(), j);
+            std::string place = fmt::format("{}_x[r * {} + {}]", name, element.x.size(), j);
+            if (pairs) {
+                const auto& [first, of_second] = pairs->variables[j];
+                place = (first == 0 ? "" : fmt::format("{} + ", first)) + (of_second ? "other" : "body");
+            }
             if (mentions(inside, index)) begin += fmt::format("            const int {} = {};\n", index, place);
             if (mentions(inside, value))
                 begin += fmt::format("            const auto {} = {}[{}];\n", value, variables,
@@ -157,11 +169,19 @@ std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
         for (std::size_t j = 0; j < element.a.size(); ++j) {
             const std::string value = fmt::format("a{}", j);
             if (mentions(inside, value))
-                begin += fmt::format("            const auto {} = {}{}_a[{} + r];\n", value,
-                                     has_parameters(element) ? "k." : "", name, j * element.rows.size());
+                begin += fmt::format("            const auto {} = {}{}_a[{} + {}];\n", value,
+                                     has_parameters(element) ? "k." : "", name,
+                                     j * coefficient_tables(element).front().size(),
+                                     !pairs                             ? "r"
+                                     : pairs->coefficients[j].of_second ? "other - 1"
+                                                                        : "body");
         }
-        text += fmt::format("        for (int r = 0; r < {}; ++r) {{  // {}\n{}{}        }}\n", element.rows.size(),
-                            name, begin, inside);
+        const std::string loop = pairs ? fmt::format(
+                                             "        for (int body = 0; body < {0}; ++body)\n"
+                                             "        for (int other = body + 1; other < {1}; ++other)",
+                                             pairs->bodies - 1, pairs->bodies)
+                                       : fmt::format("        for (int r = 0; r < {}; ++r)", element.rows.size());
+        text += fmt::format("{} {{  // {}\n{}{}        }}\n", loop, name, begin, inside);
     }
     return text;
 }

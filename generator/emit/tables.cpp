@@ -8,6 +8,7 @@
 
 #include "generator/emit/function_text.hpp"
 #include "generator/mechanics/derivation.hpp"
+#include "generator/programs/looped.hpp"
 
 namespace lobatto {
 
@@ -25,6 +26,14 @@ std::string places(const std::string& of, const std::vector<std::pair<int, int>>
         columns.push_back(column);
     }
     return integer_table(of + "_row", rows) + integer_table(of + "_column", columns);
+}
+
+// The same of a full matrix of so many rows, row by row.
+std::string full_places(const std::string& of, int rows) {
+    return fmt::format(
+        "    static constexpr lobatto::RowOfFull<{0}> {1}_row{{}};\n"
+        "    static constexpr lobatto::ColumnOfFull<{0}> {1}_column{{}};\n",
+        rows, of);
 }
 
 std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
@@ -64,7 +73,7 @@ std::string separable_shapes(const Structure& structure, const System& system, i
     }
     line(text, fmt::format("int entries = {}", structure.constant_mass().entries.size()),
          "of M^-1 V'' that are not identically zero");
-    return text + places("entry", structure.constant_mass().entries);
+    return text;
 }
 
 std::string general_shapes(const Derivation& d) {
@@ -78,7 +87,7 @@ std::string general_shapes(const Derivation& d) {
     line(text, fmt::format("int cyclic = {}", routhian.cyclic.size()), "coordinates whose momenta are constant");
     text += integer_table("cyclic_index", routhian.cyclic);
     line(text, fmt::format("int entries = {}", entries.size()), "of H = d2R/dzdz that are not identically zero");
-    text += places("entry", entries);
+    text += has_full_matrix(d) ? full_places("entry", 2 * d.system.n) : places("entry", entries);
     line(text, fmt::format("int mass_entries = {}", mass.size()), "of M = d2L/dvdv that are not identically zero");
     text += places("mass", mass);
     line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
@@ -236,6 +245,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     text += watched_shapes(d.scene);
     if (structure.form() == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.system, d.quadrature.points, precision);
+    text += has_full_matrix(d) ? full_places("entry", d.system.n) : places("entry", structure.constant_mass().entries);
     const bool solves = structure.form() == Form::separable && !structure.is_explicit();
     return solves ? text + order_of_unknowns(structure) : text;
 }

@@ -175,7 +175,7 @@ void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
 }
 
 Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
-    std::map<GiNaC::ex, Id, GiNaC::ex_is_less> done;
+    std::unordered_map<GiNaC::ex, Id> done;
     const auto convert = [&](const auto& self, const GiNaC::ex& e) -> Id {
         const auto known = done.find(e);
         if (known != done.end()) return known->second;

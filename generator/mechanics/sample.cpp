@@ -88,13 +88,12 @@ cln::cl_R float_of(const GiNaC::numeric& value) {
     return cln::cl_float(cln::the<cln::cl_R>(value.to_cl_N()), format);
 }
 
-// Of all nodes below the roots.
-static std::vector<Sized> all_sized(const Graph& graph, const std::vector<cln::cl_R>& inputs,
-                                    const std::vector<Id>& roots) {
+std::vector<Sized> all_sized(const Graph& graph, const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots) {
     const std::vector<cln::cl_R> values = graph.evaluate(inputs, roots);
     std::vector<Sized> sized(values.size());
+    std::vector<Sized> operands;
     for (const Id id : graph.topological(roots)) {
-        std::vector<Sized> operands;
+        operands.clear();
         for (const Id operand : graph[id].operands) operands.push_back(sized[static_cast<std::size_t>(operand)]);
         Sized& here = sized[static_cast<std::size_t>(id)];
         here.value = values[static_cast<std::size_t>(id)];
@@ -111,9 +110,8 @@ std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>
     return result;
 }
 
-std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<cln::cl_R>& inputs,
+std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<Sized>& sized,
                                         const std::vector<Id>& roots) {
-    const std::vector<Sized> sized = all_sized(graph, inputs, roots);
     const auto of = [&](Id id) -> const Sized& { return sized[static_cast<std::size_t>(id)]; };
     std::vector<std::set<Id>> hidden(sized.size());
     for (const Id id : graph.topological(roots))
@@ -142,14 +140,27 @@ void Formulas::set(const GiNaC::ex& symbol, const cln::cl_R& value) {
     values_[index] = value;
 }
 
-std::vector<GiNaC::exset> Formulas::hidden(const std::vector<Id>& roots) const {
+std::vector<GiNaC::exset> Formulas::hidden(const std::vector<Id>& roots, const std::vector<Sized>& sized) const {
     std::vector<GiNaC::exset> result;
-    for (const std::set<Id>& inputs : hidden_inputs(graph_, values_, roots)) {
+    for (const std::set<Id>& inputs : hidden_inputs(graph_, sized, roots)) {
         result.emplace_back();
+        if (inputs.empty()) continue;
         for (const auto& [symbol, id] : inputs_)
             if (inputs.contains(static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(id).to_int())))
                 result.back().insert(symbol);
     }
+    return result;
+}
+
+std::vector<bool> Formulas::holding(const std::vector<Id>& roots, const std::vector<GiNaC::symbol>& symbols) const {
+    std::vector<bool> holds(static_cast<std::size_t>(graph_.size()));
+    for (const GiNaC::symbol& symbol : symbols)
+        if (inputs_.contains(symbol)) holds[index_of(inputs_, symbol)] = true;
+    for (const Id id : graph_.topological(roots))
+        for (const Id operand : graph_[id].operands)
+            if (holds[static_cast<std::size_t>(operand)]) holds[static_cast<std::size_t>(id)] = true;
+    std::vector<bool> result;
+    for (const Id root : roots) result.push_back(holds[static_cast<std::size_t>(root)]);
     return result;
 }
 
@@ -159,7 +170,11 @@ cln::cl_R Formulas::get(const GiNaC::ex& symbol) const {
 
 std::vector<Id> Formulas::convert(const std::vector<GiNaC::ex>& expressions) {
     std::vector<Id> roots;
-    for (const GiNaC::ex& expression : expressions) roots.push_back(graph_.from(expression, inputs_));
+    for (const GiNaC::ex& expression : expressions) {
+        const auto [place, is_new] = converted_.emplace(expression, 0);
+        if (is_new) place->second = graph_.from(expression, inputs_);
+        roots.push_back(place->second);
+    }
     return roots;
 }
 

@@ -5,6 +5,7 @@
 #include <cln/cln.h>
 
 #include <set>
+#include <unordered_map>
 #include <vector>
 
 #include "generator/graph/graph.hpp"
@@ -22,14 +23,17 @@ struct Sized {
     }
 };
 
-// For each root the inputs that it holds where its value does not tell of them: in terms too small beside others though
-// they are not zero, as exp(-(t - 40)^2) beside q at t near 0, and in exp and tanh far out, where these are flat. Input
-// nodes, each once.
-std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<cln::cl_R>& inputs,
-                                        const std::vector<Id>& roots);
+// The values of all nodes that the roots need, by node, with their sizes. DomainError when one is not real.
+std::vector<Sized> all_sized(const Graph& graph, const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots);
 
 // The values of some nodes with their sizes. DomainError when one is not real.
 std::vector<Sized> sized_values(const Graph& graph, const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots);
+
+// For each root the inputs that it holds where its value does not tell of them: in terms too small beside others though
+// they are not zero, as exp(-(t - 40)^2) beside q at t near 0, and in exp and tanh far out, where these are flat. Input
+// nodes, each once. `sized`: all_sized.
+std::vector<std::set<Id>> hidden_inputs(const Graph& graph, const std::vector<Sized>& sized,
+                                        const std::vector<Id>& roots);
 
 // Formulas evaluated together; their symbols have values that may be changed between evaluations.
 class Formulas {
@@ -42,8 +46,13 @@ public:
     std::vector<Sized> evaluate_sized(const std::vector<Id>& roots) const {
         return sized_values(graph_, values_, roots);
     }
-    // For each root the symbols that hidden_inputs finds.
-    std::vector<GiNaC::exset> hidden(const std::vector<Id>& roots) const;
+    std::vector<Sized> evaluate_all_sized(const std::vector<Id>& roots) const {
+        return all_sized(graph_, values_, roots);
+    }
+    // For each root the symbols that hidden_inputs finds. `sized`: evaluate_all_sized.
+    std::vector<GiNaC::exset> hidden(const std::vector<Id>& roots, const std::vector<Sized>& sized) const;
+    // Whether each root holds one of these symbols.
+    std::vector<bool> holding(const std::vector<Id>& roots, const std::vector<GiNaC::symbol>& symbols) const;
     std::vector<cln::cl_R> operator()(const std::vector<GiNaC::ex>& expressions) {
         return evaluate(convert(expressions));
     }
@@ -52,6 +61,7 @@ private:
     Graph graph_;
     GiNaC::exmap inputs_;
     std::vector<cln::cl_R> values_;
+    std::unordered_map<GiNaC::ex, Id> converted_;
 };
 
 // Seeded numbers in (-1, 1), the same on every machine.

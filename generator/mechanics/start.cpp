@@ -33,7 +33,7 @@ public:
     StartCheck(const Scene& scene, const System& system)
         : scene_(scene),
           system_(system),
-          start_(as_given(scene)),
+          start_(as_given(scene, *system.formulas)),
           equations_(system, start_),
           constrained_(scene, system, start_, equations_) {}
 
@@ -89,8 +89,7 @@ public:
 
 private:
     // The scene's numbers; velocities are 0 where it gives momenta.
-    static Formulas as_given(const Scene& scene) {
-        Formulas start;
+    static Formulas as_given(const Scene& scene, Formulas start) {
         const auto set = [&](const GiNaC::symbol& symbol, const ex& value, const std::string& what) {
             start.set(symbol, float_of(scene.evaluate(value, what)));
         };

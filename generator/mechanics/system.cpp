@@ -116,11 +116,16 @@ public:
         return kinds;
     }
 
+    std::shared_ptr<const Formulas> formulas() const { return formulas_; }
+
 private:
     std::vector<Kind> sampled(const std::vector<ex>& expressions) const {
         std::vector<Kind> kinds(expressions.size());
         try {
-            at_sample_points(scene_, [&](NearStart& point) { examine(expressions, point, kinds); });
+            at_sample_points(scene_, [&](NearStart& point) {
+                point.set_all(*formulas_);
+                examine(*formulas_, formulas_->convert(expressions), point, kinds);
+            });
         } catch (const DomainError& error) {
             refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
                                        "from the singularity, or mend the formula",
@@ -129,29 +134,37 @@ private:
         return kinds;
     }
 
-    void examine(const std::vector<ex>& expressions, NearStart& point, std::vector<Kind>& kinds) const {
-        Formulas formulas;
-        point.set_all(formulas);
-        const std::vector<Id> roots = formulas.convert(expressions);
-        const std::vector<Sized> here = formulas.evaluate_sized(roots);
+    void examine(Formulas& formulas, const std::vector<Id>& roots, NearStart& point, std::vector<Kind>& kinds) const {
+        const std::vector<Sized> all = formulas.evaluate_all_sized(roots);
+        const auto here = [&](std::size_t i) -> const Sized& { return all[static_cast<std::size_t>(roots[i])]; };
         const auto moved = [&](const Symbols& symbols, bool Kind::*flag) {
+            const std::vector<bool> holding = formulas.holding(roots, symbols);
+            std::vector<std::size_t> which;
+            std::vector<Id> those;
+            for (std::size_t i = 0; i < roots.size(); ++i)
+                if (holding[i]) {
+                    which.push_back(i);
+                    those.push_back(roots[i]);
+                }
+            if (those.empty()) return;
             std::vector<cln::cl_R> before;
-            for (std::size_t k = 0; k < symbols.size(); ++k) {
-                before.push_back(formulas.get(symbols[k]));
-                formulas.set(symbols[k], point.near(before.back()));
+            for (const GiNaC::symbol& symbol : symbols) {
+                before.push_back(formulas.get(symbol));
+                formulas.set(symbol, point.near(before.back()));
             }
-            const std::vector<Sized> there = formulas.evaluate_sized(roots);
-            for (std::size_t i = 0; i < kinds.size(); ++i)
-                if (!here[i].equals(there[i])) kinds[i].*flag = true;
+            const std::vector<Sized> there = formulas.evaluate_sized(those);
+            for (std::size_t i = 0; i < those.size(); ++i)
+                if (!here(which[i]).equals(there[i])) kinds[which[i]].*flag = true;
             for (std::size_t k = 0; k < symbols.size(); ++k) formulas.set(symbols[k], before[k]);
         };
         // What a term depends on counts also where the term is too small to be seen.
-        const std::vector<GiNaC::exset> hidden = formulas.hidden(roots);
+        const std::vector<GiNaC::exset> hidden = formulas.hidden(roots, all);
         const auto hides = [&](std::size_t i, const Symbols& symbols) {
-            return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return hidden[i].contains(s); });
+            return !hidden[i].empty() &&
+                   std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return hidden[i].contains(s); });
         };
         for (std::size_t i = 0; i < kinds.size(); ++i) {
-            if (!here[i].vanishes() || !hidden[i].empty()) kinds[i].zero = false;
+            if (!here(i).vanishes() || !hidden[i].empty()) kinds[i].zero = false;
             kinds[i].on_q |= hides(i, system_.q);
             kinds[i].on_v |= hides(i, system_.v);
             kinds[i].on_t |= hides(i, {system_.t});
@@ -164,6 +177,7 @@ private:
     const Scene& scene_;
     const System& system_;
     const Occurrences motion_;  // q, v, t
+    const std::shared_ptr<Formulas> formulas_ = std::make_shared<Formulas>();
 };
 
 // Refuses a mass matrix that is singular near the start.
@@ -289,6 +303,7 @@ public:
         const Dependence dependence(scene_, system_, motion_);
         const std::vector<Dependence::Kind> kinds = dependence.of(expressions);
 
+        system_.formulas = dependence.formulas();
         keep_second_order(derived, {kinds.begin() + static_cast<std::ptrdiff_t>(first_order), kinds.end()});
         keep_first_order(kinds, dependence);
         // What is watched is given the time, as all else is.

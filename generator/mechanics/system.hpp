@@ -6,6 +6,7 @@
 #include <cln/cln.h>
 #include <ginac/ginac.h>
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@
 #include "generator/scene/scene.hpp"
 
 namespace lobatto {
+
+class Formulas;
 
 struct System {
     int n = 0;                              // coordinates
@@ -32,6 +35,9 @@ struct System {
     std::vector<Constraint> constraints;  // phi(q, t) = 0
     std::vector<GiNaC::ex> constraint_t;  // dphi/dt at fixed q, one each
     SparseMatrix constraint_q;            // G = dphi/dq, one row each
+
+    // A graph that knows the derivatives above; its symbols have values of no meaning.
+    std::shared_ptr<const Formulas> formulas;
 
     bool autonomous = true;  // neither L nor F nor a constraint depends on the time
     bool linear = false;     // p and f are affine in q and v, with constant coefficients

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "generator/mechanics/all_pairs.hpp"
 #include "generator/programs/builder.hpp"
 
 namespace lobatto {
@@ -15,6 +16,11 @@ namespace lobatto {
 namespace {
 
 using GiNaC::ex;
+
+// Of the second derivatives.
+std::size_t variables_of(const Derivation& derivation) {
+    return static_cast<std::size_t>(derivation.system.n) * (derivation.structure.form() == Form::general ? 2 : 1);
+}
 
 class LoopedBuilder : public ProgramBuilder {
 public:
@@ -164,18 +170,15 @@ private:
                     {fmt::format("{}[i{}]", slope(), j), slopes[j], i < j ? Effect::subtract : Effect::add});
         }
         node.outputs = slope_only.outputs;
-        int column = 0;
-        for (const auto& [i, j] : pairs_of(element)) {
+        const auto pairs = pairs_of(element);
+        for (std::size_t column = 0; column < pairs.size(); ++column) {
+            const auto [i, j] = pairs[column];
+            const std::string place = entry_of_row(d_, number, pairs, column);
             const ex value = gradient[i].diff(element.x[j]);
-            node.outputs.push_back(
-                {fmt::format("{}[{}_entry[r * {} + {}]]", second(), name, pairs_of(element).size(), column),
-                 convert(value), Effect::add});
+            node.outputs.push_back({fmt::format("{}[{}]", second(), place), convert(value), Effect::add});
             const ex constant = constant_part.of(value);
             if ((d_.structure.absorbed() || d_.structure.diagonal_part()) && !constant.is_zero())
-                quadratic.outputs.push_back(
-                    {fmt::format("S0[{}_entry[r * {} + {}]]", name, pairs_of(element).size(), column),
-                     convert(constant), Effect::add});
-            ++column;
+                quadratic.outputs.push_back({fmt::format("S0[{}]", place), convert(constant), Effect::add});
         }
         if (d_.scene.outputs.energy && !is_force) {
             std::vector<GiNaC::symbol> velocities;
@@ -191,8 +194,8 @@ private:
         // Coefficients that are parameters are put into an array by prepare().
         Program table = program_of({number, LoopPart::Of::coefficients});
         if (has_parameters(element))
-            for (std::size_t j = 0; j < element.a.size(); ++j)
-                for (const auto& row : element.coefficients) table.outputs.push_back({"", convert(row[j])});
+            for (const std::vector<ex>& values : coefficient_tables(element))
+                for (const ex& value : values) table.outputs.push_back({"", convert(value)});
         p_.programs.push_back(std::move(table));
     }
 
@@ -202,6 +205,36 @@ private:
 };
 
 }  // namespace
+
+bool has_full_matrix(const Derivation& derivation) {
+    constexpr std::size_t fewest = 32;
+    const Structure& structure = derivation.structure;
+    const std::size_t variables = variables_of(derivation);
+    const std::size_t entries = structure.form() == Form::general ? structure.routhian().second.entries().size()
+                                                                  : structure.constant_mass().entries.size();
+    return variables >= fewest && entries == variables * variables;
+}
+
+std::vector<std::vector<ex>> coefficient_tables(const Element& element) {
+    std::vector<std::vector<ex>> tables(element.a.size());
+    const std::optional<AllPairs> pairs = all_pairs(element);
+    for (std::size_t j = 0; j < tables.size(); ++j) {
+        if (pairs) {
+            tables[j] = pairs->coefficients[j].values;
+        } else {
+            for (const auto& row : element.coefficients) tables[j].push_back(row[j]);
+        }
+    }
+    return tables;
+}
+
+std::string entry_of_row(const Derivation& derivation, int element,
+                         const std::vector<std::pair<std::size_t, std::size_t>>& pairs, std::size_t column) {
+    const auto [i, j] = pairs[column];
+    return has_full_matrix(derivation)
+               ? fmt::format("i{} * {} + i{}", i, variables_of(derivation), j)
+               : fmt::format("{}_entry[r * {} + {}]", element_text(element), pairs.size(), column);
+}
 
 bool has_parameters(const Element& element) {
     for (const auto& row : element.coefficients)

@@ -2,6 +2,7 @@
 // The programs of kernels with loops over repeated terms, and what their tables hold.
 #pragma once
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,14 @@ Programs looped_programs(const Derivation& derivation);
 
 // The slots (i, j) of an element whose second derivative is not zero, row by row.
 std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element);
+// Whether all second derivatives are there, of so many variables that no table says where they stand: that of variables
+// i and j of N is number i N + j.
+bool has_full_matrix(const Derivation& derivation);
+// The values of each coefficient: a number a row, or a body where the rows are all pairs of bodies.
+std::vector<std::vector<GiNaC::ex>> coefficient_tables(const Element& element);
+// How a row's loop calls the place of the second derivative by the slots pairs[column], among all entries.
+std::string entry_of_row(const Derivation& derivation, int element,
+                         const std::vector<std::pair<std::size_t, std::size_t>>& pairs, std::size_t column);
 // Whether coefficients that vary are run-time parameters, not numbers.
 bool has_parameters(const Element& element);
 

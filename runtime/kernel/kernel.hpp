@@ -8,6 +8,7 @@
 #include "base/contract.hpp"
 #include "base/double_double_functions.hpp"
 #include "base/exponential.hpp"
+#include "base/full_matrix.hpp"
 #include "base/numbers.hpp"
 #include "base/pack.hpp"
 #include "base/rows.hpp"

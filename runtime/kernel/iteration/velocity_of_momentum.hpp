@@ -70,6 +70,7 @@ public:
 
 private:
     using Layout = std::conditional_t<K::cyclic == 0, Grouped<K, unknowns, 1, 0>, Whole<n>>;
+    static constexpr int few = 4;  // iterations, after which only rounding may be left
     static constexpr int mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
     static constexpr int slope_room = K::constraint_entries > 0 ? K::constraint_entries : 1;
     // x: v, then mu.
@@ -122,12 +123,14 @@ private:
         if (!evaluate(at, a.x, a)) return Status::not_finite;
         for (int iteration = 0; iteration < 100; ++iteration) {
             if (iteration > 0 && is_near(at, a, real(2) * Limits<real>::epsilon)) return Status::ok;
+            if (iteration > few && is_rounding(at, a)) return Status::ok;
             set_matrix(a);
             if (!a.matrix.factor()) return Status::singular_mass;
             const real length = solve_for(a, a.increment);
             const bool next_is_rounding = iteration > 0 && is_near(at, a, Limits<real>::root_epsilon);
             for (real part = real(1);; part *= real(0.5)) {
-                if (part < Limits<real>::epsilon) return Status::not_converged;
+                if (part < Limits<real>::epsilon)
+                    return evaluate(at, a.x, a) && is_rounding(at, a) ? Status::ok : Status::not_converged;
                 for (int i = 0; i < unknowns; ++i) a.trial[i] = a.x[i] + part * a.increment[i];
                 if (next_is_rounding || (evaluate(at, a.trial, a) && solve_for(a, a.next) <= length)) break;
             }
@@ -163,6 +166,22 @@ private:
         });
         for (int i = 0; i < unknowns; ++i)
             if (!(fabs(a.residual[i]) <= bound * size[i])) return false;
+        return true;
+    }
+
+    // Whether what is left is rounding beside the whole motion, in the metric of the mass: |p_i| <= sqrt(M_ii p v). The
+    // terms of one row may all be rounding, as those of a coordinate that a constraint holds fixed.
+    static bool is_rounding(const State& at, const Arrays& a) {
+        real twice_energy = real(0), mass[n] = {}, size[unknowns] = {};
+        for (int i = 0; i < n; ++i) twice_energy += fabs(at.p[i] * a.x[i]);
+        for (int e = 0; e < K::mass_entries; ++e)
+            if (K::mass_row[e] == K::mass_column[e]) mass[K::mass_row[e]] = fabs(a.mass[e]);
+        for (int i = 0; i < n; ++i) size[i] = sqrt(mass[i] * twice_energy);
+        each_slope([&](int e, int c, int i) {
+            if (mass[i] > real(0)) size[n + c] += fabs(a.G[e]) * sqrt(twice_energy / mass[i]);
+        });
+        for (int i = 0; i < unknowns; ++i)
+            if (!(fabs(a.residual[i]) <= real(64) * Limits<real>::epsilon * size[i])) return false;
         return true;
     }
 
