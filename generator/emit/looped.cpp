@@ -58,7 +58,7 @@ std::string LoopedText::tables() const {
         const std::optional<AllPairs> pairs = all_pairs(element);
         std::vector<int> variables, positions;
         const auto entries = full ? std::vector<std::pair<std::size_t, std::size_t>>() : pairs_of(element);
-        for (const auto& row : element.rows) {
+        for (const auto& row : pairs ? rows_of(*pairs) : element.rows) {
             if (!pairs) variables.insert(variables.end(), row.begin(), row.end());
             for (const auto& [i, j] : entries) positions.push_back(place.at({row[i], row[j]}));
         }
@@ -176,11 +176,13 @@ std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
                                      : pairs->coefficients[j].of_second ? "other - 1"
                                                                         : "body");
         }
-        const std::string loop = pairs ? fmt::format(
-                                             "        for (int body = 0; body < {0}; ++body)\n"
-                                             "        for (int other = body + 1; other < {1}; ++other)",
-                                             pairs->bodies - 1, pairs->bodies)
-                                       : fmt::format("        for (int r = 0; r < {}; ++r)", element.rows.size());
+        const bool counts = mentions(inside, "r");  // the rows
+        const std::string loop =
+            pairs ? fmt::format(
+                        "        for (int body = 0{0}; body < {1}; ++body)\n"
+                        "        for (int other = body + 1; other < {2}; ++other{3})",
+                        counts ? ", r = 0" : "", pairs->bodies - 1, pairs->bodies, counts ? ", ++r" : "")
+                  : fmt::format("        for (int r = 0; r < {}; ++r)", element.rows.size());
         text += fmt::format("{} {{  // {}\n{}{}        }}\n", loop, name, begin, inside);
     }
     return text;

@@ -68,6 +68,17 @@ std::optional<AllPairs::Coefficient> coefficient_of_pairs(const Element& element
 
 }  // namespace
 
+std::vector<std::vector<int>> rows_of(const AllPairs& pairs) {
+    std::vector<std::vector<int>> rows;
+    for (int body = 0; body < pairs.bodies; ++body)
+        for (int other = body + 1; other < pairs.bodies; ++other) {
+            rows.emplace_back();
+            for (const auto& [begin, of_second] : pairs.variables)
+                rows.back().push_back(begin + (of_second ? other : body));
+        }
+    return rows;
+}
+
 std::optional<AllPairs> all_pairs(const Element& element) {
     AllPairs result;
     result.bodies = bodies_of(element.rows.size());

@@ -31,4 +31,7 @@ std::optional<AllPairs> all_pairs(const Element& element);
 
 constexpr int fewest_bodies = 8;
 
+// The rows in the order of the loops: first body by first body, and its partners one after another.
+std::vector<std::vector<int>> rows_of(const AllPairs& pairs);
+
 }  // namespace lobatto

@@ -98,6 +98,23 @@ TEST_CASE("steps and Jacobians of bodies in loops, or in tables, are those of th
     }
 }
 
+TEST_CASE("bodies in loops beside coordinates of their own, whose matrix has zeros") {
+    const std::string pairs =
+        "sum(i = 1 .. 9, m*x[i]'^2/2) + a'^2/2 - a^4 - sum(i = 2 .. 9, sum(j = 1 .. i - 1, m^2*sqrt(1 + (x[i] - "
+        "x[j])^2)))";
+    const Derivation derivation = derive(test::scene_of(
+        pairs, "a = { position = 1, velocity = 0 }\nx = { count = 9, position = \"i^2/9\", velocity = 0 }", 4,
+        "m = 0.3"));
+    const std::string header = emit(derivation).header;
+    CHECK(header.find("other < 9; ++other, ++r)") != std::string::npos);
+    const Kernel kernel = test::kernel_in_own_cache(derivation, Precision::double_),
+                 exact = test::kernel_in_own_cache(derivation, Precision::quadruple);
+    const StartIn<double> start = start_in<double>(ExactStart(derivation.scene), kernel, 0.05);
+    CHECK(trajectory_leaves<double>(derivation, kernel, start.parameters, start.q, start.p, 0.05) < 4);
+    const StartIn<__float128> at = start_in<__float128>(ExactStart(derivation.scene), exact, 0.05);
+    CHECK(jacobian_defect(derivation, exact, at.parameters, at.q, at.p, 0.05) < 1e-12);
+}
+
 TEST_CASE("the text of a kernel does not grow with the number of pairs") {
     const auto size = [](int bodies) { return static_cast<double>(emit(derive(bodies_scene(bodies))).header.size()); };
     const double of_12 = size(12), of_18 = size(18), of_24 = size(24);
