@@ -43,6 +43,10 @@ install(FILES ${MANUAL_DIR}/lobatto.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fi
 install(FILES ${MANUAL_DIR}/scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/lobatto)
 
+# The package of a project that takes this one in is that project's own.
+if(NOT PROJECT_IS_TOP_LEVEL)
+    return()
+endif()
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME lobatto)
 set(CPACK_PACKAGE_CONTACT "The Lobatto authors <lobatto@localhost>")

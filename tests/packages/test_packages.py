@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What others take of this tree: its source in a project of theirs, a wheel, a Debian package. Each is made whole, as a
+user would make it, without network. That takes minutes, so it belongs to `./lobatto test --all`."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = pathlib.Path(os.environ["LOBATTO_PROGRAM"])
+BUILD = PROGRAM.parent
+
+
+def succeed(*command, **options):
+    """The standard output of a command that must succeed."""
+    ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False, **options)
+    assert ran.returncode == 0, f"{command}:\n{ran.stdout[-4000:]}\n{ran.stderr[-4000:]}"
+    return ran.stdout
+
+
+def bits_of_run(scene, folder, *words):
+    """The last state of `lobatto run`: t,a,b as it writes them."""
+    succeed(PROGRAM, "run", scene, *words, "--quiet", "-o", folder / "run.csv")
+    return (folder / "run.csv").read_text().splitlines()[-1]
+
+
+WAYS = {
+    "add_subdirectory": f"add_subdirectory({ROOT} lobatto)",
+    "FetchContent": f"include(FetchContent)\nFetchContent_Declare(lobatto SOURCE_DIR {ROOT})\n"
+                    "FetchContent_MakeAvailable(lobatto)",
+}
+
+
+@pytest.mark.parametrize("way, generator", [("add_subdirectory", "Ninja"), ("FetchContent", "Unix Makefiles")])
+def test_a_project_that_takes_the_source_in_builds_and_installs(way, generator, tmp_path):
+    project, build, prefix = tmp_path / "project", tmp_path / "build", tmp_path / "prefix"
+    shutil.copytree(ROOT / "examples" / "cmake", project)
+    listed = (project / "CMakeLists.txt").read_text()
+    found = "find_package(Lobatto 0.1 REQUIRED)"
+    assert found in listed
+    (project / "CMakeLists.txt").write_text(listed.replace(found, WAYS[way]))
+    succeed("cmake", "-S", project, "-B", build, "-G", generator, "-DCMAKE_BUILD_TYPE=Release")
+    succeed("cmake", "--build", build, "--parallel", os.cpu_count())
+    scene = project / "arm.toml"
+    assert bits_of_run(scene, tmp_path, "--points", "6").startswith(succeed(build / "kernel").strip() + ",")
+    assert succeed(build / "control", scene).startswith("t = 4.00 s: a = -0.01924")
+    assert "1000 of 1000" in succeed(build / "swing", scene)
+    assert "Deriving" not in succeed("cmake", "--build", build)
+    with scene.open("a") as file:
+        file.write("# changed\n")
+    assert "Deriving" in succeed("cmake", "--build", build)
+    succeed("cmake", "--install", build, "--prefix", prefix)
+    assert succeed(prefix / "bin" / "lobatto", "--version").startswith("lobatto 0.")
