@@ -55,3 +55,19 @@ def test_a_project_that_takes_the_source_in_builds_and_installs(way, generator, 
     assert "Deriving" in succeed("cmake", "--build", build)
     succeed("cmake", "--install", build, "--prefix", prefix)
     assert succeed(prefix / "bin" / "lobatto", "--version").startswith("lobatto 0.")
+
+
+def test_pip_installs_the_module_from_the_tree_without_network(tmp_path):
+    environment, home = tmp_path / "env", tmp_path / "home"
+    succeed(sys.executable, "-m", "venv", "--system-site-packages", environment)
+    python = environment / "bin" / "python"
+    outside = {**{name: value for name, value in os.environ.items() if name != "PYTHONPATH"}, "HOME": str(home),
+               "PIP_CONFIG_FILE": os.devnull}
+    # No index may be asked: neither for the module nor for what builds it.
+    succeed(python, "-m", "pip", "install", "--no-index", "--no-cache-dir", ROOT, env=outside, cwd=tmp_path)
+    said = succeed(python, ROOT / "examples" / "python" / "first_pendulum.py", "picture.png", env=outside, cwd=tmp_path)
+    assert "measured error" in said and (tmp_path / "picture.png").stat().st_size > 5000
+    where = succeed(python, "-c", "import lobatto; print(lobatto.__file__, lobatto.__version__)", env=outside, cwd=tmp_path)
+    assert where.startswith(str(environment)) and where.endswith(succeed(PROGRAM, "--version").removeprefix("lobatto "))
+    succeed(python, "-m", "pip", "uninstall", "--yes", "lobatto", env=outside)
+    assert not list(environment.glob("lib/python*/site-packages/lobatto*"))
