@@ -1,109 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// lobatto.h on lobatto.hpp: handles that remember what went wrong.
+// lobatto.h on lobatto.hpp: scenes, trajectories step by step, runs and sweeps.
 #include <cmath>
-#include <new>
-#include <utility>
 
-#include "library/include/lobatto/lobatto.h"
-#include "library/include/lobatto/lobatto.hpp"
-
-namespace lobatto::api {
-
-namespace {
-
-// What each handle has.
-template <class Value>
-struct Handle {
-    std::optional<Value> value;
-    int status = 0;
-    std::string message;
-
-    // Runs the work, whose exceptions become status and message. It may return whether the motion goes on.
-    template <class Work>
-    int attempt(Work&& work) noexcept {
-        status = 0;
-        try {
-            message.clear();
-            if constexpr (std::is_same_v<decltype(work()), bool>) {
-                if (!work()) status = stopped;
-            } else {
-                work();
-            }
-        } catch (const Error& error) {
-            fail(error.exit_code(), error.what());
-        } catch (const std::exception& error) {
-            fail(4, error.what());
-        } catch (...) {
-            fail(4, "unknown error");
-        }
-        return status;
-    }
-
-    static constexpr int stopped = 1;
-
-private:
-    void fail(int code, const char* text) noexcept {
-        status = code;
-        try {
-            message = text;
-        } catch (...) {  // no memory: the status says it
-        }
-    }
-};
-
-Settings settings_of(const lobatto_settings* given) {
-    Settings settings;
-    if (given == nullptr) return settings;
-    const auto put = [](std::string& text, const char* word) {
-        if (word != nullptr) text = word;
-    };
-    if (given->points != 0) settings.points = given->points;
-    if (given->stages != 0) settings.stages = given->stages;
-    if (given->splitting != 0) settings.splitting = given->splitting;
-    if (given->tolerance != 0) settings.tolerance = given->tolerance;
-    put(settings.arithmetic, given->arithmetic);
-    put(settings.numbers, given->numbers);
-    put(settings.step, given->step);
-    put(settings.until, given->until);
-    if (given->every != 0) settings.every = given->every;
-    for (const char* const* set = given->set; set != nullptr && *set != nullptr; ++set) {
-        const std::string argument = *set;
-        const std::size_t equals = argument.find('=');
-        if (equals == std::string::npos) throw InputError("set: expected name=value, not '" + argument + "'");
-        settings.set.emplace_back(argument.substr(0, equals), argument.substr(equals + 1));
-    }
-    return settings;
-}
-
-const char* text(const std::string* string) {
-    return string == nullptr ? nullptr : string->c_str();
-}
-
-// Element `index` of a list of what may have failed.
-template <class List>
-const typename List::value_type* element(const List* list, std::size_t index) {
-    return list != nullptr && index < list->size() ? &(*list)[index] : nullptr;
-}
-
-const double* data(const std::vector<double>& values) {
-    return values.empty() ? nullptr : values.data();
-}
-
-}  // namespace
-
-}  // namespace lobatto::api
+#include "library/handles.hpp"
 
 using lobatto::api::Handle;
 namespace api = lobatto::api;
 
-struct lobatto_scene : Handle<api::Scene> {
-    const api::Variable* coordinate(std::size_t index) const {
-        return value ? api::element(&value->coordinates(), index) : nullptr;
-    }
-    const api::Variable* parameter(std::size_t index) const {
-        return value ? api::element(&value->parameters(), index) : nullptr;
-    }
-};
 struct lobatto_integrator : Handle<api::Stepper> {
     template <class Work>
     int with_stepper(Work&& work) noexcept {
@@ -113,16 +16,6 @@ struct lobatto_integrator : Handle<api::Stepper> {
 struct lobatto_trajectory : Handle<api::Trajectory> {};
 struct lobatto_sweep : Handle<api::Sweep> {};
 
-namespace {
-
-const api::Scene& scene_of(const lobatto_scene* scene) {
-    if (scene == nullptr) throw api::InputError("there is no scene: NULL was given");
-    if (!scene->value) throw api::InputError("the scene was not read: " + scene->message);
-    return *scene->value;
-}
-
-}  // namespace
-
 extern "C" {
 
 const char* lobatto_version(void) {
@@ -131,17 +24,13 @@ const char* lobatto_version(void) {
 }
 
 lobatto_scene* lobatto_scene_read(const char* path) {
-    auto* const scene = new (std::nothrow) lobatto_scene;
-    if (scene != nullptr) scene->attempt([&] { scene->value.emplace(std::string(path == nullptr ? "" : path)); });
-    return scene;
+    return api::made<lobatto_scene>(
+        [&](lobatto_scene& scene) { scene.value.emplace(std::string(path == nullptr ? "" : path)); });
 }
 lobatto_scene* lobatto_scene_from_text(const char* text, const char* path) {
-    auto* const scene = new (std::nothrow) lobatto_scene;
-    if (scene != nullptr)
-        scene->attempt([&] {
-            scene->value = api::Scene::from_text(text == nullptr ? "" : text, path == nullptr ? "scene.toml" : path);
-        });
-    return scene;
+    return api::made<lobatto_scene>([&](lobatto_scene& scene) {
+        scene.value = api::Scene::from_text(text == nullptr ? "" : text, path == nullptr ? "scene.toml" : path);
+    });
 }
 void lobatto_scene_free(lobatto_scene* scene) {
     delete scene;
@@ -192,11 +81,9 @@ const char* lobatto_scene_event_text(const lobatto_scene* scene, size_t index) {
 }
 
 lobatto_integrator* lobatto_integrator_new(const lobatto_scene* scene, const lobatto_settings* settings) {
-    auto* const integrator = new (std::nothrow) lobatto_integrator;
-    if (integrator != nullptr)
-        integrator->attempt(
-            [&] { integrator->value.emplace(api::compile(scene_of(scene), api::settings_of(settings))); });
-    return integrator;
+    return api::made<lobatto_integrator>([&](lobatto_integrator& integrator) {
+        integrator.value.emplace(api::compile(api::scene_of(scene), api::settings_of(settings)));
+    });
 }
 lobatto_integrator* lobatto_integrator_copy(const lobatto_integrator* integrator) {
     auto* const copy = new (std::nothrow) lobatto_integrator;
@@ -267,21 +154,18 @@ double lobatto_integrator_energy(const lobatto_integrator* integrator) {
 }
 
 lobatto_trajectory* lobatto_run(const lobatto_scene* scene, const lobatto_settings* settings, int measure) {
-    auto* const trajectory = new (std::nothrow) lobatto_trajectory;
-    if (trajectory == nullptr) return trajectory;
-    trajectory->attempt([&] {
+    return api::made<lobatto_trajectory>([&](lobatto_trajectory& trajectory) {
         api::RunOptions options;
         static_cast<api::Settings&>(options) = api::settings_of(settings);
         options.measure = measure != 0;
         try {
-            trajectory->value = api::run(scene_of(scene), options);
+            trajectory.value = api::run(api::scene_of(scene), options);
         } catch (const api::RunFailure& failure) {
-            trajectory->value = failure.trajectory();
+            trajectory.value = failure.trajectory();
             throw;
         }
-        return trajectory->value->stopped_by.empty();
+        return trajectory.value->stopped_by.empty();
     });
-    return trajectory;
 }
 void lobatto_trajectory_free(lobatto_trajectory* trajectory) {
     delete trajectory;
@@ -313,17 +197,14 @@ double lobatto_trajectory_error(const lobatto_trajectory* trajectory) {
 
 lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_settings* settings, size_t count,
                                  size_t columns, const char* const* names, const double* const* values) {
-    auto* const sweep = new (std::nothrow) lobatto_sweep;
-    if (sweep == nullptr) return sweep;
-    sweep->attempt([&] {
+    return api::made<lobatto_sweep>([&](lobatto_sweep& sweep) {
         api::Starts starts;
         starts.count = count;
         for (size_t c = 0; c < columns; ++c) starts.columns[names[c]].assign(values[c], values[c] + count);
         api::SweepOptions options;
         static_cast<api::Settings&>(options) = api::settings_of(settings);
-        sweep->value = api::sweep(scene_of(scene), starts, options);
+        sweep.value = api::sweep(api::scene_of(scene), starts, options);
     });
-    return sweep;
 }
 void lobatto_sweep_free(lobatto_sweep* sweep) {
     delete sweep;

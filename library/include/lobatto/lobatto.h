@@ -131,6 +131,63 @@ LOBATTO_C_API const double* lobatto_sweep_t(const lobatto_sweep* sweep);
 LOBATTO_C_API const double* lobatto_sweep_q(const lobatto_sweep* sweep);
 LOBATTO_C_API const double* lobatto_sweep_p(const lobatto_sweep* sweep);
 
+/* --- What is known of a scene ------------------------------------------------------------------------------------ */
+
+typedef struct lobatto_text lobatto_text;
+
+/* How its integrator follows: as a person reads it, as a LaTeX document, as JSON. */
+LOBATTO_C_API lobatto_text* lobatto_derivation(const lobatto_scene* scene, const lobatto_settings* settings);
+LOBATTO_C_API lobatto_text* lobatto_derivation_latex(const lobatto_scene* scene, const lobatto_settings* settings);
+LOBATTO_C_API lobatto_text* lobatto_derivation_json(const lobatto_scene* scene, const lobatto_settings* settings);
+/* What was found in it, and what its kernel leaves out. */
+LOBATTO_C_API lobatto_text* lobatto_check_json(const lobatto_scene* scene, const lobatto_settings* settings);
+/* Which steps keep linear motion bounded, and what this step does. */
+LOBATTO_C_API lobatto_text* lobatto_stability_json(const lobatto_scene* scene, const lobatto_settings* settings);
+/* Its integrator as C++: a header that needs nothing else, or as a textbook prints it. */
+LOBATTO_C_API lobatto_text* lobatto_emit(const lobatto_scene* scene, const lobatto_settings* settings);
+LOBATTO_C_API lobatto_text* lobatto_emit_plain(const lobatto_scene* scene, const lobatto_settings* settings);
+LOBATTO_C_API void lobatto_text_free(lobatto_text* text);
+LOBATTO_C_API int lobatto_text_status(const lobatto_text* text);
+LOBATTO_C_API const char* lobatto_text_message(const lobatto_text* text);
+LOBATTO_C_API const char* lobatto_text_content(const lobatto_text* text);
+LOBATTO_C_API const char* lobatto_text_file(const lobatto_text* text); /* "arm.hpp"; NULL for what is no C++ */
+
+/* --- Choosing ---------------------------------------------------------------------------------------------------- */
+
+typedef struct lobatto_choice lobatto_choice;
+
+/* The cheapest method and step that keep an error to the end, relative to the amplitude. `budget`: seconds to search.
+ */
+LOBATTO_C_API lobatto_choice* lobatto_tune(const lobatto_scene* scene, double error, const lobatto_settings* settings,
+                                           double budget);
+LOBATTO_C_API void lobatto_choice_free(lobatto_choice* choice);
+LOBATTO_C_API int lobatto_choice_status(const lobatto_choice* choice);
+LOBATTO_C_API const char* lobatto_choice_message(const lobatto_choice* choice);
+/* For lobatto_run and lobatto_integrator_new; for as long as the choice lives. */
+LOBATTO_C_API const lobatto_settings* lobatto_choice_settings(const lobatto_choice* choice);
+LOBATTO_C_API const char* lobatto_choice_method(const lobatto_choice* choice); /* "Lobatto, 8 points" */
+LOBATTO_C_API double lobatto_choice_step(const lobatto_choice* choice);
+LOBATTO_C_API double lobatto_choice_predicted_error(const lobatto_choice* choice);
+LOBATTO_C_API double lobatto_choice_seconds(const lobatto_choice* choice); /* what the motion costs with it */
+/* 1: no member of the family that was not tried can be expected to win. */
+LOBATTO_C_API int lobatto_choice_complete(const lobatto_choice* choice);
+
+/* --- Proving ----------------------------------------------------------------------------------------------------- */
+
+typedef struct lobatto_proof lobatto_proof;
+
+/* Everything that can be checked of a scene: claims, and whether each holds. Status 0 says that all were looked at. */
+LOBATTO_C_API lobatto_proof* lobatto_verify(const lobatto_scene* scene, const lobatto_settings* settings);
+LOBATTO_C_API void lobatto_proof_free(lobatto_proof* proof);
+LOBATTO_C_API int lobatto_proof_status(const lobatto_proof* proof);
+LOBATTO_C_API const char* lobatto_proof_message(const lobatto_proof* proof);
+LOBATTO_C_API size_t lobatto_proof_count(const lobatto_proof* proof);
+LOBATTO_C_API int lobatto_proof_holds(const lobatto_proof* proof, size_t index); /* 1: it does */
+LOBATTO_C_API const char* lobatto_proof_claim(const lobatto_proof* proof, size_t index);
+LOBATTO_C_API const char* lobatto_proof_measured(const lobatto_proof* proof, size_t index);
+LOBATTO_C_API const char* lobatto_proof_bound(const lobatto_proof* proof, size_t index);
+LOBATTO_C_API const char* lobatto_proof_meaning(const lobatto_proof* proof, size_t index); /* of a failure */
+
 #ifdef __cplusplus
 }
 #endif
