@@ -235,5 +235,17 @@ const double* lobatto_sweep_q(const lobatto_sweep* sweep) {
 const double* lobatto_sweep_p(const lobatto_sweep* sweep) {
     return sweep->value ? api::data(sweep->value->p) : nullptr;
 }
+const size_t* lobatto_sweep_states_first(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.first) : nullptr;
+}
+const double* lobatto_sweep_states_t(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.t) : nullptr;
+}
+const double* lobatto_sweep_states_q(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.q) : nullptr;
+}
+const double* lobatto_sweep_states_p(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.p) : nullptr;
+}
 
 }  // extern "C"

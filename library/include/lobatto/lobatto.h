@@ -130,6 +130,12 @@ LOBATTO_C_API const char* lobatto_sweep_status_text(const lobatto_sweep* sweep, 
 LOBATTO_C_API const double* lobatto_sweep_t(const lobatto_sweep* sweep);
 LOBATTO_C_API const double* lobatto_sweep_q(const lobatto_sweep* sweep);
 LOBATTO_C_API const double* lobatto_sweep_p(const lobatto_sweep* sweep);
+/* Where the settings say `every`: of trajectory i the start, each such state and the last one are rows first[i], ...,
+ * first[i + 1] - 1 of these. Else NULL. */
+LOBATTO_C_API const size_t* lobatto_sweep_states_first(const lobatto_sweep* sweep); /* count + 1 numbers */
+LOBATTO_C_API const double* lobatto_sweep_states_t(const lobatto_sweep* sweep);
+LOBATTO_C_API const double* lobatto_sweep_states_q(const lobatto_sweep* sweep);
+LOBATTO_C_API const double* lobatto_sweep_states_p(const lobatto_sweep* sweep);
 
 /* --- What is known of a scene ------------------------------------------------------------------------------------ */
 

@@ -235,6 +235,7 @@ struct RunOptions : Settings {
     /// About ten times a second, from 0 to 1; false ends the run, and what was computed is returned.
     std::function<bool(double)> progress;
 };
+/// To the end of the scene, judged as the command line judges it.
 LOBATTO_API Trajectory run(const Scene& scene, const RunOptions& options = {});
 
 // --- Sweeps ----------------------------------------------------------------------------------------------------------
@@ -253,7 +254,14 @@ struct SweepOptions : Settings {
     std::function<bool(double)> progress;
 };
 
+/// What becomes of trajectories. `states` is empty unless the settings say `every`.
 struct Sweep {
+    /// Of trajectory i the start, each `every`-th state and the last one are rows first[i], ..., first[i + 1] - 1.
+    struct States {
+        std::vector<std::size_t> first;    ///< count + 1 numbers
+        std::vector<double> t, q, p;       ///< rows, rows x n, rows x n
+        std::vector<double> energy_error;  ///< as below
+    };
     std::vector<Variable> coordinates;
     std::vector<std::string> kept_names;
     std::size_t count = 0;              ///< trajectories; fewer than asked for where `progress` ended it
@@ -265,8 +273,10 @@ struct Sweep {
     std::vector<double> error;          ///< measured, relative to the amplitude; empty when not asked for
     std::vector<double> kept;           ///< count x kept_names
     std::vector<std::string> statuses;  ///< in words, by number
+    States states;
     bool interrupted = false;
 };
+/// All of them at once, on all processors.
 LOBATTO_API Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options = {});
 
 // --- Choosing --------------------------------------------------------------------------------------------------------
