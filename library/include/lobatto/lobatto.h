@@ -5,6 +5,8 @@
  *     lobatto_integrator *motion = lobatto_integrator_new(scene, NULL);
  *     if (lobatto_integrator_advance(motion, 100) != 0) puts(lobatto_integrator_message(motion));
  *
+ * The examples further down go on from these lines; tests compile and run them.
+ *
  * Handles are opaque. A function that makes one never returns NULL unless memory is out: what went wrong is its status,
  * and in words its message. A handle that failed may be asked for these two and be freed; what is asked of it else is
  * 0 or NULL. Handles may be freed in any order. Strings and arrays belong to their handle, until it changes or is
@@ -70,7 +72,13 @@ typedef struct lobatto_settings {
 
 typedef struct lobatto_integrator lobatto_integrator;
 
-/* Compiles the kernel of the scene, or finds it in the cache. The motion is at the scene's start. */
+/* Compiles the kernel of the scene, or finds it in the cache. The motion is at the scene's start.
+ *
+ *     while (lobatto_integrator_t(motion) < 10)
+ *         if (lobatto_integrator_advance(motion, 1) != 0) break;
+ *     printf("q = %g, %s\n", lobatto_integrator_q(motion)[0], lobatto_integrator_message(motion));
+ *     lobatto_integrator_free(motion);
+ */
 LOBATTO_C_API lobatto_integrator* lobatto_integrator_new(const lobatto_scene* scene, const lobatto_settings* settings);
 /* A second motion from where this one is. */
 LOBATTO_C_API lobatto_integrator* lobatto_integrator_copy(const lobatto_integrator* integrator);
@@ -100,7 +108,16 @@ LOBATTO_C_API double lobatto_integrator_energy(const lobatto_integrator* integra
 
 typedef struct lobatto_trajectory lobatto_trajectory;
 
-/* A run that fails on its way keeps what was computed. `measure`: whether its error is measured by a companion. */
+/* A run that fails on its way keeps what was computed. `measure`: whether its error is measured by a companion.
+ *
+ *     lobatto_settings settings = {0};
+ *     settings.points = 6;
+ *     settings.until = "3";
+ *     lobatto_trajectory *run = lobatto_run(scene, &settings, 1);
+ *     if (lobatto_trajectory_status(run) != 0) puts(lobatto_trajectory_message(run));
+ *     printf("%d states, error %.1e\n", (int)lobatto_trajectory_count(run), lobatto_trajectory_error(run));
+ *     lobatto_trajectory_free(run);
+ */
 LOBATTO_C_API lobatto_trajectory* lobatto_run(const lobatto_scene* scene, const lobatto_settings* settings,
                                               int measure);
 LOBATTO_C_API void lobatto_trajectory_free(lobatto_trajectory* trajectory);
@@ -117,7 +134,15 @@ LOBATTO_C_API double lobatto_trajectory_error(const lobatto_trajectory* trajecto
 
 typedef struct lobatto_sweep lobatto_sweep;
 
-/* `columns` arrays of `count` numbers; names[c] is a position q, a velocity q' or momentum p_q, or a parameter. */
+/* `columns` arrays of `count` numbers; names[c] is a position q, a velocity q' or momentum p_q, or a parameter.
+ *
+ *     const double q[] = {0.5, 1, 1.5}, omega[] = {6, 6, 7};
+ *     const char *const names[] = {"q", "omega"};
+ *     const double *const values[] = {q, omega};
+ *     lobatto_sweep *sweep = lobatto_sweep_run(scene, NULL, 3, 2, names, values);
+ *     for (size_t i = 0; i < lobatto_sweep_count(sweep); ++i) printf("q = %g\n", lobatto_sweep_q(sweep)[i]);
+ *     lobatto_sweep_free(sweep);
+ */
 LOBATTO_C_API lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_settings* settings,
                                                size_t count, size_t columns, const char* const* names,
                                                const double* const* values);
@@ -145,7 +170,12 @@ typedef struct lobatto_text lobatto_text;
 LOBATTO_C_API lobatto_text* lobatto_derivation(const lobatto_scene* scene, const lobatto_settings* settings);
 LOBATTO_C_API lobatto_text* lobatto_derivation_latex(const lobatto_scene* scene, const lobatto_settings* settings);
 LOBATTO_C_API lobatto_text* lobatto_derivation_json(const lobatto_scene* scene, const lobatto_settings* settings);
-/* What was found in it, and what its kernel leaves out. */
+/* What was found in it, and what its kernel leaves out.
+ *
+ *     lobatto_text *found = lobatto_check_json(scene, NULL);
+ *     puts(lobatto_text_status(found) == 0 ? lobatto_text_content(found) : lobatto_text_message(found));
+ *     lobatto_text_free(found);
+ */
 LOBATTO_C_API lobatto_text* lobatto_check_json(const lobatto_scene* scene, const lobatto_settings* settings);
 /* Which steps keep linear motion bounded, and what this step does. */
 LOBATTO_C_API lobatto_text* lobatto_stability_json(const lobatto_scene* scene, const lobatto_settings* settings);
@@ -163,6 +193,11 @@ LOBATTO_C_API const char* lobatto_text_file(const lobatto_text* text); /* "arm.h
 typedef struct lobatto_choice lobatto_choice;
 
 /* The cheapest method and step that keep an error to the end, relative to the amplitude. `budget`: seconds to search.
+ *
+ *     lobatto_choice *choice = lobatto_tune(scene, 1e-6, NULL, 2);
+ *     lobatto_integrator *chosen = lobatto_integrator_new(scene, lobatto_choice_settings(choice));
+ *     lobatto_choice_free(choice);
+ *     lobatto_integrator_free(chosen);
  */
 LOBATTO_C_API lobatto_choice* lobatto_tune(const lobatto_scene* scene, double error, const lobatto_settings* settings,
                                            double budget);
@@ -182,7 +217,13 @@ LOBATTO_C_API int lobatto_choice_complete(const lobatto_choice* choice);
 
 typedef struct lobatto_proof lobatto_proof;
 
-/* Everything that can be checked of a scene: claims, and whether each holds. Status 0 says that all were looked at. */
+/* Everything that can be checked of a scene: claims, and whether each holds. Status 0 says that all were looked at.
+ *
+ *     lobatto_proof *proof = lobatto_verify(scene, NULL);
+ *     for (size_t i = 0; i < lobatto_proof_count(proof); ++i)
+ *         if (!lobatto_proof_holds(proof, i)) puts(lobatto_proof_claim(proof, i));
+ *     lobatto_proof_free(proof);
+ */
 LOBATTO_C_API lobatto_proof* lobatto_verify(const lobatto_scene* scene, const lobatto_settings* settings);
 LOBATTO_C_API void lobatto_proof_free(lobatto_proof* proof);
 LOBATTO_C_API int lobatto_proof_status(const lobatto_proof* proof);

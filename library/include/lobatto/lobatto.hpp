@@ -6,6 +6,8 @@
 ///     lob::Stepper stepper(lob::compile(scene));
 ///     stepper.advance(100);
 ///
+/// The examples further down go on from these lines; tests compile and run them.
+///
 /// Units are those of the scene. Arrays of several states are row-major: state i, coordinate k is [i * n + k].
 /// Every function throws Error when it cannot do what it promises; the texts are those of the command line.
 /// Reading and deriving scenes takes a lock of the whole process; objects of different threads are free otherwise. One
@@ -80,6 +82,11 @@ struct Settings {
 };
 
 /// A mechanical system, read and checked. Copies share it.
+///
+///     for (const lob::Variable& coordinate : scene.coordinates())
+///         std::printf("%s = %g %s\n", coordinate.name.c_str(), coordinate.value, coordinate.unit.c_str());
+///     std::ofstream("pendulum.hpp") << scene.emit().second;
+///
 class LOBATTO_API Scene {
 public:
     explicit Scene(const std::string& path);
@@ -151,6 +158,15 @@ struct EventHit {
 };
 
 /// A trajectory that the caller takes forward: for control loops, games, couplings.
+///
+///     const double q = 1, p = 0;
+///     stepper.start(0, &q, &p);
+///     while (stepper.t() < 10) {
+///         stepper.set("omega", stepper.q()[0] > 0 ? 6 : 6.5);
+///         stepper.step();
+///     }
+///     const auto [position, velocity] = stepper.at(stepper.t() - stepper.step_size() / 2);
+///
 class LOBATTO_API Stepper {
 public:
     explicit Stepper(const Kernel& kernel);  ///< at the start of the scene
@@ -236,6 +252,13 @@ struct RunOptions : Settings {
     std::function<bool(double)> progress;
 };
 /// To the end of the scene, judged as the command line judges it.
+///
+///     lob::RunOptions options;
+///     options.points = 6;
+///     options.until = "3";
+///     const lob::Trajectory run = lob::run(scene, options);
+///     std::printf("q = %g after %g, error %.1e\n", run.q.back(), run.t.back(), run.error.value());
+///
 LOBATTO_API Trajectory run(const Scene& scene, const RunOptions& options = {});
 
 // --- Sweeps ----------------------------------------------------------------------------------------------------------
@@ -277,6 +300,18 @@ struct Sweep {
     bool interrupted = false;
 };
 /// All of them at once, on all processors.
+///
+///     lob::Starts starts;
+///     starts.count = 3;
+///     starts.columns["q"] = {0.5, 1, 1.5};
+///     starts.columns["omega"] = {6, 6, 7};
+///     lob::SweepOptions options;
+///     options.until = "3";
+///     options.every = 20;
+///     const lob::Sweep sweep = lob::sweep(scene, starts, options);
+///     for (std::size_t row = sweep.states.first[1]; row < sweep.states.first[2]; ++row)
+///         std::printf("%g: q = %g\n", sweep.states.t[row], sweep.states.q[row]);
+///
 LOBATTO_API Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options = {});
 
 // --- Choosing --------------------------------------------------------------------------------------------------------
@@ -291,6 +326,10 @@ struct Choice {
 };
 /// The cheapest member of the family, and its step, that keep an error to the end. `budget`: seconds to search.
 /// `progress`: told what is being done; false ends the search, which then throws ComputationError.
+///
+///     const lob::Choice choice = lob::tune(scene, 1e-6, {}, 2);
+///     lob::Stepper chosen(lob::compile(scene, choice.settings));
+///
 LOBATTO_API Choice tune(const Scene& scene, double error, const Settings& settings = {}, double budget = 20,
                         const std::function<bool(const std::string&)>& progress = {});
 
@@ -302,6 +341,10 @@ struct Claim {
     std::string meaning;  ///< of a failure
 };
 /// Everything that can be checked of a scene, from the quadrature to the running kernel.
+///
+///     for (const lob::Claim& claim : lob::verify(scene))
+///         if (!claim.holds) std::printf("%s: %s\n", claim.claim.c_str(), claim.meaning.c_str());
+///
 LOBATTO_API std::vector<Claim> verify(const Scene& scene, const Settings& settings = {});
 
 }  // namespace lobatto::api
