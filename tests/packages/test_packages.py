@@ -71,3 +71,33 @@ def test_pip_installs_the_module_from_the_tree_without_network(tmp_path):
     assert where.startswith(str(environment)) and where.endswith(succeed(PROGRAM, "--version").removeprefix("lobatto "))
     succeed(python, "-m", "pip", "uninstall", "--yes", "lobatto", env=outside)
     assert not list(environment.glob("lib/python*/site-packages/lobatto*"))
+
+
+def test_a_debian_package_holds_what_it_says_and_runs_where_it_is_unpacked(tmp_path):
+    succeed("cpack", "-G", "DEB", "-B", tmp_path, cwd=BUILD)
+    (package,) = tmp_path.glob("lobatto_*.deb")
+    fields = succeed("dpkg-deb", "--field", package)
+    for wanted in ("Package: lobatto", "Depends: g++ | clang", "libginac", "libcln", "Recommends: gnuplot-nox, python3-numpy"):
+        assert wanted in fields
+    listed = [line.split(maxsplit=5)[5] for line in succeed("dpkg-deb", "--contents", package).splitlines()]
+    assert all(name == "./" or name.startswith("./usr/") for name in listed)
+    # What it does to a system beside its files: the cache of the dynamic linker.
+    succeed("dpkg-deb", "--control", package, tmp_path / "control")
+    scripts = {path.name: path.read_text() for path in (tmp_path / "control").iterdir()}
+    assert set(scripts) == {"control", "md5sums", "postinst", "postrm"}
+    assert all("ldconfig" in scripts[name] and "rm " not in scripts[name] for name in ("postinst", "postrm"))
+
+    root = tmp_path / "root"
+    succeed("dpkg-deb", "-x", package, root)
+    usr = root / "usr"
+    assert (usr / "share/man/man1/lobatto-run.1").exists()
+    assert (usr / "share/bash-completion/completions/lobatto").exists()
+    succeed(usr / "bin/lobatto", "run", usr / "share/lobatto/scenes/pendulum.toml", "--until", "1", "--quiet", "-o",
+            tmp_path / "run.csv")
+    assert len((tmp_path / "run.csv").read_text().splitlines()) > 20
+    succeed("gcc", "-std=c99", usr / "share/lobatto/examples/cmake/swing.c", "-I", usr / "include", "-L", usr / "lib",
+            "-llobatto", f"-Wl,-rpath,{usr}/lib", "-o", tmp_path / "swing")
+    assert "1000 of 1000" in succeed(tmp_path / "swing", usr / "share/lobatto/examples/cmake/arm.toml")
+    version = succeed(sys.executable, "-c", "import lobatto; print(lobatto.__version__)",
+                      env={**os.environ, "PYTHONPATH": str(usr / "lib/python3/dist-packages")})
+    assert version == succeed(PROGRAM, "--version").removeprefix("lobatto ")
