@@ -67,7 +67,8 @@ def test_pip_installs_the_module_from_the_tree_without_network(tmp_path):
     succeed(python, "-m", "pip", "install", "--no-index", "--no-cache-dir", ROOT, env=outside, cwd=tmp_path)
     said = succeed(python, ROOT / "examples" / "python" / "first_pendulum.py", "picture.png", env=outside, cwd=tmp_path)
     assert "measured error" in said and (tmp_path / "picture.png").stat().st_size > 5000
-    where = succeed(python, "-c", "import lobatto; print(lobatto.__file__, lobatto.__version__)", env=outside, cwd=tmp_path)
+    where = succeed(python, "-c", "import lobatto; print(lobatto.__file__, lobatto.__version__)", env=outside,
+                    cwd=tmp_path)
     assert where.startswith(str(environment)) and where.endswith(succeed(PROGRAM, "--version").removeprefix("lobatto "))
     succeed(python, "-m", "pip", "uninstall", "--yes", "lobatto", env=outside)
     assert not list(environment.glob("lib/python*/site-packages/lobatto*"))
@@ -77,7 +78,8 @@ def test_a_debian_package_holds_what_it_says_and_runs_where_it_is_unpacked(tmp_p
     succeed("cpack", "-G", "DEB", "-B", tmp_path, cwd=BUILD)
     (package,) = tmp_path.glob("lobatto_*.deb")
     fields = succeed("dpkg-deb", "--field", package)
-    for wanted in ("Package: lobatto", "Depends: g++ | clang", "libginac", "libcln", "Recommends: gnuplot-nox, python3-numpy"):
+    for wanted in ("Package: lobatto", "Depends: g++ | clang", "libginac", "libcln",
+                   "Recommends: gnuplot-nox, python3-numpy"):
         assert wanted in fields
     listed = [line.split(maxsplit=5)[5] for line in succeed("dpkg-deb", "--contents", package).splitlines()]
     assert all(name == "./" or name.startswith("./usr/") for name in listed)
