@@ -12,9 +12,24 @@ struct lobatto_integrator : Handle<api::Stepper> {
     int with_stepper(Work&& work) noexcept {
         return value ? attempt([&] { return work(*value); }) : status;
     }
+    std::vector<api::EventHit> hits;  // taken last, and as C sees them
+    std::vector<lobatto_event> events;
+    std::vector<double> multipliers;
 };
-struct lobatto_trajectory : Handle<api::Trajectory> {};
+struct lobatto_trajectory : Handle<api::Trajectory> {
+    std::vector<lobatto_event> events;
+};
 struct lobatto_sweep : Handle<api::Sweep> {};
+
+namespace {
+
+std::vector<lobatto_event> events_of(const std::vector<api::EventHit>& hits) {
+    std::vector<lobatto_event> events;
+    for (const api::EventHit& hit : hits) events.push_back({hit.kind, hit.t, hit.q.data(), hit.p.data()});
+    return events;
+}
+
+}  // namespace
 
 extern "C" {
 
@@ -134,6 +149,35 @@ int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, d
         std::copy(state.second.begin(), state.second.end(), velocity);
     });
 }
+int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent) {
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        const std::vector<double> values = stepper.tangent();
+        std::copy(values.begin(), values.end(), tangent);
+    });
+}
+int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value) {
+    return integrator->with_stepper(
+        [&](api::Stepper& stepper) { *value = stepper.parameter(parameter == nullptr ? "" : parameter); });
+}
+int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto_event** events, size_t* count) {
+    *events = nullptr;
+    *count = 0;
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        integrator->hits = stepper.take_events();
+        integrator->events = events_of(integrator->hits);
+        *events = api::data(integrator->events);
+        *count = integrator->events.size();
+    });
+}
+int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers, size_t* count) {
+    *multipliers = nullptr;
+    *count = 0;
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        integrator->multipliers = stepper.multipliers();
+        *multipliers = api::data(integrator->multipliers);
+        *count = integrator->multipliers.size();
+    });
+}
 size_t lobatto_integrator_coordinates(const lobatto_integrator* integrator) {
     return integrator->value ? integrator->value->coordinates() : 0;
 }
@@ -162,8 +206,10 @@ lobatto_trajectory* lobatto_run(const lobatto_scene* scene, const lobatto_settin
             trajectory.value = api::run(api::scene_of(scene), options);
         } catch (const api::RunFailure& failure) {
             trajectory.value = failure.trajectory();
+            trajectory.events = events_of(trajectory.value->events);
             throw;
         }
+        trajectory.events = events_of(trajectory.value->events);
         return trajectory.value->stopped_by.empty();
     });
 }
@@ -193,6 +239,16 @@ const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory) {
 }
 double lobatto_trajectory_error(const lobatto_trajectory* trajectory) {
     return trajectory->value ? trajectory->value->error.value_or(std::nan("")) : std::nan("");
+}
+const lobatto_event* lobatto_trajectory_events(const lobatto_trajectory* trajectory, size_t* count) {
+    *count = trajectory->events.size();
+    return api::data(trajectory->events);
+}
+size_t lobatto_trajectory_warnings(const lobatto_trajectory* trajectory) {
+    return trajectory->value ? trajectory->value->warnings.size() : 0;
+}
+const char* lobatto_trajectory_warning(const lobatto_trajectory* trajectory, size_t index) {
+    return api::text(trajectory->value ? api::element(&trajectory->value->warnings, index) : nullptr);
 }
 
 lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_settings* settings, size_t count,

@@ -1,22 +1,32 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// lobatto.h, called by a program of C99 (known.c) that has nothing but the header and the shared object.
+// lobatto.h, called by programs of C99 that have nothing but the header and the shared object.
 #include <doctest/doctest.h>
 
 #include "tests/support.hpp"
 
 using namespace lobatto;
 
-TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what is refused says why") {
+namespace {
+
+// Compiles a program of this folder, and runs it with the paths of scenes.
+test::Finished run_c(const std::string& source, const std::vector<std::string>& scenes) {
     const test::TemporaryFolder folder;
-    const std::string program = folder / "known", libraries = LOBATTO_BUILD_DIR "/library";
+    const std::string program = folder / "program", libraries = LOBATTO_BUILD_DIR "/library";
     const test::Finished compiled =
         test::run({"gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-I",
-                   LOBATTO_SOURCE_DIR "/library/include", LOBATTO_SOURCE_DIR "/tests/library/known.c", "-o", program,
-                   "-L" + libraries, "-llobatto", "-Wl,-rpath," + libraries});
+                   LOBATTO_SOURCE_DIR "/library/include", LOBATTO_SOURCE_DIR "/tests/library/" + source, "-o", program,
+                   "-L" + libraries, "-llobatto", "-lm", "-Wl,-rpath," + libraries});
     CAPTURE(compiled.err);
     REQUIRE(compiled.exit_code == 0);
-    const test::Finished ran = test::run(
-        {program, LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", LOBATTO_SOURCE_DIR "/scenes/rod_pendulum.toml"});
+    std::vector<std::string> command = {program};
+    for (const std::string& scene : scenes) command.push_back(LOBATTO_SOURCE_DIR "/scenes/" + scene + ".toml");
+    return test::run(command);
+}
+
+}  // namespace
+
+TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what is refused says why") {
+    const test::Finished ran = run_c("known.c", {"pendulum", "rod_pendulum"});
     CAPTURE(ran.out);
     REQUIRE(ran.exit_code == 0);
     for (const char* line : {
@@ -37,4 +47,14 @@ TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what
              "stability knows no constraints yet; run, sweep, emit, derive, check and verify do",
          })
         CHECK_MESSAGE(ran.out.find(line) != std::string::npos, line);
+}
+
+TEST_CASE("from C99 a motion tells what it met, what holds it, and what a step does") {
+    const test::Finished ran = run_c("motion.c", {"bouncing_ball", "rod_pendulum", "pendulum"});
+    CAPTURE(ran.out);
+    REQUIRE(ran.exit_code == 0);
+    CHECK(ran.out.starts_with("met: "));
+    CHECK(ran.out.find("unknown: status 2, unknown parameter 'omga'; declared: m, omega. Did you mean 'omega'?\n") !=
+          std::string::npos);
+    CHECK(ran.out.find("warning: the error is ") != std::string::npos);
 }

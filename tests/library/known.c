@@ -47,17 +47,17 @@ static void show_texts(const lobatto_scene* scene) {
 static void choose(const lobatto_scene* scene) {
     const char* const set[] = {"omega=6", NULL};
     lobatto_settings settings = {0};
-    settings.until = "10";
+    settings.until = "2";
     settings.set = set;
-    lobatto_choice* choice = lobatto_tune(scene, 1e-8, &settings, 3);
+    lobatto_choice* choice = lobatto_tune(scene, 1e-4, &settings, 10);
     check(lobatto_choice_status(choice) == 0, lobatto_choice_message(choice));
     const lobatto_settings* chosen = lobatto_choice_settings(choice);
     check(chosen != NULL && strcmp(chosen->set[0], "omega=6") == 0 && chosen->set[1] == NULL, "what was set stays set");
-    check(strcmp(chosen->until, "10") == 0 && lobatto_choice_step(choice) == atof(chosen->step), "step and end");
+    check(strcmp(chosen->until, "2") == 0 && lobatto_choice_step(choice) == atof(chosen->step), "step and end");
     check((chosen->points != 0) + (chosen->stages != 0) + (chosen->splitting != 0) == 1, "one method");
-    check(lobatto_choice_predicted_error(choice) <= 1e-8 && lobatto_choice_seconds(choice) > 0, "error and cost");
+    check(lobatto_choice_predicted_error(choice) <= 1e-4 && lobatto_choice_seconds(choice) > 0, "error and cost");
     lobatto_trajectory* run = lobatto_run(scene, chosen, 1);
-    check(lobatto_trajectory_status(run) == 0 && lobatto_trajectory_error(run) < 3e-8, "the promise is kept");
+    check(lobatto_trajectory_status(run) == 0 && lobatto_trajectory_error(run) < 3e-4, "the promise is kept");
     printf("chosen: %s\n", lobatto_choice_method(choice));
     lobatto_trajectory_free(run);
     lobatto_choice_free(choice);

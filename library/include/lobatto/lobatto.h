@@ -68,6 +68,13 @@ typedef struct lobatto_settings {
     const char* const* set;           /* "name=formula" each; the last is NULL */
 } lobatto_settings;
 
+/* A crossing, a stop or an impact that was met. */
+typedef struct lobatto_event {
+    int kind; /* number of lobatto_scene_event_text */
+    double t;
+    const double *q, *p; /* n each */
+} lobatto_event;
+
 /* --- One trajectory, step by step -------------------------------------------------------------------------------- */
 
 typedef struct lobatto_integrator lobatto_integrator;
@@ -96,6 +103,15 @@ LOBATTO_C_API int lobatto_integrator_set(lobatto_integrator* integrator, const c
 LOBATTO_C_API int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity); /* n */
 /* Position and velocity at a time inside the last step, n each. */
 LOBATTO_C_API int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, double* velocity);
+/* One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The motion stays where it is. */
+LOBATTO_C_API int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent);
+LOBATTO_C_API int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value);
+/* What was met since the last call: *count events, until the next call. */
+LOBATTO_C_API int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto_event** events,
+                                                 size_t* count);
+/* Of the constraints, here: *count numbers, until the next call. */
+LOBATTO_C_API int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers,
+                                                 size_t* count);
 
 LOBATTO_C_API size_t lobatto_integrator_coordinates(const lobatto_integrator* integrator);
 LOBATTO_C_API double lobatto_integrator_step_size(const lobatto_integrator* integrator);
@@ -129,6 +145,9 @@ LOBATTO_C_API const double* lobatto_trajectory_q(const lobatto_trajectory* traje
 LOBATTO_C_API const double* lobatto_trajectory_p(const lobatto_trajectory* trajectory);
 LOBATTO_C_API const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory); /* NULL: none is kept */
 LOBATTO_C_API double lobatto_trajectory_error(const lobatto_trajectory* trajectory); /* relative, at the end; NaN */
+LOBATTO_C_API const lobatto_event* lobatto_trajectory_events(const lobatto_trajectory* trajectory, size_t* count);
+LOBATTO_C_API size_t lobatto_trajectory_warnings(const lobatto_trajectory* trajectory);
+LOBATTO_C_API const char* lobatto_trajectory_warning(const lobatto_trajectory* trajectory, size_t index);
 
 /* --- Sweeps ------------------------------------------------------------------------------------------------------ */
 
@@ -194,7 +213,10 @@ typedef struct lobatto_choice lobatto_choice;
 
 /* The cheapest method and step that keep an error to the end, relative to the amplitude. `budget`: seconds to search.
  *
- *     lobatto_choice *choice = lobatto_tune(scene, 1e-6, NULL, 2);
+ *     lobatto_settings settings = {0};
+ *     settings.until = "2";
+ *     lobatto_choice *choice = lobatto_tune(scene, 1e-4, &settings, 10);
+ *     if (lobatto_choice_status(choice) != 0) puts(lobatto_choice_message(choice));
  *     lobatto_integrator *chosen = lobatto_integrator_new(scene, lobatto_choice_settings(choice));
  *     lobatto_choice_free(choice);
  *     lobatto_integrator_free(chosen);

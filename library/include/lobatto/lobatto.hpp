@@ -327,7 +327,9 @@ struct Choice {
 /// The cheapest member of the family, and its step, that keep an error to the end. `budget`: seconds to search.
 /// `progress`: told what is being done; false ends the search, which then throws ComputationError.
 ///
-///     const lob::Choice choice = lob::tune(scene, 1e-6, {}, 2);
+///     lob::Settings settings;
+///     settings.until = "2";
+///     const lob::Choice choice = lob::tune(scene, 1e-4, settings, 10);
 ///     lob::Stepper chosen(lob::compile(scene, choice.settings));
 ///
 LOBATTO_API Choice tune(const Scene& scene, double error, const Settings& settings = {}, double budget = 20,
