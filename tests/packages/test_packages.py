@@ -78,8 +78,8 @@ def test_a_debian_package_holds_what_it_says_and_runs_where_it_is_unpacked(tmp_p
     succeed("cpack", "-G", "DEB", "-B", tmp_path, cwd=BUILD)
     (package,) = tmp_path.glob("lobatto_*.deb")
     fields = succeed("dpkg-deb", "--field", package)
-    for wanted in ("Package: lobatto", "Depends: g++ | clang", "libginac", "libcln",
-                   "Recommends: gnuplot-nox, python3-numpy"):
+    for wanted in ("Package: lobatto", "Depends: g++ | clang", "libginac", "libcln", "libopenmpi",
+                   "Recommends: gnuplot-nox, python3-numpy, openmpi-bin"):
         assert wanted in fields
     listed = [line.split(maxsplit=5)[5] for line in succeed("dpkg-deb", "--contents", package).splitlines()]
     assert all(name == "./" or name.startswith("./usr/") for name in listed)
@@ -97,6 +97,7 @@ def test_a_debian_package_holds_what_it_says_and_runs_where_it_is_unpacked(tmp_p
     succeed(usr / "bin/lobatto", "run", usr / "share/lobatto/scenes/pendulum.toml", "--until", "1", "--quiet", "-o",
             tmp_path / "run.csv")
     assert len((tmp_path / "run.csv").read_text().splitlines()) > 20
+    assert succeed(usr / "bin/lobatto-mpi", "--version") == succeed(PROGRAM, "--version")
     succeed("gcc", "-std=c99", usr / "share/lobatto/examples/cmake/swing.c", "-I", usr / "include", "-L", usr / "lib",
             "-llobatto", f"-Wl,-rpath,{usr}/lib", "-o", tmp_path / "swing")
     assert "1000 of 1000" in succeed(tmp_path / "swing", usr / "share/lobatto/examples/cmake/arm.toml")
