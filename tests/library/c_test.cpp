@@ -25,7 +25,8 @@ test::Finished run_c(const std::string& source, const std::vector<std::string>& 
 
 }  // namespace
 
-TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what is refused says why") {
+TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what is refused says why" *
+          doctest::test_suite("slow")) {
     const test::Finished ran = run_c("known.c", {"pendulum", "rod_pendulum"});
     CAPTURE(ran.out);
     REQUIRE(ran.exit_code == 0);
@@ -49,7 +50,7 @@ TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what
         CHECK_MESSAGE(ran.out.find(line) != std::string::npos, line);
 }
 
-TEST_CASE("from C99 a motion tells what it met, what holds it, and what a step does") {
+TEST_CASE("from C99 a motion tells what it met, what holds it, and what a step does" * doctest::test_suite("slow")) {
     const test::Finished ran = run_c("motion.c", {"bouncing_ball", "rod_pendulum", "pendulum"});
     CAPTURE(ran.out);
     REQUIRE(ran.exit_code == 0);

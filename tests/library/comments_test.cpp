@@ -54,7 +54,8 @@ const std::string include = "-I" LOBATTO_SOURCE_DIR "/library/include";
 
 }  // namespace
 
-TEST_CASE("the examples in the comments of lobatto.hpp compile without a warning, and do what they say") {
+TEST_CASE("the examples in the comments of lobatto.hpp compile without a warning, and do what they say" *
+          doctest::test_suite("slow")) {
     const std::vector<std::string> examples = examples_of("lobatto.hpp");
     REQUIRE(examples.size() == 7);
     const std::string said =
@@ -66,7 +67,8 @@ TEST_CASE("the examples in the comments of lobatto.hpp compile without a warning
     CHECK(said.ends_with("-- 4\n-- 5\n-- 6\n"));                 // all claims hold
 }
 
-TEST_CASE("the examples in the comments of lobatto.h compile as C99 without a warning, and do what they say") {
+TEST_CASE("the examples in the comments of lobatto.h compile as C99 without a warning, and do what they say" *
+          doctest::test_suite("slow")) {
     const std::vector<std::string> examples = examples_of("lobatto.h");
     REQUIRE(examples.size() == 7);
     const std::string said = output_of("#include <lobatto/lobatto.h>\n#include <stdio.h>\n", examples,
