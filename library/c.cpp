@@ -1,124 +1,32 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// lobatto.h on lobatto.hpp: handles that remember what went wrong.
+// lobatto.h on lobatto.hpp: scenes, trajectories step by step, runs and sweeps.
 #include <cmath>
-#include <new>
-#include <utility>
 
-#include "library/include/lobatto/lobatto.h"
-#include "library/include/lobatto/lobatto.hpp"
-
-namespace lobatto::api {
-
-namespace {
-
-// What each handle has.
-template <class Value>
-struct Handle {
-    std::optional<Value> value;
-    int status = 0;
-    std::string message;
-
-    // Runs the work, whose exceptions become status and message. It may return whether the motion goes on.
-    template <class Work>
-    int attempt(Work&& work) noexcept {
-        status = 0;
-        try {
-            message.clear();
-            if constexpr (std::is_same_v<decltype(work()), bool>) {
-                if (!work()) status = stopped;
-            } else {
-                work();
-            }
-        } catch (const Error& error) {
-            fail(error.exit_code(), error.what());
-        } catch (const std::exception& error) {
-            fail(4, error.what());
-        } catch (...) {
-            fail(4, "unknown error");
-        }
-        return status;
-    }
-
-    static constexpr int stopped = 1;
-
-private:
-    void fail(int code, const char* text) noexcept {
-        status = code;
-        try {
-            message = text;
-        } catch (...) {  // no memory: the status says it
-        }
-    }
-};
-
-Settings settings_of(const lobatto_settings* given) {
-    Settings settings;
-    if (given == nullptr) return settings;
-    const auto put = [](std::string& text, const char* word) {
-        if (word != nullptr) text = word;
-    };
-    if (given->points != 0) settings.points = given->points;
-    if (given->stages != 0) settings.stages = given->stages;
-    if (given->splitting != 0) settings.splitting = given->splitting;
-    if (given->tolerance != 0) settings.tolerance = given->tolerance;
-    put(settings.arithmetic, given->arithmetic);
-    put(settings.numbers, given->numbers);
-    put(settings.step, given->step);
-    put(settings.until, given->until);
-    if (given->every != 0) settings.every = given->every;
-    for (const char* const* set = given->set; set != nullptr && *set != nullptr; ++set) {
-        const std::string argument = *set;
-        const std::size_t equals = argument.find('=');
-        if (equals == std::string::npos) throw InputError("set: expected name=value, not '" + argument + "'");
-        settings.set.emplace_back(argument.substr(0, equals), argument.substr(equals + 1));
-    }
-    return settings;
-}
-
-const char* text(const std::string* string) {
-    return string == nullptr ? nullptr : string->c_str();
-}
-
-// Element `index` of a list of what may have failed.
-template <class List>
-const typename List::value_type* element(const List* list, std::size_t index) {
-    return list != nullptr && index < list->size() ? &(*list)[index] : nullptr;
-}
-
-const double* data(const std::vector<double>& values) {
-    return values.empty() ? nullptr : values.data();
-}
-
-}  // namespace
-
-}  // namespace lobatto::api
+#include "library/handles.hpp"
 
 using lobatto::api::Handle;
 namespace api = lobatto::api;
 
-struct lobatto_scene : Handle<api::Scene> {
-    const api::Variable* coordinate(std::size_t index) const {
-        return value ? api::element(&value->coordinates(), index) : nullptr;
-    }
-    const api::Variable* parameter(std::size_t index) const {
-        return value ? api::element(&value->parameters(), index) : nullptr;
-    }
-};
 struct lobatto_integrator : Handle<api::Stepper> {
     template <class Work>
     int with_stepper(Work&& work) noexcept {
         return value ? attempt([&] { return work(*value); }) : status;
     }
+    std::vector<api::EventHit> hits;  // taken last, and as C sees them
+    std::vector<lobatto_event> events;
+    std::vector<double> multipliers;
 };
-struct lobatto_trajectory : Handle<api::Trajectory> {};
+struct lobatto_trajectory : Handle<api::Trajectory> {
+    std::vector<lobatto_event> events;
+};
 struct lobatto_sweep : Handle<api::Sweep> {};
 
 namespace {
 
-const api::Scene& scene_of(const lobatto_scene* scene) {
-    if (scene == nullptr) throw api::InputError("there is no scene: NULL was given");
-    if (!scene->value) throw api::InputError("the scene was not read: " + scene->message);
-    return *scene->value;
+std::vector<lobatto_event> events_of(const std::vector<api::EventHit>& hits) {
+    std::vector<lobatto_event> events;
+    for (const api::EventHit& hit : hits) events.push_back({hit.kind, hit.t, hit.q.data(), hit.p.data()});
+    return events;
 }
 
 }  // namespace
@@ -131,17 +39,13 @@ const char* lobatto_version(void) {
 }
 
 lobatto_scene* lobatto_scene_read(const char* path) {
-    auto* const scene = new (std::nothrow) lobatto_scene;
-    if (scene != nullptr) scene->attempt([&] { scene->value.emplace(std::string(path == nullptr ? "" : path)); });
-    return scene;
+    return api::made<lobatto_scene>(
+        [&](lobatto_scene& scene) { scene.value.emplace(std::string(path == nullptr ? "" : path)); });
 }
 lobatto_scene* lobatto_scene_from_text(const char* text, const char* path) {
-    auto* const scene = new (std::nothrow) lobatto_scene;
-    if (scene != nullptr)
-        scene->attempt([&] {
-            scene->value = api::Scene::from_text(text == nullptr ? "" : text, path == nullptr ? "scene.toml" : path);
-        });
-    return scene;
+    return api::made<lobatto_scene>([&](lobatto_scene& scene) {
+        scene.value = api::Scene::from_text(text == nullptr ? "" : text, path == nullptr ? "scene.toml" : path);
+    });
 }
 void lobatto_scene_free(lobatto_scene* scene) {
     delete scene;
@@ -192,11 +96,9 @@ const char* lobatto_scene_event_text(const lobatto_scene* scene, size_t index) {
 }
 
 lobatto_integrator* lobatto_integrator_new(const lobatto_scene* scene, const lobatto_settings* settings) {
-    auto* const integrator = new (std::nothrow) lobatto_integrator;
-    if (integrator != nullptr)
-        integrator->attempt(
-            [&] { integrator->value.emplace(api::compile(scene_of(scene), api::settings_of(settings))); });
-    return integrator;
+    return api::made<lobatto_integrator>([&](lobatto_integrator& integrator) {
+        integrator.value.emplace(api::compile(api::scene_of(scene), api::settings_of(settings)));
+    });
 }
 lobatto_integrator* lobatto_integrator_copy(const lobatto_integrator* integrator) {
     auto* const copy = new (std::nothrow) lobatto_integrator;
@@ -247,6 +149,35 @@ int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, d
         std::copy(state.second.begin(), state.second.end(), velocity);
     });
 }
+int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent) {
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        const std::vector<double> values = stepper.tangent();
+        std::copy(values.begin(), values.end(), tangent);
+    });
+}
+int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value) {
+    return integrator->with_stepper(
+        [&](api::Stepper& stepper) { *value = stepper.parameter(parameter == nullptr ? "" : parameter); });
+}
+int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto_event** events, size_t* count) {
+    *events = nullptr;
+    *count = 0;
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        integrator->hits = stepper.take_events();
+        integrator->events = events_of(integrator->hits);
+        *events = api::data(integrator->events);
+        *count = integrator->events.size();
+    });
+}
+int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers, size_t* count) {
+    *multipliers = nullptr;
+    *count = 0;
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        integrator->multipliers = stepper.multipliers();
+        *multipliers = api::data(integrator->multipliers);
+        *count = integrator->multipliers.size();
+    });
+}
 size_t lobatto_integrator_coordinates(const lobatto_integrator* integrator) {
     return integrator->value ? integrator->value->coordinates() : 0;
 }
@@ -267,21 +198,20 @@ double lobatto_integrator_energy(const lobatto_integrator* integrator) {
 }
 
 lobatto_trajectory* lobatto_run(const lobatto_scene* scene, const lobatto_settings* settings, int measure) {
-    auto* const trajectory = new (std::nothrow) lobatto_trajectory;
-    if (trajectory == nullptr) return trajectory;
-    trajectory->attempt([&] {
+    return api::made<lobatto_trajectory>([&](lobatto_trajectory& trajectory) {
         api::RunOptions options;
         static_cast<api::Settings&>(options) = api::settings_of(settings);
         options.measure = measure != 0;
         try {
-            trajectory->value = api::run(scene_of(scene), options);
+            trajectory.value = api::run(api::scene_of(scene), options);
         } catch (const api::RunFailure& failure) {
-            trajectory->value = failure.trajectory();
+            trajectory.value = failure.trajectory();
+            trajectory.events = events_of(trajectory.value->events);
             throw;
         }
-        return trajectory->value->stopped_by.empty();
+        trajectory.events = events_of(trajectory.value->events);
+        return trajectory.value->stopped_by.empty();
     });
-    return trajectory;
 }
 void lobatto_trajectory_free(lobatto_trajectory* trajectory) {
     delete trajectory;
@@ -310,20 +240,27 @@ const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory) {
 double lobatto_trajectory_error(const lobatto_trajectory* trajectory) {
     return trajectory->value ? trajectory->value->error.value_or(std::nan("")) : std::nan("");
 }
+const lobatto_event* lobatto_trajectory_events(const lobatto_trajectory* trajectory, size_t* count) {
+    *count = trajectory->events.size();
+    return api::data(trajectory->events);
+}
+size_t lobatto_trajectory_warnings(const lobatto_trajectory* trajectory) {
+    return trajectory->value ? trajectory->value->warnings.size() : 0;
+}
+const char* lobatto_trajectory_warning(const lobatto_trajectory* trajectory, size_t index) {
+    return api::text(trajectory->value ? api::element(&trajectory->value->warnings, index) : nullptr);
+}
 
 lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_settings* settings, size_t count,
                                  size_t columns, const char* const* names, const double* const* values) {
-    auto* const sweep = new (std::nothrow) lobatto_sweep;
-    if (sweep == nullptr) return sweep;
-    sweep->attempt([&] {
+    return api::made<lobatto_sweep>([&](lobatto_sweep& sweep) {
         api::Starts starts;
         starts.count = count;
         for (size_t c = 0; c < columns; ++c) starts.columns[names[c]].assign(values[c], values[c] + count);
         api::SweepOptions options;
         static_cast<api::Settings&>(options) = api::settings_of(settings);
-        sweep->value = api::sweep(scene_of(scene), starts, options);
+        sweep.value = api::sweep(api::scene_of(scene), starts, options);
     });
-    return sweep;
 }
 void lobatto_sweep_free(lobatto_sweep* sweep) {
     delete sweep;
@@ -353,6 +290,18 @@ const double* lobatto_sweep_q(const lobatto_sweep* sweep) {
 }
 const double* lobatto_sweep_p(const lobatto_sweep* sweep) {
     return sweep->value ? api::data(sweep->value->p) : nullptr;
+}
+const size_t* lobatto_sweep_states_first(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.first) : nullptr;
+}
+const double* lobatto_sweep_states_t(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.t) : nullptr;
+}
+const double* lobatto_sweep_states_q(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.q) : nullptr;
+}
+const double* lobatto_sweep_states_p(const lobatto_sweep* sweep) {
+    return sweep->value ? api::data(sweep->value->states.p) : nullptr;
 }
 
 }  // extern "C"

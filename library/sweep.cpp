@@ -2,6 +2,7 @@
 // Many trajectories of one scene, from starts in columns.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -32,12 +33,27 @@ std::unique_ptr<SweepStudy> begin_sweep(const Scene& scene, const Starts& starts
         options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);
     method_of(options).apply(read);
     MethodChoice::require_double(read, "sweep");
-    if (options.every) throw InputError("every: a sweep of the library keeps the last state; leave it out");
     StudyOptions study;
     study.overrides = overrides_of(options);
     study.threads = options.threads;
     study.measures = options.measure;
     return std::make_unique<SweepStudy>(std::move(read), request_of(starts), study, &algebra());
+}
+
+// Of a trajectory whose states were kept each `kept_every`-th step: the start, each `every`-th state, the last one.
+void keep_states(Sweep& sweep, const EnsembleTrajectory& trajectory, std::int64_t kept_every, std::int64_t every) {
+    const Records& kept = trajectory.kept;
+    const auto n = static_cast<std::ptrdiff_t>(sweep.coordinates.size());
+    Sweep::States& states = sweep.states;
+    for (std::int64_t i = 0; i < kept.count; ++i) {
+        if (i + 1 != kept.count && i * kept_every % every != 0) continue;
+        const double* const row = kept.rows + i * kept.columns;
+        states.t.push_back(row[0]);
+        states.q.insert(states.q.end(), row + 1, row + 1 + n);
+        states.p.insert(states.p.end(), row + 1 + n, row + 1 + 2 * n);
+        states.energy_error.push_back(kept.energy != nullptr ? kept.energy[i] - trajectory.energy_start : std::nan(""));
+    }
+    states.first.push_back(states.t.size());
 }
 
 void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& trajectory, int status) {
@@ -76,8 +92,14 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
             progress = [&](std::int64_t done) {
                 if (!options.progress(static_cast<double>(done) / study->steps_of(0, count))) is_interrupted = 1;
             };
-        const auto sink = [&](const EnsembleTrajectory& trajectory, const Verdict& verdict, const EnsembleRequest&) {
+        // With a clock the scene itself says which states there are between.
+        const std::int64_t every =
+            swept.clock ? std::min<std::int64_t>(options.every.value_or(0), 1) : options.every.value_or(0);
+        if (every > 0) sweep.states.first.push_back(0);
+        const auto sink = [&](const EnsembleTrajectory& trajectory, const Verdict& verdict,
+                              const EnsembleRequest& request) {
             if (options.measure) sweep.error.push_back(verdict.error);
+            if (every > 0) keep_states(sweep, trajectory, request.every, every);
             keep(sweep, swept, trajectory, verdict.status);
         };
         sweep.interrupted = study->compute(0, count, sink, progress, &is_interrupted).interrupted;

@@ -209,6 +209,18 @@ py::dict run(const lob::Scene& scene, bool measure, bool beyond_horizon, const p
     return dict_of(unlocked([&] { return lob::run(scene, options); }));
 }
 
+// None where none were kept.
+py::object states_of(lob::Sweep::States&& states, py::ssize_t n) {
+    if (states.first.empty()) return py::none();
+    py::dict dict;
+    dict["first"] = owned(std::move(states.first));
+    dict["t"] = owned(std::move(states.t));
+    dict["q"] = owned(std::move(states.q), n);
+    dict["p"] = owned(std::move(states.p), n);
+    dict["energy_error"] = owned(std::move(states.energy_error));
+    return dict;
+}
+
 py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vector<std::string>& keep, int threads,
                bool measure, const py::object& progress, const py::kwargs& given) {
     lob::Starts starts;
@@ -243,6 +255,7 @@ py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vect
     dict["error"] = result.error.empty() ? py::object(py::none()) : py::object(owned(std::move(result.error)));
     dict["kept"] = kept;
     dict["statuses"] = result.statuses;
+    dict["_states"] = states_of(std::move(result.states), n);
     return dict;
 }
 

@@ -6,6 +6,7 @@ import hashlib
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -30,30 +31,56 @@ def _tag():
     return f"{python}-{python}-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
 
 
+def _cmake(*words):
+    try:
+        code = subprocess.run(["cmake", *map(str, words)], check=False).returncode
+    except FileNotFoundError:
+        code = "there is no cmake"
+    if code != 0:
+        sys.exit(f"lobatto: the module could not be built (cmake {words[0]}: {code}). The lines above say why. What it "
+                 "needs is listed under \"Install\" in docs/python.md and at the top of the file `lobatto`.")
+
+
 def _build():
     """The files of the package: {name in the wheel: path}."""
-    subprocess.run(["cmake", "-S", ROOT, "-B", BUILD, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DLOBATTO_PYTHON=ON",
-                    f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_BUILD_WITH_INSTALL_RPATH=ON"], check=True)
-    subprocess.run(["cmake", "--build", BUILD, "--target", "python_sources", "--parallel", str(os.cpu_count())],
-                   check=True)
-    files = {f"lobatto/{path.name}": path for path in sorted((BUILD / "python" / "lobatto").iterdir()) if path.is_file()}
-    library = (BUILD / "library" / "liblobatto.so.0").resolve()
-    files["lobatto/liblobatto.so.0"] = library
-    return files
+    cache = BUILD / "CMakeCache.txt"
+    if cache.exists() and f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}\n" not in cache.read_text():
+        shutil.rmtree(BUILD)  # of a tree that was moved or copied
+    _cmake("-S", ROOT, "-B", BUILD, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DLOBATTO_PYTHON=ON",
+           f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_BUILD_WITH_INSTALL_RPATH=ON")
+    _cmake("--build", BUILD, "--target", "python_sources", "--parallel", os.cpu_count())
+    files = [path for path in sorted((ROOT / "python" / "lobatto").iterdir()) if path.is_file()]
+    # Of this Python: another one may have built its module in the same folder.
+    files.append(BUILD / "python" / "lobatto" / f"_lobatto{sysconfig.get_config_var('EXT_SUFFIX')}")
+    files.append(BUILD / "library" / "liblobatto.so.0")
+    return {f"lobatto/{path.name}": path for path in files}
+
+
+def _info():
+    """The files that say what the wheel is: {name in the wheel: content}."""
+    folder = f"lobatto-{_version()}.dist-info"
+    wheel = f"Wheel-Version: 1.0\nGenerator: lobatto\nRoot-Is-Purelib: false\nTag: {_tag()}\n"
+    return {f"{folder}/METADATA": _metadata().encode(), f"{folder}/WHEEL": wheel.encode()}
+
+
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    """Without it pip builds the wheel twice, the first time only to read its name."""
+    for name, content in _info().items():
+        path = pathlib.Path(metadata_directory) / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+    return path.parent.name
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    files = _build()
-    info = f"lobatto-{_version()}.dist-info"
-    contents = {name: path.read_bytes() for name, path in files.items()}
-    contents[f"{info}/METADATA"] = _metadata().encode()
-    contents[f"{info}/WHEEL"] = (f"Wheel-Version: 1.0\nGenerator: lobatto\nRoot-Is-Purelib: false\n"
-                                 f"Tag: {_tag()}\n").encode()
+    contents = {name: path.read_bytes() for name, path in _build().items()}
+    contents.update(_info())
     record = ""
     for name, content in contents.items():
         digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
         record += f"{name},sha256={digest},{len(content)}\n"
-    contents[f"{info}/RECORD"] = (record + f"{info}/RECORD,,\n").encode()
+    own = f"lobatto-{_version()}.dist-info/RECORD"
+    contents[own] = (record + f"{own},,\n").encode()
     wheel = f"lobatto-{_version()}-{_tag()}.whl"
     with zipfile.ZipFile(pathlib.Path(wheel_directory) / wheel, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in contents.items():

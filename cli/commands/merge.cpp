@@ -32,6 +32,7 @@ class Parts {
 public:
     Parts(const std::vector<std::string>& paths, TableFormat format) : format_(format) {
         for (const std::string& path : paths) {
+            refuse_interrupted(path);
             if (table_format(path) != format)
                 throw InputError(
                     fmt::format("{}: parts and the table that is made of them have the same ending", path));
@@ -100,6 +101,17 @@ public:
 private:
     TableReader reader(const std::string& path) const { return {path, format_, path + ".json"}; }
 
+    // Until a part ends its rows stand in NAME.partial.
+    static void refuse_interrupted(const std::string& path) {
+        const std::string ending = ".partial";
+        const bool is_named = path.ends_with(ending);
+        const std::string left = is_named ? path : path + ending;
+        if (!is_named && (std::filesystem::exists(path) || !std::filesystem::exists(left))) return;
+        throw InputError(
+            fmt::format("{} is of a sweep that goes on or was stopped; --resume continues it, and ends with {}", left,
+                        left.substr(0, left.size() - ending.size())));
+    }
+
     void require_all() const {
         constexpr std::size_t told = 20;
         std::vector<std::int64_t> missing;
@@ -108,8 +120,10 @@ private:
         if (missing.empty()) return;
         const std::size_t count = missing.size();
         missing.resize(std::min(count, told));
-        throw InputError(fmt::format("{} of {} shards {} missing: {}{}", count, head_.shard->of,
-                                     count == 1 ? "is" : "are", fmt::join(missing, ", "), count > told ? ", …" : ""));
+        throw InputError(fmt::format("{} of {} shards {} missing: {}{}. Compute {} with --shard {}/{} --resume{}",
+                                     count, head_.shard->of, count == 1 ? "is" : "are", fmt::join(missing, ", "),
+                                     count > told ? ", …" : "", count == 1 ? "it" : "them", missing.front(),
+                                     head_.shard->of, count == 1 ? "" : " and so on"));
     }
 
     TableFormat format_;

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy
 
-from ._lobatto import Stepper
+from ._lobatto import InputError, Stepper
 
 
 class State(NamedTuple):
@@ -121,10 +121,22 @@ class Trajectory(_Rows):
         return _table(self._facts())
 
 
+class States(_Rows):
+    """What a sweep kept of one trajectory: t and energy_error (count), q and p (count x n)."""
+
+    def __init__(self, coordinates, kept, rows):
+        self.coordinates = coordinates
+        self.t, self.q, self.p, self.energy_error = (kept[name][rows] for name in ("t", "q", "p", "energy_error"))
+
+    def __len__(self):
+        return len(self.t)
+
+
 class Sweep(_Rows):
     """The last states of many trajectories: status, steps, t (count), q and p (count x n), kept by name.
 
     ``status`` 0: it reached the end or a stop; ``statuses[i]`` says what i means. ``ok`` is the mask of these.
+    ``states(i)``: where ``every`` was given, the start of trajectory i, each such state, and the last one.
     """
 
     def __init__(self, scene, values):
@@ -137,6 +149,14 @@ class Sweep(_Rows):
 
     def __getitem__(self, name):
         return self.kept[name] if name in self.kept else super().__getitem__(name)
+
+    def states(self, index):
+        if self._states is None:
+            raise InputError("this sweep kept the last states alone; every=10 keeps each tenth too")
+        first = self._states["first"]
+        if not 0 <= index < len(self):
+            raise IndexError(f"there is no trajectory {index}; there are {len(self)}, counted from 0")
+        return States(self.coordinates, self._states, slice(int(first[index]), int(first[index + 1])))
 
     def __repr__(self):
         return f"Sweep({len(self)} trajectories, {int(self.ok.sum())} reached their end)"

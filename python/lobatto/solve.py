@@ -37,7 +37,8 @@ def sweep(scene, starts, *, keep=(), threads=0, measure=False, progress=None, **
     """Runs a scene from many starts at once. Returns a Sweep.
 
     ``starts``: arrays by name, of one length or one number for all: positions "q", velocities "q'" or momenta "p_q",
-    parameters. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states.
+    parameters. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states. ``every``: keep each
+    such state of all trajectories too; ``states(i)`` of the Sweep returns them.
     """
     columns = numpy.broadcast_arrays(*(numpy.atleast_1d(numpy.asarray(values, dtype=float)).ravel()
                                        for values in starts.values()))

@@ -145,8 +145,9 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
     const std::string one = part("1.csv", "1/4"), two = part("2.csv", "2/4"), three = part("3.csv", "3/4"),
                       four = part("4.csv", "4/4"), again = part("again.csv", "2/4"), other = part("o.csv", "2/5"),
                       stranger = part("s.csv", "2/4", "q=0:2:10");
-    CHECK(refusal({one, three}, out) == "2 of 4 shards are missing: 2, 4\n");
-    CHECK(refusal({one, three, four}, out) == "1 of 4 shards is missing: 2\n");
+    CHECK(refusal({one, three}, out) ==
+          "2 of 4 shards are missing: 2, 4. Compute them with --shard 2/4 --resume and so on\n");
+    CHECK(refusal({one, three, four}, out) == "1 of 4 shards is missing: 2. Compute it with --shard 2/4 --resume\n");
     CHECK(refusal({one, two, three, four, again}, out) ==
           two + " and " + again + " are both shard 2/4; leave one of both out\n");
     CHECK(refusal({one, other}, out) ==
@@ -165,6 +166,12 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
     test::write_text(two, text.substr(0, text.rfind('\n', text.size() - 2) + 1));
     CHECK(refusal({one, two, three, four}, out) ==
           two + " is not complete: it has 2 of 3 trajectories. Continue it with --resume\n");
+    std::filesystem::rename(two, two + ".partial");
+    for (const std::string& named : {two, two + ".partial"})
+        CHECK(refusal({one, named, three, four}, out) ==
+              two + ".partial is of a sweep that goes on or was stopped; --resume continues it, and ends with " + two +
+                  "\n");
+    std::filesystem::remove(two + ".partial");
     // One of another processor.
     test::write_text(two, text);
     const std::string label = ", compiled kernel ";

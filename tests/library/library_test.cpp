@@ -228,6 +228,51 @@ TEST_CASE("a sweep keeps what it is asked for in place of states") {
     CHECK(sweep.error[0] < 1e-4);
 }
 
+TEST_CASE("a sweep that keeps states on the way has those of the command line, also where errors are measured") {
+    const lobatto::test::TemporaryFolder folder;
+    const std::string file = folder / "sweep.csv";
+    for (const char* name : {"double_pendulum", "kepler"}) {
+        CAPTURE(name);
+        const lob::Scene scene(scenes + name + ".toml");
+        const std::string varied = scene.coordinates().front().name;
+        REQUIRE(lobatto::test::run({LOBATTO_PROGRAM, "sweep", scene.path(), "--vary", varied + "=0.9,1,1.1", "--until",
+                                    "2", "--every", "7", "-o", file, "--quiet"})
+                    .exit_code == 0);
+        const auto rows = rows_of(file);
+        lob::SweepOptions options;
+        options.until = "2";
+        options.every = 7;
+        for (const bool measure : {false, true}) {
+            options.measure = measure;
+            const lob::Sweep sweep = lob::sweep(scene, {3, {{varied, {0.9, 1, 1.1}}}}, options);
+            const std::size_t n = sweep.coordinates.size();
+            REQUIRE(sweep.states.first.size() == 4);
+            REQUIRE(sweep.states.first[3] == rows.size());
+            CHECK(rows.size() > 9);
+            for (std::size_t i = 0; i < 3; ++i)
+                for (std::size_t row = sweep.states.first[i]; row < sweep.states.first[i + 1]; ++row) {
+                    CHECK(rows[row][0] == static_cast<double>(i));
+                    CHECK(rows[row][4] == sweep.states.t[row]);  // index, start, status, steps, t
+                    for (std::size_t k = 0; k < n; ++k) CHECK(rows[row][5 + k] == sweep.states.q[row * n + k]);
+                }
+            for (std::size_t k = 0; k < n; ++k) {
+                CHECK(sweep.states.q[(sweep.states.first[2] - 1) * n + k] == sweep.q[n + k]);
+                CHECK(sweep.states.p[(sweep.states.first[2] - 1) * n + k] == sweep.p[n + k]);
+            }
+            CHECK(sweep.states.energy_error[sweep.states.first[2]] == 0);
+            CHECK(sweep.states.energy_error.back() == sweep.energy_error.back());
+        }
+    }
+    lob::SweepOptions options;
+    options.every = 0;
+    const lob::Scene pendulum(scenes + "pendulum.toml");
+    CHECK(message_of<lob::InputError>([&] {
+              lob::sweep(pendulum, {1, {{"q", {1}}}}, options);
+          }).find("0 is not a number of states") != std::string::npos);
+    options.every.reset();
+    CHECK(lob::sweep(pendulum, {1, {{"q", {1}}}}, options).states.first.empty());
+}
+
 TEST_CASE("progress may end a run, and what was computed is there") {
     lob::RunOptions options;
     options.until = "1e6";

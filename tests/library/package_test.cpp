@@ -66,6 +66,36 @@ TEST_SUITE("slow") {
         }
     }
 
+    TEST_CASE("below DESTDIR lies all that is installed: program, library, manual pages, completions, schemas") {
+        const test::TemporaryFolder folder;
+        {
+            const test::EnvironmentVariable destination("DESTDIR", folder.string());
+            install("/opt/lobatto");
+        }
+        CHECK(std::distance(fs::directory_iterator(folder.string()), fs::directory_iterator()) == 1);
+        const std::string root = folder / "opt/lobatto";
+        for (const char* file :
+             {"bin/lobatto", "include/lobatto/lobatto.h", "include/lobatto/lobatto.hpp", "share/man/man1/lobatto.1",
+              "share/man/man1/lobatto-run.1", "share/bash-completion/completions/lobatto",
+              "share/zsh/site-functions/_lobatto", "share/fish/vendor_completions.d/lobatto.fish",
+              "share/lobatto/scene.schema.json", "share/lobatto/schemas", "share/lobatto/scenes/pendulum.toml",
+              "share/lobatto/examples/cmake/arm.toml", "share/doc/lobatto/copyright"})
+            CHECK_MESSAGE(fs::exists(root + "/" + file), file);
+        // No file names the folder that it was put below, nor the one where it was built.
+        for (const std::string& path : {folder.string(), build_folder}) {
+            const test::Finished found = test::run({"grep", "-rlIF", path, root});
+            CHECK_MESSAGE(found.out.empty(), found.out);
+        }
+        const std::string moved = folder / "moved";
+        fs::rename(root, moved);
+        output_of({moved + "/bin/lobatto", "run", moved + "/share/lobatto/scenes/pendulum.toml", "--until", "1",
+                   "--quiet", "-o", folder / "run.csv"});
+        CHECK(fs::exists(folder / "run.csv"));
+        CHECK(output_of({"bash", "-c",
+                         "source '" + moved + "/share/bash-completion/completions/lobatto' && complete -p lobatto"})
+                  .find("lobatto") != std::string::npos);
+    }
+
     TEST_CASE("pkg-config finds the library in the folder where it lies") {
         const test::TemporaryFolder folder;
         install(folder / "prefix");

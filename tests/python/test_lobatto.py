@@ -113,6 +113,18 @@ def test_a_sweep_takes_and_gives_arrays(pendulum):
         lobatto.sweep(pendulum, {"quux": starts})
 
 
+def test_a_sweep_keeps_states_on_the_way(pendulum):
+    sweep = lobatto.sweep(pendulum, {"q": [0.5, 1.0]}, until=1, every=8)
+    run = lobatto.run(pendulum, until=1, every=8)
+    states = sweep.states(1)
+    assert numpy.array_equal(states.t, run.t) and len(states) == 4  # 20 steps: 0, 8, 16, 20
+    assert states["q"][0] == 1 and states["p_q"][-1] == sweep.p[1, 0] and states.q[-1, 0] == sweep.q[1, 0]
+    with pytest.raises(IndexError, match="there are 2"):
+        sweep.states(2)
+    with pytest.raises(lobatto.InputError, match="every=10"):
+        lobatto.sweep(pendulum, {"q": [0.5]}, until=1).states(0)
+
+
 def test_what_is_chosen_keeps_its_promise(pendulum):
     choice = lobatto.tune(pendulum, 1e-8, budget=3, until=10)
     run = lobatto.run(pendulum, **choice.settings)

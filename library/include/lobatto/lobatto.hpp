@@ -6,6 +6,8 @@
 ///     lob::Stepper stepper(lob::compile(scene));
 ///     stepper.advance(100);
 ///
+/// The examples further down go on from these lines; tests compile and run them.
+///
 /// Units are those of the scene. Arrays of several states are row-major: state i, coordinate k is [i * n + k].
 /// Every function throws Error when it cannot do what it promises; the texts are those of the command line.
 /// Reading and deriving scenes takes a lock of the whole process; objects of different threads are free otherwise. One
@@ -80,6 +82,11 @@ struct Settings {
 };
 
 /// A mechanical system, read and checked. Copies share it.
+///
+///     for (const lob::Variable& coordinate : scene.coordinates())
+///         std::printf("%s = %g %s\n", coordinate.name.c_str(), coordinate.value, coordinate.unit.c_str());
+///     std::ofstream("pendulum.hpp") << scene.emit().second;
+///
 class LOBATTO_API Scene {
 public:
     explicit Scene(const std::string& path);
@@ -151,6 +158,15 @@ struct EventHit {
 };
 
 /// A trajectory that the caller takes forward: for control loops, games, couplings.
+///
+///     const double q = 1, p = 0;
+///     stepper.start(0, &q, &p);
+///     while (stepper.t() < 10) {
+///         stepper.set("omega", stepper.q()[0] > 0 ? 6 : 6.5);
+///         stepper.step();
+///     }
+///     const auto [position, velocity] = stepper.at(stepper.t() - stepper.step_size() / 2);
+///
 class LOBATTO_API Stepper {
 public:
     explicit Stepper(const Kernel& kernel);  ///< at the start of the scene
@@ -235,6 +251,14 @@ struct RunOptions : Settings {
     /// About ten times a second, from 0 to 1; false ends the run, and what was computed is returned.
     std::function<bool(double)> progress;
 };
+/// To the end of the scene, judged as the command line judges it.
+///
+///     lob::RunOptions options;
+///     options.points = 6;
+///     options.until = "3";
+///     const lob::Trajectory run = lob::run(scene, options);
+///     std::printf("q = %g after %g, error %.1e\n", run.q.back(), run.t.back(), run.error.value());
+///
 LOBATTO_API Trajectory run(const Scene& scene, const RunOptions& options = {});
 
 // --- Sweeps ----------------------------------------------------------------------------------------------------------
@@ -253,7 +277,14 @@ struct SweepOptions : Settings {
     std::function<bool(double)> progress;
 };
 
+/// What becomes of trajectories. `states` is empty unless the settings say `every`.
 struct Sweep {
+    /// Of trajectory i the start, each `every`-th state and the last one are rows first[i], ..., first[i + 1] - 1.
+    struct States {
+        std::vector<std::size_t> first;    ///< count + 1 numbers
+        std::vector<double> t, q, p;       ///< rows, rows x n, rows x n
+        std::vector<double> energy_error;  ///< as below
+    };
     std::vector<Variable> coordinates;
     std::vector<std::string> kept_names;
     std::size_t count = 0;              ///< trajectories; fewer than asked for where `progress` ended it
@@ -265,8 +296,22 @@ struct Sweep {
     std::vector<double> error;          ///< measured, relative to the amplitude; empty when not asked for
     std::vector<double> kept;           ///< count x kept_names
     std::vector<std::string> statuses;  ///< in words, by number
+    States states;
     bool interrupted = false;
 };
+/// All of them at once, on all processors.
+///
+///     lob::Starts starts;
+///     starts.count = 3;
+///     starts.columns["q"] = {0.5, 1, 1.5};
+///     starts.columns["omega"] = {6, 6, 7};
+///     lob::SweepOptions options;
+///     options.until = "3";
+///     options.every = 20;
+///     const lob::Sweep sweep = lob::sweep(scene, starts, options);
+///     for (std::size_t row = sweep.states.first[1]; row < sweep.states.first[2]; ++row)
+///         std::printf("%g: q = %g\n", sweep.states.t[row], sweep.states.q[row]);
+///
 LOBATTO_API Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options = {});
 
 // --- Choosing --------------------------------------------------------------------------------------------------------
@@ -281,6 +326,12 @@ struct Choice {
 };
 /// The cheapest member of the family, and its step, that keep an error to the end. `budget`: seconds to search.
 /// `progress`: told what is being done; false ends the search, which then throws ComputationError.
+///
+///     lob::Settings settings;
+///     settings.until = "2";
+///     const lob::Choice choice = lob::tune(scene, 1e-4, settings, 10);
+///     lob::Stepper chosen(lob::compile(scene, choice.settings));
+///
 LOBATTO_API Choice tune(const Scene& scene, double error, const Settings& settings = {}, double budget = 20,
                         const std::function<bool(const std::string&)>& progress = {});
 
@@ -292,6 +343,10 @@ struct Claim {
     std::string meaning;  ///< of a failure
 };
 /// Everything that can be checked of a scene, from the quadrature to the running kernel.
+///
+///     for (const lob::Claim& claim : lob::verify(scene))
+///         if (!claim.holds) std::printf("%s: %s\n", claim.claim.c_str(), claim.meaning.c_str());
+///
 LOBATTO_API std::vector<Claim> verify(const Scene& scene, const Settings& settings = {});
 
 }  // namespace lobatto::api
