@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // How fast the generator itself is: from scene text to kernel text, and to a compiled kernel, as a table in Markdown.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -86,6 +87,19 @@ Source fixed_chain(int n) {
                                             n));
 }
 
+// Bodies in space, each of which pulls on all others.
+Source bodies(int n) {
+    return Source("bodies.toml",
+                  fmt::format("lagrangian = \"sum(i=1..n, m[i]*(x[i]'^2 + y[i]'^2 + z[i]'^2)/2) + sum(i=2..n, "
+                              "sum(j=1..i-1, m[i]*m[j]/sqrt((x[i]-x[j])^2 + (y[i]-y[j])^2 + (z[i]-z[j])^2)))\"\n"
+                              "[coordinates]\nx = {{ count = {0}, position = \"cos(i)\", velocity = 0 }}\n"
+                              "y = {{ count = {0}, position = \"sin(i)\", velocity = 0 }}\n"
+                              "z = {{ count = {0}, position = \"i/4\", velocity = 0 }}\n"
+                              "[parameters]\nn = {{ value = {0}, constant = true }}\nm = [{1}]\n"
+                              "[run]\nstep = 0.1\nuntil = 1\n",
+                              n, fmt::join(std::vector<int>(static_cast<std::size_t>(n), 1), ", ")));
+}
+
 // The processor's name, for the reader of the table.
 std::string processor() {
     std::ifstream file("/proc/cpuinfo");
@@ -119,4 +133,7 @@ int main() {
     for (const int n : {32, 64, 128, 256, 512, 1024})
         print_row(fmt::format("chain of {}", n), static_cast<std::size_t>(n), measure(fixed_chain(n)),
                   n == 256 ? "1" : "");
+    fmt::print("\nBodies that all pull on each other:\n\n{}", head);
+    for (const int n : {10, 20, 40})
+        print_row(fmt::format("{} bodies", n), static_cast<std::size_t>(3 * n), measure(bodies(n)), n == 40 ? "1" : "");
 }

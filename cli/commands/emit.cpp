@@ -107,6 +107,17 @@ fs::path path_for(const EmitCommand& options, const std::string& name) {
     return path;
 }
 
+// -o -: the text itself, of one file.
+bool is_printed(const EmitCommand& options) {
+    if (!is_standard_output(options.folder)) return false;
+    if (!options.plain && !options.standalone && !options.no_support)
+        throw InputError(
+            "-o -: standard output takes one file, but the kernel includes another; add --standalone, --plain or "
+            "--no-support, or name a folder");
+    if (options.json) throw InputError("-o -: standard output takes the header or the report; leave --json out");
+    return true;
+}
+
 void write_plain(const PlainSource& source, const EmitCommand& options) {
     const fs::path path = path_for(options, source.name);
     write_atomically(path, source.header);
@@ -130,8 +141,12 @@ void emit_scene(const EmitCommand& options) {
     if (options.ensemble && !options.standalone)
         throw InputError(
             "--ensemble: kernel.hpp carries ensembles anyway; leave --ensemble out, or add --standalone for one file");
+    const bool printed = is_printed(options);
     if (options.plain) {
-        write_plain(emit_plain(scene, scene.method.numbers), options);
+        if (printed)
+            fmt::print(std::cout, "{}", emit_plain(scene, scene.method.numbers).header);
+        else
+            write_plain(emit_plain(scene, scene.method.numbers), options);
         return;
     }
     EmitOptions emit_options{scene.method.numbers, {}};
@@ -140,7 +155,10 @@ void emit_scene(const EmitCommand& options) {
             return support_text(options.ensemble ? with_ensemble(parts) : parts);
         };
     const KernelSource source = emit(derive(scene, options.general), emit_options);
-
+    if (printed) {
+        fmt::print(std::cout, "{}", source.header);
+        return;
+    }
     const fs::path path = path_for(options, source.name);
     if (!options.standalone && !options.no_support) {
         if (source.name == "kernel")
@@ -175,7 +193,7 @@ void add_emit(CommandLine& program) {
     const auto options = std::make_shared<EmitCommand>();
     Command command = program.command("emit", "Write the integrator of a scene as a C++ header");
     command.option("SCENE", options->scene, "Scene file").required();
-    command.option("-o,--output", options->folder, "Folder for NAME.hpp and the kernel.hpp that it includes")
+    command.option("-o,--output", options->folder, "Folder for NAME.hpp and the kernel.hpp that it includes; - prints one file")
         .required()
         .shown_as("FOLDER");
     options->method.add_to(command);

@@ -29,6 +29,7 @@ std::string output_path(const std::string& given, const std::string& name) {
 }
 
 std::string output_folder(const std::string& given, const std::string& name) {
+    if (is_standard_output(given)) throw InputError("-o -: several files are written; name a folder for them");
     const std::string folder = output_path(given, name);
     std::error_code error;
     std::filesystem::create_directories(folder, error);

@@ -221,6 +221,22 @@ TEST_CASE("emit writes the header and its support, says what each pass saved and
     CHECK(files == 2);  // no temporary file is left
 }
 
+TEST_CASE("emit prints one file where it is asked to") {
+    const test::TemporaryFolder folder;
+    const std::string scene = tree + "/scenes/pendulum.toml";
+    for (const char* kind : {"--plain", "--standalone", "--no-support"}) {
+        const test::Finished printed = lobatto_program({"emit", scene, kind, "-o", "-"});
+        CHECK(printed.exit_code == 0);
+        const std::string into = folder / kind;
+        REQUIRE(lobatto_program({"emit", scene, kind, "-o", into}).exit_code == 0);
+        CHECK(printed.out == test::read_file(into + "/pendulum.hpp"));
+    }
+    const test::Finished two = lobatto_program({"emit", scene, "-o", "-"});
+    CHECK(two.exit_code == 2);
+    CHECK(contains(two.err, "standard output takes one file"));
+    CHECK(contains(lobatto_program({"gallery", tree + "/scenes", "-o", "-"}).err, "name a folder for them"));
+}
+
 TEST_CASE("emit that cannot write says where and why, with exit code 4, and leaves the old file") {
     const test::TemporaryFolder folder;
     test::write_text(folder / "file", "not a folder");
