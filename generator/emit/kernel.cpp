@@ -89,7 +89,7 @@ public:
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
                 tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
-                coefficients() + prepare(name);
+                coefficients() + prepare(name) + set_inputs();
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -195,6 +195,7 @@ private:
             if (!unit.empty()) unit = "[" + unit + "]";
             if (identifier(parameter.name) != parameter.name)  // C++ or <complex.h> has that name
                 unit += (unit.empty() ? "" : " ") + ("the scene's " + parameter.name);
+            if (parameter.is_input) unit += (unit.empty() ? "" : " ") + std::string("an input: set_inputs()");
             text += unit.empty()
                         ? fmt::format("        {}\n", lines[i])
                         : fmt::format("        {:<{}}  // {}\n", lines[i], std::min<std::size_t>(widest, 60), unit);
@@ -312,6 +313,51 @@ private:
                        std::string(name.size() + result.size() + 13, ' '));
     }
 
+    // Whether a value changes with the inputs of the scene.
+    bool holds_input(Id id) const {
+        const std::vector<Id> below = p_.graph.topological({id});
+        return std::any_of(below.begin(), below.end(), [&](Id one) {
+            if (p_.graph[one].op != Op::input || p_.graph[one].phase != Phase::parameter) return false;
+            const auto& all = d_.scene.parameters;
+            return std::any_of(all.begin(), all.end(), [&](const Parameter& parameter) {
+                return parameter.is_input && identifier(parameter.name) == p_.graph.input_of(one).code;
+            });
+        });
+    }
+
+    // (D60) What prepare() gives, as far as it changes with inputs.
+    std::string set_inputs() const {
+        if (d_.system.inputs.empty()) return "";
+        std::vector<Output> statements, all;
+        std::string finite;
+        for (const Id id : hoisted_.order) all.push_back({"k." + hoisted_.names.at(id), id});
+        if (d_.structure.looped)
+            for (const Output& statement : looped_.prepared()) all.push_back(statement);
+        for (const Output& statement : all) {
+            if (!holds_input(statement.value)) continue;
+            statements.push_back(statement);
+            finite += (finite.empty() ? "" : ", ") + statement.target;
+        }
+        const auto names = [&](Id id) -> std::string {
+            if (holds_input(id)) return p_.graph[id].op == Op::input ? "p." + p_.graph.input_of(id).code : "";
+            if (const std::string field = field_name(id); !field.empty()) return "k." + field;
+            if (p_.graph[id].op != Op::input) return "";
+            return p_.graph[id].phase == Phase::parameter ? "p." + p_.graph.input_of(id).code
+                                                          : p_.graph.input_of(id).code;
+        };
+        std::string text =
+            FunctionText(p_, statements, names, {options_.precision, Phase::step_size, false, false, Notation::cpp, {}})
+                .lines();
+        if (!finite.empty())
+            text +=
+                wrapped("        if (!lobatto::is_finite(" + finite + ")) return Status::not_finite;", "            ");
+        text += "        return Status::ok;\n";
+        return "\n    // (D60) The same after other values of inputs alone.\n" +
+               signature("Status", "set_inputs", {{"const Parameters&", "p"}, {"real", "h"}, {"Coefficients&", "k"}},
+                         text) +
+               text + "    }\n";
+    }
+
     // How a function reaches a value that it does not compute.
     std::string name_of(Id id) const {
         const std::string field = field_name(id);
@@ -411,6 +457,7 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
     std::set<std::string> parts = {stepper_of(derivation.scene, derivation.structure)};
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
     if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
+    if (!derivation.system.inputs.empty()) parts.insert("steppers/inputs.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
             case Op::sin:
             case Op::cos:

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -320,6 +321,10 @@ private:
             fail(formula.at, frame,
                  fmt::format("{} holds coordinates or the time, which cannot occur in {}: write it with numbers and "
                              "parameters",
+                             definition.label, frame.formula));
+        if (!motion_allowed_ && entry.value.inputs)
+            fail(formula.at, frame,
+                 fmt::format("{} holds an input, which cannot occur in {}: write it with numbers and parameters",
                              definition.label, frame.formula));
         if (!formula.primed) return entry.value;
         if (entry.value.velocities)

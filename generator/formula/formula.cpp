@@ -38,6 +38,8 @@ std::string kind_of(const Name& name) {
             return "a coordinate";
         case Name::Role::parameter:
             return "a parameter";
+        case Name::Role::input:
+            return "an input";
         case Name::Role::definition:
             return "a definition";
         case Name::Role::time:
@@ -416,13 +418,14 @@ private:
 
     void refuse_by_role(const Syntax& formula, std::string_view base) const {
         const Name::Role role = formula.name->role;
-        if (formula.primed && (role == Name::Role::parameter || role == Name::Role::time))
+        if (formula.primed && role != Name::Role::coordinate && role != Name::Role::definition)
             fail(formula.at,
                  fmt::format("{} is {} and has no velocity; only coordinates have one", base, kind_of(*formula.name)));
         if (scope_.motion_allowed) return;
         std::string what;
         if (role == Name::Role::coordinate) what = formula.primed ? "the velocity" : "the coordinate";
         if (role == Name::Role::time) what = "the time";
+        if (role == Name::Role::input) what = "the input";
         if (formula.primed && role == Name::Role::definition) what = "the velocity";
         if (!what.empty())
             fail(formula.at, fmt::format("{} {}{} cannot occur in {}: write it with numbers and parameters", what, base,

@@ -170,6 +170,7 @@ Operand Arithmetic::compute(const std::string& operation, const std::vector<cons
         rational = rational && is_a<numeric>(operand->expression);
         result.moves = result.moves || operand->moves;
         result.velocities = result.velocities || operand->velocities;
+        result.inputs = result.inputs || operand->inputs;
     }
     work_.spend(parts);
     try {

@@ -44,6 +44,7 @@ struct Operand {
     // What occurs in it.
     bool moves = false;  // positions or the time
     bool velocities = false;
+    bool inputs = false;
 };
 
 // What a formula asks for and cannot have, as a sentence without its place.

@@ -186,7 +186,8 @@ private:
         const bool takes_mass = separable_.diagonal_mass || interior_ <= full_mass_limit;
         if (!system_.separable || (!takes_mass && !separable_.is_explicit))
             form_ = Form::general;
-        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted && takes_mass)
+        else if (system_.linear && system_.autonomous && system_.inputs.empty() && n_ <= linear_map_limit &&
+                 !polynomial_wanted && takes_mass)
             form_ = Form::linear_map;
         if (!separable_.is_explicit) return;
         result_.linear = form_ == Form::linear_map;
@@ -334,6 +335,12 @@ private:
         if (result_.linear || separable_.clean || separable_.is_explicit || interior_ == 0 || !separable_.diagonal_mass)
             return;
         separable_.constant_hessian = SparseMatrix(n_, n_);
+        const auto& curvatures = system_.hessian.entries();
+        if (std::any_of(curvatures.begin(), curvatures.end(),
+                        [&](const auto& entry) { return has_any(entry.second, system_.inputs); })) {
+            find("quadratic part absorbed", false, "the second derivatives of V change with inputs");
+            return;
+        }
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
         std::vector<ex> whole, rest;
@@ -445,10 +452,11 @@ private:
         const std::string of = system_.separable ? "V" : "L";
         for (const auto& [matrix, by_velocity, then_velocity] : blocks)
             for (const auto& [place, value] : matrix->entries()) {
-                const char* on = has_any(value, system_.q)   ? "position"
-                                 : has_any(value, system_.v) ? "velocity"
-                                 : value.has(system_.t)      ? "time"
-                                                             : nullptr;
+                const char* on = has_any(value, system_.q)        ? "position"
+                                 : has_any(value, system_.v)      ? "velocity"
+                                 : value.has(system_.t)           ? "time"
+                                 : has_any(value, system_.inputs) ? "inputs"
+                                                                  : nullptr;
                 if (on == nullptr) continue;
                 const std::string row = name(place.first), column = name(place.second) + (then_velocity ? "'" : "");
                 const bool outer =
@@ -506,6 +514,12 @@ private:
         find("no forces", driven.empty(),
              driven.empty() ? "all forces come from L, so every step is symplectic"
                             : "forces beside L act on " + names(driven) + ", so energy is gained or lost");
+        if (!system_.inputs.empty()) {
+            std::string list;
+            for (const GiNaC::symbol& input : system_.inputs) list += (list.empty() ? "" : ", ") + input.get_name();
+            find("inputs", true,
+                 list + ": a program may change them before each step with set_inputs(), and the energy with them");
+        }
         if (!scene_.constants.empty()) {
             std::string list;
             for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;

@@ -83,11 +83,12 @@ ex sum_of(const exvector& terms) {
     return terms.empty() ? ex(0) : ex(GiNaC::add(terms));
 }
 
-// Which of q, v, t the derivatives of a system depend on, from their values at sample points.
+// Which of q, v, t and the inputs the derivatives of a system depend on, from their values at sample points.
 class Dependence {
 public:
     struct Kind {
-        bool zero = true, on_q = false, on_v = false, on_t = false;
+        bool zero = true, on_q = false, on_v = false, on_t = false, on_inputs = false;
+        bool constant() const { return !on_q && !on_v && !on_t && !on_inputs; }
     };
 
     Dependence(const Scene& scene, const System& system, const Symbols& motion)
@@ -111,7 +112,10 @@ public:
             if (!is_broken(expressions[i])) continue;
             kinds[i].zero = false;
             for (const std::size_t variable : motion_.in(expressions[i]))
-                (variable < n ? kinds[i].on_q : variable < 2 * n ? kinds[i].on_v : kinds[i].on_t) = true;
+                (variable < n        ? kinds[i].on_q
+                 : variable < 2 * n  ? kinds[i].on_v
+                 : variable == 2 * n ? kinds[i].on_t
+                                     : kinds[i].on_inputs) = true;
         }
         return kinds;
     }
@@ -155,15 +159,17 @@ private:
             kinds[i].on_q |= hides(i, system_.q);
             kinds[i].on_v |= hides(i, system_.v);
             kinds[i].on_t |= hides(i, {system_.t});
+            kinds[i].on_inputs |= hides(i, system_.inputs);
         }
         moved(system_.q, &Kind::on_q);
         moved(system_.v, &Kind::on_v);
         moved({system_.t}, &Kind::on_t);
+        if (!system_.inputs.empty()) moved(system_.inputs, &Kind::on_inputs);
     }
 
     const Scene& scene_;
     const System& system_;
-    const Occurrences motion_;  // q, v, t
+    const Occurrences motion_;  // q, v, t, inputs
 };
 
 // Refuses a mass matrix that is singular near the start.
@@ -319,10 +325,12 @@ private:
             system_.outer_force.push_back(coordinate.force);
         }
         for (const Parameter& parameter : scene_.parameters) system_.parameters.push_back(parameter.symbol);
+        system_.inputs = scene_.inputs();
         system_.lagrangian = scene_.lagrangian;
         motion_ = system_.q;
         motion_.insert(motion_.end(), system_.v.begin(), system_.v.end());
         motion_.push_back(system_.t);
+        motion_.insert(motion_.end(), system_.inputs.begin(), system_.inputs.end());
         system_.terms = terms_of(system_.lagrangian, motion_);
         system_.momentum = gradient_of(system_.terms, system_.v);
         system_.force = gradient_of(system_.terms, system_.q);
@@ -356,7 +364,7 @@ private:
             for (const auto& [place, value] : derived[block].entries()) {
                 const Dependence::Kind& kind = kinds[next++];
                 if (kind.zero) continue;
-                const bool constant = !kind.on_q && !kind.on_v && !kind.on_t;
+                const bool constant = kind.constant();
                 const ex kept_value = constant ? constant_form(value, of_motion) : value;
                 kept[block]->put(place.first, place.second, kept_value);
                 system_.linear = system_.linear && constant;
@@ -383,7 +391,8 @@ private:
         if (block == 0 && !constant)
             refuse_separable(text() + (kind.on_v   ? " depends on the velocity"
                                        : kind.on_q ? " depends on the position"
-                                                   : " depends on the time"));
+                                       : kind.on_t ? " depends on the time"
+                                                   : " depends on an input"));
         if (block == 1) refuse_separable(text() + ": the momentum depends on the position");
         if (block == 2) refuse_separable(text() + ": the force depends on the velocity");
     }
@@ -437,7 +446,7 @@ private:
 
     const Scene& scene_;
     System system_;
-    Symbols motion_;  // positions, velocities and time
+    Symbols motion_;  // positions, velocities, time and inputs
 };
 
 }  // namespace

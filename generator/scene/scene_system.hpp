@@ -58,6 +58,7 @@ private:
 
     void read_time();
     void read_parameters();
+    void read_parameters(const std::string& section, const std::string& what);
     Parameter read_parameter(const Entry& entry, const Entry& value);
     std::vector<Parameter> read_elements(const Entry& entry, const Entry& list);
     void read_coordinates();

@@ -35,6 +35,7 @@
 #include "steppers/events.hpp"
 #include "steppers/general.hpp"
 #include "steppers/impacts.hpp"
+#include "steppers/inputs.hpp"
 #include "steppers/linear.hpp"
 #include "steppers/separable.hpp"
 #include "steppers/splitting.hpp"

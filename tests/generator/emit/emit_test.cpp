@@ -408,6 +408,7 @@ TEST_CASE("the names that a scene may not take are those that kernels declare") 
             }
             scene.impacts.push_back(wall);
         }
+        if (method.family == Family::splitting) scene.parameters.back().is_input = true;
         const std::string header = emit(derive(scene)).header;
         const std::regex declaration(
             R"(\n    (?:static constexpr [\w:* ]*?|using |struct |static [\w:]+&? )(\w+)(?:\[| =| \{|\())");
