@@ -13,6 +13,7 @@
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/looped.hpp"
 #include "generator/emit/tables.hpp"
+#include "generator/formula/spline.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "generator/programs/identifier.hpp"
 #include "generator/programs/programs.hpp"
@@ -66,6 +67,14 @@ std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
     return angles;
 }
 
+// Which splines occur in what a kernel computes.
+std::set<int> splines_of(const Programs& programs) {
+    std::set<int> numbers;
+    for (Id id = 0; id < programs.graph.size(); ++id)
+        if (programs.graph[id].op == Op::table) numbers.insert(programs.graph[id].index / 4);
+    return numbers;
+}
+
 class Emitter {
 public:
     Emitter(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options)
@@ -88,8 +97,8 @@ public:
         text += options_.support_text ? options_.support_text(support) : "#include \"kernel.hpp\"\n";
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
-                tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
-                coefficients() + prepare(name) + set_inputs();
+                tables(d_, options_.precision) + measured() + (d_.structure.looped ? looped_.tables() : "") +
+                parameters() + coefficients() + prepare(name) + set_inputs();
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -358,6 +367,24 @@ private:
                text + "    }\n";
     }
 
+    // The splines of the scene, in the order of their names.
+    std::string measured() const {
+        std::string text;
+        for (const int number : splines_of(p_)) {
+            const Spline& spline = spline_of(number);
+            std::vector<cln::cl_R> coefficients;
+            for (const auto& piece : spline.coefficients())
+                coefficients.insert(coefficients.end(), piece.begin(), piece.end());
+            text += fmt::format(
+                "\n    // Measured values, {}: knots x, and between them cubic polynomials in u - x[i] (D61).\n"
+                "    struct {} {{\n        static constexpr int points = {};\n",
+                comment_safe(spline.file()), spline_name(number), spline.x().size());
+            text += value_table("x", spline.x(), options_.precision) +
+                    value_table("c", coefficients, options_.precision) + "    };\n";
+        }
+        return text;
+    }
+
     // How a function reaches a value that it does not compute.
     std::string name_of(Id id) const {
         const std::string field = field_name(id);
@@ -475,7 +502,11 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
                 break;
             case Op::asin:
             case Op::acos:
+            case Op::table:
+                parts.insert("base/spline.hpp");
+                break;
             case Op::atan:
+            case Op::atan2:
                 parts.insert("base/arc.hpp");
                 break;
             default:

@@ -162,6 +162,15 @@ std::string number_table(const std::string& name, const std::vector<GiNaC::ex>& 
     return vector_text(name, values, precision, exact);
 }
 
+std::string value_table(const std::string& name, const std::vector<cln::cl_R>& values, Precision precision) {
+    Graph graph;
+    std::string numbers;
+    for (const cln::cl_R& value : values)
+        numbers += (numbers.empty() ? "" : ", ") + formula(graph, graph.constant(value), Notation::cpp, {}, precision);
+    return wrapped(fmt::format("        static constexpr real {}[{}] = {{{}}};", name, values.size(), numbers),
+                   "            ");
+}
+
 const char* type_name(Precision precision) {
     switch (precision) {
         case Precision::single:

@@ -6,7 +6,7 @@
 //     power   = primary [ ^ signed ]
 //     primary = number | name [ '[' sum { , sum } ']' ] [ ' ] | function ( sum ) | ( sum )
 //             | name ( sum { , sum } )  of a body
-//             | sum ( name = sum .. sum , sum ) | mod ( sum , sum )
+//             | sum ( name = sum .. sum , sum ) | mod ( sum , sum ) | table ( "file" , sum )
 #include "generator/formula/formula.hpp"
 
 #include <fmt/format.h>
@@ -210,6 +210,7 @@ private:
             ++next_;
             if (first.text == "sum") return follow(read_series(first));
             if (first.text == "mod") return follow(read_remainder(first));
+            if (first.text == "table") return follow(read_table(first));
             const Function* function = find_function(std::string(first.text));
             if (function == nullptr && is_function_name(std::string(first.text))) return follow(read_pieced(first));
             return follow(function != nullptr ? read_call(first, *function) : read_name(first));
@@ -289,6 +290,24 @@ private:
         remainder.operands.push_back(read_sum());
         expect(')', open);
         return remainder;
+    }
+
+    Syntax read_table(const Token& name) {
+        constexpr std::string_view form = "table(\"file.csv\", a)";
+        refuse_without_parenthesis(name, std::string(form));
+        const Token open = tokens_[next_++], file = token();
+        if (file.kind != Token::Kind::text)
+            fail(file, fmt::format("measured values are written {}, with the name of a file in quotes", form));
+        if (!tokens_[++next_].is(',')) fail(token(), fmt::format("measured values are written {}", form));
+        ++next_;
+        if (++function_depth_ > ExpressionLimits::function_depth)
+            fail(name, fmt::format("functions of functions in {} are more than {} deep; write it with fewer",
+                                   scope_.formula, ExpressionLimits::function_depth));
+        Syntax table = node(Kind::table, name, read_sum());
+        --function_depth_;
+        table.file = file;
+        expect(')', open);
+        return table;
     }
 
     // The order of a and b in if(a < b, c, d) is turned round.
@@ -437,7 +456,7 @@ private:
         if (token().is('(')) {
             std::vector<std::string> names;
             for (const Function& function : functions()) names.push_back(function.name);
-            names.insert(names.end(), {"sum", "mod"});
+            names.insert(names.end(), {"sum", "mod", "table"});
             for (const auto& [name, form] : pieced_functions()) names.push_back(name);
             const std::string near = name == "ln" ? " Write log." : suggestion(name, names);
             fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula,

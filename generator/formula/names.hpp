@@ -63,11 +63,18 @@ struct Switch {
     Position at;
 };
 
+// A file of measured values: the number of its spline, and where it is named first.
+struct TableUse {
+    int spline;
+    Position at;
+};
+
 struct Names {
     std::vector<Switch> switches;
     std::vector<DomainCondition> conditions;
     bool records = true;  // conditions
     std::map<std::string, Name, std::less<>> all;
+    std::map<std::string, TableUse, std::less<>> tables;  // files that were read
     Flow flow;
     Work work;
 

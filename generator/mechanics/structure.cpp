@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "generator/formula/expansion.hpp"
+#include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/routhian.hpp"
 #include "generator/mechanics/sample.hpp"
@@ -520,11 +521,38 @@ private:
             find("inputs", true,
                  list + ": a program may change them before each step with set_inputs(), and the energy with them");
         }
+        measured_values();
         if (!scene_.constants.empty()) {
             std::string list;
             for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;
             find("constant parameters", true, list + ": numbers in the formulas, not arguments of them");
         }
+    }
+
+    // What is not smooth in them, and not cut at; where atan2 jumps.
+    void measured_values() {
+        std::set<int> numbers;
+        bool has_angle = false;
+        const auto look_at = [&](const ex& formula) {
+            for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
+                if (!GiNaC::is_a<GiNaC::function>(*part)) continue;
+                if (is_table_value(*part)) numbers.insert(GiNaC::ex_to<GiNaC::numeric>(part->op(0)).to_int());
+                has_angle = has_angle || GiNaC::ex_to<GiNaC::function>(*part).get_name() == "atan2";
+            }
+        };
+        look_at(system_.lagrangian);
+        for (const ex& force : system_.outer_force) look_at(force);
+        for (const Constraint& constraint : system_.constraints) look_at(constraint.value);
+        for (const int number : numbers)
+            find(
+                "measured values", true,
+                fmt::format("{}: cubic polynomials between {} knots, smooth to the second derivative (C2). A step "
+                            "across a knot errs by h^4 where a force is this table, by h^3 where a potential is; steps "
+                            "that end at knots keep the order of the method",
+                            spline_of(number).file(), spline_of(number).x().size()));
+        if (has_angle)
+            find("angles of atan2", true,
+                 "atan2(y, x) jumps by 2*pi where y passes 0 and x is below 0, and no step is cut there");
     }
 
     const Scene& scene_;

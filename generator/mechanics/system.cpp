@@ -14,6 +14,7 @@
 #include <map>
 #include <set>
 
+#include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/mass_equations.hpp"
 #include "generator/mechanics/sample.hpp"
@@ -94,15 +95,27 @@ public:
     Dependence(const Scene& scene, const System& system, const Symbols& motion)
         : scene_(scene), system_(system), motion_(motion) {}
 
-    // A root or other broken power of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2) does: what
-    // holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a point is
-    // constant.
+    // A root, other broken power or table of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2)
+    // does: what holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a
+    // point is constant.
     bool is_broken(const ex& expression) const {
         for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
-            if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::integer) &&
-                !motion_.in(*part).empty())
-                return true;
+            if (is_pieced(*part) && !motion_.in(*part).empty()) return true;
         return false;
+    }
+    // Whether something broken holds positions or velocities.
+    bool is_bent(const ex& expression) const {
+        const std::size_t n = system_.q.size();
+        for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
+            if (is_pieced(*part))
+                for (const std::size_t variable : motion_.in(*part))
+                    if (variable < 2 * n) return true;
+        return false;
+    }
+
+    static bool is_pieced(const ex& part) {
+        return is_table_value(part) ||
+               (GiNaC::is_a<GiNaC::power>(part) && !part.op(1).info(GiNaC::info_flags::integer));
     }
 
     std::vector<Kind> of(const std::vector<ex>& expressions) const {
@@ -404,7 +417,7 @@ private:
             ex& value = i < n ? system_.momentum[i] : system_.force[i - n];
             if (kinds[i].zero) value = 0;
             if (kinds[i].on_t) system_.autonomous = false;
-            if (!dependence.is_broken(value)) continue;
+            if (!dependence.is_bent(value)) continue;
             system_.linear = false;
             if (kinds[i].on_v && i >= n)
                 refuse_separable("f_" + coordinate_of(i - n) + ": the force depends on the velocity");

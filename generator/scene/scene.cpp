@@ -60,6 +60,7 @@ public:
         system_.read_view();
         system_.add_switches();
         refuse_beside_impacts();
+        for (const auto& [file, use] : system_.tables()) scene_.tables.push_back(use);
         system_.refuse_unused();
         return std::move(scene_);
     }

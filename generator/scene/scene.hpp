@@ -167,6 +167,7 @@ struct Scene {
     std::vector<Constraint> constraints;
     std::vector<Impact> impacts;
     std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
+    std::vector<TableUse> tables;             // measured values in any formula
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
     std::optional<Clock> clock;

@@ -13,6 +13,7 @@
 #include "base/rows.hpp"
 #include "base/shifts.hpp"
 #include "base/solve.hpp"
+#include "base/spline.hpp"
 #include "base/trigonometry.hpp"
 #include "iteration/constrained_fixed_point.hpp"
 #include "iteration/convergence.hpp"

@@ -332,7 +332,7 @@ TEST_CASE("two coordinates with a coupled mass matrix compile, linear and not" *
 TEST_CASE("every function a scene may use compiles" * doctest::test_suite("slow")) {
     check_compiles({"functions_all",
                     "q'^2/2 - sqrt(1 + q^2)*tan(q/4) - exp(q)*log(2 + q^2) - sinh(q)*cosh(q)*tanh(q) - "
-                    "asin(q/9)*acos(q/9)*atan(q) - (2 + q)^(a/3)",
+                    "asin(q/9)*acos(q/9)*atan(q) - (2 + q)^(a/3) - atan2(q, a) - atan2(a, q)*atan2(q, 2 + q)",
                     {"q"},
                     {"a"}},
                    {4});
