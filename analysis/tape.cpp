@@ -6,6 +6,8 @@
 #include <map>
 #include <string>
 
+#include "generator/formula/spline.hpp"
+
 namespace lobatto {
 
 using GiNaC::ex;
@@ -29,14 +31,22 @@ bool Tape::append(const ex& formula, const std::vector<GiNaC::symbol>& variables
         instruction.operation = Operation::variable;
         instruction.variable = static_cast<std::size_t>(found - variables.begin());
     } else if (is_function || is_power || GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula)) {
-        for (const ex& operand : formula)
-            if (!append(operand, variables)) return false;
+        for (std::size_t i = is_table_value(formula) ? 2 : 0; i < formula.nops(); ++i)
+            if (!append(formula.op(i), variables)) return false;
         instruction.operands = static_cast<int>(formula.nops());
         instruction.operation = is_function                        ? Operation::call
                                 : is_power                         ? Operation::power
                                 : GiNaC::is_a<GiNaC::add>(formula) ? Operation::sum
                                                                    : Operation::product;
-        if (is_function) {
+        if (is_table_value(formula)) {
+            instruction.operation = Operation::table;
+            instruction.operands = 1;
+            instruction.spline = GiNaC::ex_to<GiNaC::numeric>(formula.op(0)).to_int();
+            instruction.order = GiNaC::ex_to<GiNaC::numeric>(formula.op(1)).to_int();
+        } else if (is_function && formula.nops() == 2) {
+            if (GiNaC::ex_to<GiNaC::function>(formula).get_name() != "atan2") return false;
+            instruction.operation = Operation::angle;
+        } else if (is_function) {
             const auto found = functions.find(GiNaC::ex_to<GiNaC::function>(formula).get_name());
             if (found == functions.end()) return false;
             instruction.function = found->second;
@@ -65,6 +75,9 @@ Tape::Value Tape::sized(const std::vector<double>& variables) const {
         double result = *first;
         if (instruction.operation == Operation::call) result = instruction.function(*first);
         if (instruction.operation == Operation::power) result = std::pow(first[0], first[1]);
+        if (instruction.operation == Operation::table)
+            result = spline_of(instruction.spline)(instruction.order, *first);
+        if (instruction.operation == Operation::angle) result = std::atan2(first[0], first[1]);
         size = std::fabs(result);
         for (auto operand = first + 1; operand != stack.end(); ++operand) {
             if (instruction.operation == Operation::sum) {

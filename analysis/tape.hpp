@@ -21,13 +21,14 @@ public:
     double operator()(const std::vector<double>& variables) const { return sized(variables).value; }
 
 private:
-    enum class Operation { number, variable, sum, product, power, call };
+    enum class Operation { number, variable, sum, product, power, call, angle, table };
     struct Instruction {
         Operation operation;
         double number = 0;
         std::size_t variable = 0;
         int operands = 0;
         double (*function)(double) = nullptr;
+        int spline = 0, order = 0;  // table
     };
     bool append(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables);
 

@@ -88,6 +88,13 @@ double lobatto_scene_parameter_value(const lobatto_scene* scene, size_t index) {
     const api::Variable* const found = scene->parameter(index);
     return found == nullptr ? 0 : found->value;
 }
+size_t lobatto_scene_inputs(const lobatto_scene* scene) {
+    return scene->value ? scene->value->inputs().size() : 0;
+}
+const char* lobatto_scene_input_name(const lobatto_scene* scene, size_t index) {
+    const api::Variable* const found = scene->value ? api::element(&scene->value->inputs(), index) : nullptr;
+    return found == nullptr ? nullptr : found->name.c_str();
+}
 size_t lobatto_scene_events(const lobatto_scene* scene) {
     return scene->value ? scene->value->events().size() : 0;
 }
@@ -135,6 +142,9 @@ int lobatto_integrator_advance_to(lobatto_integrator* integrator, double t) {
 int lobatto_integrator_set(lobatto_integrator* integrator, const char* parameter, double value) {
     return integrator->with_stepper(
         [&](api::Stepper& stepper) { stepper.set(parameter == nullptr ? "" : parameter, value); });
+}
+int lobatto_integrator_set_inputs(lobatto_integrator* integrator, const double* values) {
+    return integrator->with_stepper([&](api::Stepper& stepper) { stepper.set_inputs(values); });
 }
 int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity) {
     return integrator->with_stepper([&](api::Stepper& stepper) {

@@ -18,7 +18,7 @@ namespace lobatto::api {
 
 struct Scene::Parts {
     lobatto::Scene scene;
-    std::vector<Variable> coordinates, parameters;
+    std::vector<Variable> coordinates, parameters, inputs;
     std::vector<std::string> events;
     double step, until;
 };
@@ -28,7 +28,7 @@ struct Kernel::Parts {
     lobatto::Kernel kernel;
     std::string digest;
     TrajectoryRequest start;  // of the scene, in numbers
-    std::vector<Variable> coordinates, parameters;
+    std::vector<Variable> coordinates, parameters, inputs;
     std::vector<std::string> events;
 };
 
@@ -63,6 +63,7 @@ lobatto::Scene with_method(const Scene& scene, const Settings& settings);
 // With their initial positions and their values.
 std::vector<Variable> coordinates_of(const lobatto::Scene& scene);
 std::vector<Variable> parameters_of(const lobatto::Scene& scene);
+std::vector<Variable> inputs_of(const lobatto::Scene& scene);
 std::vector<std::string> events_of(const lobatto::Scene& scene);
 
 }  // namespace lobatto::api

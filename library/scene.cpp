@@ -74,11 +74,23 @@ std::vector<Variable> coordinates_of(const lobatto::Scene& scene) {
     return variables;
 }
 
+namespace {
+
+Variable variable_of(const lobatto::Scene& scene, const Parameter& parameter) {
+    return {parameter.name, parameter.unit, scene.evaluate(parameter.value, parameter.name).to_double()};
+}
+
+}  // namespace
+
 std::vector<Variable> parameters_of(const lobatto::Scene& scene) {
     std::vector<Variable> variables;
+    for (const Parameter& parameter : scene.parameters) variables.push_back(variable_of(scene, parameter));
+    return variables;
+}
+std::vector<Variable> inputs_of(const lobatto::Scene& scene) {
+    std::vector<Variable> variables;
     for (const Parameter& parameter : scene.parameters)
-        variables.push_back(
-            {parameter.name, parameter.unit, scene.evaluate(parameter.value, parameter.name).to_double()});
+        if (parameter.is_input) variables.push_back(variable_of(scene, parameter));
     return variables;
 }
 
@@ -91,10 +103,11 @@ std::vector<std::string> events_of(const lobatto::Scene& scene) {
 namespace {
 
 std::shared_ptr<const Scene::Parts> parts_of(const Source& source) {
-    auto parts = std::make_shared<Scene::Parts>(Scene::Parts{read_scene(source), {}, {}, {}, 0, 0});
+    auto parts = std::make_shared<Scene::Parts>(Scene::Parts{read_scene(source), {}, {}, {}, {}, 0, 0});
     const lobatto::Scene& scene = parts->scene;
     parts->coordinates = coordinates_of(scene);
     parts->parameters = parameters_of(scene);
+    parts->inputs = inputs_of(scene);
     parts->events = events_of(scene);
     parts->step = scene.evaluate(scene.run.step, "the step").to_double();
     parts->until = scene.evaluate(scene.run.until, "the end time").to_double();
@@ -130,6 +143,9 @@ const std::vector<Variable>& Scene::coordinates() const {
 }
 const std::vector<Variable>& Scene::parameters() const {
     return parts_->parameters;
+}
+const std::vector<Variable>& Scene::inputs() const {
+    return parts_->inputs;
 }
 const std::vector<std::string>& Scene::events() const {
     return parts_->events;

@@ -33,6 +33,9 @@ const std::vector<Variable>& Kernel::coordinates() const {
 const std::vector<Variable>& Kernel::parameters() const {
     return parts_->parameters;
 }
+const std::vector<Variable>& Kernel::inputs() const {
+    return parts_->inputs;
+}
 const std::vector<std::string>& Kernel::events() const {
     return parts_->events;
 }
@@ -55,9 +58,9 @@ Kernel compile(const Scene& scene, const Settings& settings) {
         const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
         LoadedStepper<double> stepper(kernel);
         const TrajectoryRequest start = request_of(changed, steps.count, stepper);
-        return Kernel(std::make_shared<const Kernel::Parts>(Kernel::Parts{changed, kernel, source.digest, start,
-                                                                          coordinates_of(changed),
-                                                                          parameters_of(changed), events_of(changed)}));
+        return Kernel(std::make_shared<const Kernel::Parts>(
+            Kernel::Parts{changed, kernel, source.digest, start, coordinates_of(changed), parameters_of(changed),
+                          inputs_of(changed), events_of(changed)}));
     });
 }
 
@@ -112,6 +115,29 @@ struct Stepper::Parts {
         lobatto_status status = stepper.prepare(parameters, step);
         if (status == LOBATTO_OK) status = stepper.start(time, q, p);
         if (status != LOBATTO_OK) fail(status, {});
+    }
+
+    // Parameters from `first` on; where the kernel refuses them, those of before.
+    void change(std::size_t first, const std::vector<double>& values) {
+        const std::vector<double> before = parameters;
+        std::copy(values.begin(), values.end(), parameters.begin() + static_cast<std::ptrdiff_t>(first));
+        if (parameters == before) return;
+        const lobatto_kernel& table = stepper.kernel().table();
+        const auto begin = static_cast<std::size_t>(table.first_input),
+                   end = begin + static_cast<std::size_t>(table.inputs);
+        const bool are_inputs = first >= begin && first + values.size() <= end;
+        const auto take = [&] {
+            last_step = 0;
+            if (!are_inputs) return restart();
+            if (const lobatto_status status = stepper.set_inputs(parameters); status != LOBATTO_OK) fail(status, {});
+        };
+        try {
+            take();
+        } catch (...) {
+            parameters = before;
+            restart();
+            throw;
+        }
     }
 
     // Of steps of equal length; with a clock, of arrivals after `interval` each, at most at `end`.
@@ -203,6 +229,9 @@ Stepper::~Stepper() = default;
 std::size_t Stepper::coordinates() const {
     return parts_->n();
 }
+std::size_t Stepper::inputs() const {
+    return parts_->kernel.inputs().size();
+}
 double Stepper::step_size() const {
     return parts_->step;
 }
@@ -272,7 +301,8 @@ std::pair<std::vector<double>, std::vector<double>> Stepper::at(double t) const 
     return guarded([&] {
         const Parts& parts = *parts_;
         if (parts.last_step == 0)
-            throw InputError("at: no step was taken yet, or a stop or another start came after it; take one first");
+            throw InputError(
+                "at: no step was taken yet, or a stop, another start or parameter came after it; take one first");
         const double theta = 1 + (t - parts.time) / parts.last_step;
         if (!(theta >= -1e-9 && theta <= 1 + 1e-9) || parts.is_clocked())
             throw InputError(
@@ -306,13 +336,13 @@ std::vector<double> Stepper::tangent() const {
 namespace {
 
 std::size_t parameter_index(const Kernel& kernel, const std::string& name) {
+    const std::vector<Variable>& all = kernel.parameters();
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Variable& one) { return one.name == name; });
+    if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
     std::vector<std::string> names;
-    for (const Variable& parameter : kernel.parameters()) names.push_back(parameter.name);
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end())
-        throw InputError(
-            fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
-    return static_cast<std::size_t>(found - names.begin());
+    for (const Variable& parameter : all) names.push_back(parameter.name);
+    throw InputError(
+        fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
 }
 
 }  // namespace
@@ -321,18 +351,12 @@ double Stepper::parameter(const std::string& name) const {
     return guarded([&] { return parts_->parameters[parameter_index(parts_->kernel, name)]; });
 }
 void Stepper::set(const std::string& name, double value) {
+    guarded([&] { parts_->change(parameter_index(parts_->kernel, name), {value}); });
+}
+void Stepper::set_inputs(const double* values) {
     guarded([&] {
-        double& parameter = parts_->parameters[parameter_index(parts_->kernel, name)];
-        if (parameter == value) return;
-        const double before = parameter;
-        parameter = value;
-        try {
-            parts_->restart();
-        } catch (...) {
-            parameter = before;
-            parts_->restart();
-            throw;
-        }
+        const lobatto_kernel& table = parts_->stepper.kernel().table();
+        parts_->change(static_cast<std::size_t>(table.first_input), {values, values + table.inputs});
     });
 }
 

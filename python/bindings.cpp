@@ -333,7 +333,8 @@ void add_scene(py::module_& module) {
         .def_property_readonly("text", &lob::Scene::text, "Of the scene file.")
         .def_property_readonly("lagrangian", &lob::Scene::lagrangian)
         .def_property_readonly("coordinates", &lob::Scene::coordinates)
-        .def_property_readonly("parameters", &lob::Scene::parameters)
+        .def_property_readonly("parameters", &lob::Scene::parameters, "Inputs too.")
+        .def_property_readonly("inputs", &lob::Scene::inputs)
         .def_property_readonly("events", &lob::Scene::events)
         .def_property_readonly("method", &lob::Scene::method)
         .def_property_readonly("step", &lob::Scene::step)
@@ -386,7 +387,18 @@ void add_stepper(py::module_& module) {
             },
             py::arg("t"), py::arg("q"), py::arg("p") = py::none(), py::kw_only(), py::arg("velocity") = py::none(),
             "Another place to go on from: positions, and momenta or velocities.")
-        .def("set", &lob::Stepper::set, py::arg("name"), py::arg("value"), "A parameter, from the next step on.")
+        .def("set", &lob::Stepper::set, py::arg("name"), py::arg("value"),
+             "A parameter or an input, from the next step on.")
+        .def(
+            "set_inputs",
+            [](lob::Stepper& stepper, const Array& values) {
+                const std::size_t wanted = stepper.inputs();
+                if (values.ndim() != 1 || static_cast<std::size_t>(values.size()) != wanted)
+                    throw lob::InputError("set_inputs needs " + std::to_string(wanted) +
+                                          " numbers, one for each input of the scene");
+                stepper.set_inputs(values.data());
+            },
+            py::arg("values"), "All inputs of the scene, in its order, from the next step on.")
         .def("parameter", &lob::Stepper::parameter, py::arg("name"))
         .def(
             "copy", [](const lob::Stepper& stepper) { return lob::Stepper(stepper); }, "A second motion from here.")

@@ -69,10 +69,32 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
     return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
 }
 
+// Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
+std::string end_of_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
+                         const RunObservers& observers) {
+    LoadedStepper<double> stepper(run.plain);
+    std::vector<double> velocity;
+    if (run.scene.tables.empty() || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
+        return "";
+    std::vector<double> ahead = {result.time + request.step};
+    for (std::size_t k = 0; k < velocity.size(); ++k) ahead.push_back(result.q[k] + request.step * velocity[k]);
+    ahead.insert(ahead.end(), result.p.begin(), result.p.end());
+    const std::string what = observers.domains.text(observers.parameters, ahead.data());
+    if (what.empty()) return "";
+    return fmt::format(
+        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, and has no "
+        "value "
+        "there. Try an earlier end, or measure further.",
+        result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), what);
+}
+
 // Of a run whose steps failed, that left its motion or lost it, or whose energy is no number. Empty: of none.
 std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
-                       const std::string& departure) {
+                       const RunObservers& observers, const std::string& departure) {
     const Scene& scene = run.scene;
+    if (result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED)
+        if (const std::string why = end_of_table(run, request, result, observers); !why.empty()) return why;
     if (result.status != LOBATTO_OK)
         return explain_stop(result, request, passing_step(run.plain, request, result), clock_advice(scene));
     if (!departure.empty()) return departure;
@@ -121,7 +143,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
             verdict.warnings.push_back(warning);
-    verdict.failure = failure_of(run, request, result, departure);
+    verdict.failure = failure_of(run, request, result, observers, departure);
     return verdict;
 }
 

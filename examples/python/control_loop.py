@@ -8,7 +8,7 @@ import lobatto
 scene = lobatto.Lagrangian(
     "(M + m)*x'^2/2 + m*l*x'*a'*cos(a) + m*l^2*a'^2/2 - m*g*l*cos(a) + push*x", title="A rod on a cart",
     x=dict(position=0, velocity=0, unit="m"), a=dict(position=0.2, velocity=0, unit="rad"),  # from upright
-    M=1, m=0.2, l=0.5, g=9.81, push=dict(value=0, unit="N"), step=0.01, method=dict(points=3))
+    M=1, m=0.2, l=0.5, g=9.81, push=dict(value=0, unit="N"), inputs=["push"], step=0.01, method=dict(points=3))
 gains = numpy.array([1.0, 35.0, 2.5, 7.0])  # on x, a and their velocities
 cart = lobatto.Stepper(scene)
 while cart.t < 10 - 1e-9:

@@ -164,10 +164,14 @@ protected:
         const auto append = [&list](const std::string& item) { list += (list.empty() ? "" : ", ") + item; };
         for (const Coordinate& coordinate : d_.scene.coordinates) append(with_unit(coordinate.name, coordinate.unit));
         facts.emplace_back("Coordinates", list);
-        for (const auto& [title, parameters] :
-             {std::pair{"Parameters", &d_.scene.parameters}, std::pair{"Constants", &d_.scene.constants}}) {
+        std::vector<Parameter> parameters, inputs;
+        for (const Parameter& parameter : d_.scene.parameters)
+            (parameter.is_input ? inputs : parameters).push_back(parameter);
+        const auto& constants = d_.scene.constants;
+        for (const auto& [title, of] :
+             {std::pair{"Parameters", parameters}, std::pair{"Inputs", inputs}, std::pair{"Constants", constants}}) {
             list.clear();
-            for (const Parameter& parameter : *parameters)
+            for (const Parameter& parameter : of)
                 append(with_unit(parameter.name + " = " + canonical_text(parameter.value), parameter.unit));
             if (!list.empty()) facts.emplace_back(title, list);
         }

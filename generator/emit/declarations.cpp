@@ -203,6 +203,9 @@ const std::set<std::string>& member_names() {
                                                 "reset_of",
                                                 "parameter",
                                                 "prepare",
+                                                "inputs",
+                                                "first_input",
+                                                "set_inputs",
                                                 "Parameters",
                                                 "Coefficients",
                                                 "CoefficientsOf",
@@ -216,7 +219,10 @@ bool is_member_name(const std::string& name) {
         return std::any_of(declarations(form).begin(), declarations(form).end(),
                            [&](const Declaration& declaration) { return declaration.program == name; });
     };
-    return member_names().contains(name) || is_function(Form::separable) || is_function(Form::general);
+    // Those of measured values (generator/formula/spline.hpp).
+    const bool is_table = name.starts_with("table_") && name.size() == 13 &&
+                          name.find_first_not_of("0123456789abcdef", 6) == std::string::npos;
+    return is_table || member_names().contains(name) || is_function(Form::separable) || is_function(Form::general);
 }
 
 }  // namespace lobatto

@@ -13,6 +13,7 @@
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/looped.hpp"
 #include "generator/emit/tables.hpp"
+#include "generator/formula/spline.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "generator/programs/identifier.hpp"
 #include "generator/programs/programs.hpp"
@@ -66,6 +67,14 @@ std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
     return angles;
 }
 
+// Which splines occur in what a kernel computes.
+std::set<int> splines_of(const Programs& programs) {
+    std::set<int> numbers;
+    for (Id id = 0; id < programs.graph.size(); ++id)
+        if (programs.graph[id].op == Op::table) numbers.insert(programs.graph[id].index / 4);
+    return numbers;
+}
+
 class Emitter {
 public:
     Emitter(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options)
@@ -88,8 +97,8 @@ public:
         text += options_.support_text ? options_.support_text(support) : "#include \"kernel.hpp\"\n";
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
-                tables(d_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") + parameters() +
-                coefficients() + prepare(name);
+                tables(d_, options_.precision) + measured() + (d_.structure.looped ? looped_.tables() : "") +
+                parameters() + coefficients() + prepare(name) + set_inputs();
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -195,6 +204,7 @@ private:
             if (!unit.empty()) unit = "[" + unit + "]";
             if (identifier(parameter.name) != parameter.name)  // C++ or <complex.h> has that name
                 unit += (unit.empty() ? "" : " ") + ("the scene's " + parameter.name);
+            if (parameter.is_input) unit += (unit.empty() ? "" : " ") + std::string("an input: set_inputs()");
             text += unit.empty()
                         ? fmt::format("        {}\n", lines[i])
                         : fmt::format("        {:<{}}  // {}\n", lines[i], std::min<std::size_t>(widest, 60), unit);
@@ -312,6 +322,69 @@ private:
                        std::string(name.size() + result.size() + 13, ' '));
     }
 
+    // Whether a value changes with the inputs of the scene.
+    bool holds_input(Id id) const {
+        const std::vector<Id> below = p_.graph.topological({id});
+        return std::any_of(below.begin(), below.end(), [&](Id one) {
+            if (p_.graph[one].op != Op::input || p_.graph[one].phase != Phase::parameter) return false;
+            const auto& all = d_.scene.parameters;
+            return std::any_of(all.begin(), all.end(), [&](const Parameter& parameter) {
+                return parameter.is_input && identifier(parameter.name) == p_.graph.input_of(one).code;
+            });
+        });
+    }
+
+    // (D60) What prepare() gives, as far as it changes with inputs.
+    std::string set_inputs() const {
+        if (d_.system.inputs.empty()) return "";
+        std::vector<Output> statements, all;
+        std::string finite;
+        for (const Id id : hoisted_.order) all.push_back({"k." + hoisted_.names.at(id), id});
+        if (d_.structure.looped)
+            for (const Output& statement : looped_.prepared()) all.push_back(statement);
+        for (const Output& statement : all) {
+            if (!holds_input(statement.value)) continue;
+            statements.push_back(statement);
+            finite += (finite.empty() ? "" : ", ") + statement.target;
+        }
+        const auto names = [&](Id id) -> std::string {
+            if (holds_input(id)) return p_.graph[id].op == Op::input ? "p." + p_.graph.input_of(id).code : "";
+            if (const std::string field = field_name(id); !field.empty()) return "k." + field;
+            if (p_.graph[id].op != Op::input) return "";
+            return p_.graph[id].phase == Phase::parameter ? "p." + p_.graph.input_of(id).code
+                                                          : p_.graph.input_of(id).code;
+        };
+        std::string text =
+            FunctionText(p_, statements, names, {options_.precision, Phase::step_size, false, false, Notation::cpp, {}})
+                .lines();
+        if (!finite.empty())
+            text +=
+                wrapped("        if (!lobatto::is_finite(" + finite + ")) return Status::not_finite;", "            ");
+        text += "        return Status::ok;\n";
+        return "\n    // (D60) The same after other values of inputs alone.\n" +
+               signature("Status", "set_inputs", {{"const Parameters&", "p"}, {"real", "h"}, {"Coefficients&", "k"}},
+                         text) +
+               text + "    }\n";
+    }
+
+    // The splines of the scene, in the order of their names.
+    std::string measured() const {
+        std::string text;
+        for (const int number : splines_of(p_)) {
+            const Spline& spline = spline_of(number);
+            std::vector<cln::cl_R> coefficients;
+            for (const auto& piece : spline.coefficients())
+                coefficients.insert(coefficients.end(), piece.begin(), piece.end());
+            text += fmt::format(
+                "\n    // Measured values, {}: knots x, and between them cubic polynomials in u - x[i] (D61).\n"
+                "    struct {} {{\n        static constexpr int points = {};\n",
+                comment_safe(spline.file()), spline_name(number), spline.x().size());
+            text += value_table("x", spline.x(), options_.precision) +
+                    value_table("c", coefficients, options_.precision) + "    };\n";
+        }
+        return text;
+    }
+
     // How a function reaches a value that it does not compute.
     std::string name_of(Id id) const {
         const std::string field = field_name(id);
@@ -412,6 +485,7 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
     if (has_full_matrix(derivation)) parts.insert("base/full_matrix.hpp");
     if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
+    if (!derivation.system.inputs.empty()) parts.insert("steppers/inputs.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
             case Op::sin:
             case Op::cos:
@@ -429,7 +503,11 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
                 break;
             case Op::asin:
             case Op::acos:
+            case Op::table:
+                parts.insert("base/spline.hpp");
+                break;
             case Op::atan:
+            case Op::atan2:
                 parts.insert("base/arc.hpp");
                 break;
             default:

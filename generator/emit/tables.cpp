@@ -171,6 +171,15 @@ std::string number_table(const std::string& name, const std::vector<GiNaC::ex>& 
     return vector_text(name, values, precision, exact);
 }
 
+std::string value_table(const std::string& name, const std::vector<cln::cl_R>& values, Precision precision) {
+    Graph graph;
+    std::string numbers;
+    for (const cln::cl_R& value : values)
+        numbers += (numbers.empty() ? "" : ", ") + formula(graph, graph.constant(value), Notation::cpp, {}, precision);
+    return wrapped(fmt::format("        static constexpr real {}[{}] = {{{}}};", name, values.size(), numbers),
+                   "            ");
+}
+
 const char* type_name(Precision precision) {
     switch (precision) {
         case Precision::single:
@@ -242,6 +251,12 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size() - (d.scene.clock ? 1 : 0)),
          d.scene.clock ? "in the order of the scene; the one after them is the energy at the start"
                        : "in the order of the scene");
+    if (const std::size_t inputs = d.system.inputs.size(); inputs > 0) {
+        const auto& all = d.scene.parameters;
+        const auto first = std::find_if(all.begin(), all.end(), [](const Parameter& one) { return one.is_input; });
+        line(text, fmt::format("int inputs = {}", inputs), "parameters that set_inputs() may change before a step");
+        line(text, fmt::format("int first_input = {}", first - all.begin()), "which are one after another");
+    }
     text += watched_shapes(d.scene);
     if (structure.form() == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.system, d.quadrature.points, precision);

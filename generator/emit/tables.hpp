@@ -30,5 +30,6 @@ const char* type_name(Precision precision);
 // static constexpr int NAME[...] = {...}; and real NAME[...] likewise.
 std::string integer_table(const std::string& name, const std::vector<int>& values);
 std::string number_table(const std::string& name, const std::vector<GiNaC::ex>& values, Precision precision);
+std::string value_table(const std::string& name, const std::vector<cln::cl_R>& values, Precision precision);
 
 }  // namespace lobatto

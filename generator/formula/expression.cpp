@@ -4,8 +4,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <utility>
+
+#include "generator/formula/spline.hpp"
 
 namespace lobatto {
 namespace {
@@ -169,6 +173,8 @@ private:
                 return series(formula, frame, arithmetic);
             case Kind::pieced:
                 return pieced(formula, frame, arithmetic);
+            case Kind::table:
+                return table(formula, frame, arithmetic);
             case Kind::remainder:
                 break;
         }
@@ -189,6 +195,13 @@ private:
             if (name == "hypot")
                 return arithmetic.call(*find_function("sqrt"), arithmetic.add(arithmetic.multiply(parts[0], parts[0]),
                                                                               arithmetic.multiply(parts[1], parts[1])));
+            if (name == "atan2") {
+                require(
+                    DomainCondition::Kind::nonzero,
+                    arithmetic.add(arithmetic.multiply(parts[0], parts[0]), arithmetic.multiply(parts[1], parts[1])),
+                    "atan2, which has no value where both of its arguments are 0,", formula);
+                return arithmetic.angle(parts[0], parts[1]);
+            }
             const bool is_of_one = name == "abs" || name == "sign";
             const Operand side = side_of(is_of_one ? parts[0] : less(parts[0], parts[1]), formula, frame);
             if (name == "sign") return side;
@@ -200,6 +213,48 @@ private:
             const Operand &first = parts[is_if ? 2 : is_min ? 1 : 0], &second = parts[is_if ? 3 : is_min ? 0 : 1];
             return arithmetic.add(arithmetic.multiply(above, first), arithmetic.multiply(below, second));
         });
+    }
+
+    Operand table(const Syntax& formula, Frame& frame, const Arithmetic& arithmetic) {
+        const int number = read_table(formula, frame);
+        const Spline& spline = spline_of(number);
+        const Operand argument = evaluate(formula.operands[0], frame);
+        return computed(formula.at, frame, [&] {
+            const auto end = [](const cln::cl_R& x) { return operand_of(numeric(cln::rationalize(x))); };
+            const Operand first = end(spline.x().front()), last = end(spline.x().back());
+            const std::string what = fmt::format("the table {}, which goes from {:.6g} to {:.6g},", spline.file(),
+                                                 first.value->to_double(), last.value->to_double());
+            const auto least = DomainCondition::Kind::nonnegative;
+            require(least, arithmetic.add(argument, arithmetic.negate(first)), what, formula);
+            require(least, arithmetic.add(last, arithmetic.negate(argument)), what, formula);
+            return arithmetic.table(number, argument);
+        });
+    }
+
+    // A file beside that of the scene, read once.
+    int read_table(const Syntax& formula, const Frame& frame) {
+        const std::string name(formula.file.text);
+        if (names_ != nullptr)
+            if (const auto known = names_->tables.find(name); known != names_->tables.end())
+                return known->second.spline;
+        const std::filesystem::path path(name);
+        const auto refuse = [&](const std::string& why) { fail(formula.file, frame, why); };
+        if (name.empty()) refuse("the file of a table has no name");
+        if (!is_printable(name) || name.find('\\') != std::string::npos)
+            refuse("the name of a table holds no control characters and no backslashes");
+        if (path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end())
+            refuse(
+                "a table lies in the folder of its scene, or below it: write its place from there, without /.. and "
+                "without / at the beginning");
+        const std::filesystem::path whole = std::filesystem::path(source_.path()).parent_path() / path;
+        std::error_code error;
+        if (!std::filesystem::exists(whole, error))
+            refuse(fmt::format("there is no file {} for this table", whole.string()));
+        if (!std::filesystem::is_regular_file(whole, error))
+            refuse(fmt::format("{} is no file that a table can be read from", whole.string()));
+        const int number = number_of(read_spline(Source::read(whole.string(), "table"), name));
+        if (names_ != nullptr) names_->tables.emplace(name, TableUse{number, formula.at.at});
+        return number;
     }
 
     // 1 where u > 0, -1 where it is below: a number where that is known, else the side of a switch.
@@ -320,6 +375,10 @@ private:
             fail(formula.at, frame,
                  fmt::format("{} holds coordinates or the time, which cannot occur in {}: write it with numbers and "
                              "parameters",
+                             definition.label, frame.formula));
+        if (!motion_allowed_ && entry.value.inputs)
+            fail(formula.at, frame,
+                 fmt::format("{} holds an input, which cannot occur in {}: write it with numbers and parameters",
                              definition.label, frame.formula));
         if (!formula.primed) return entry.value;
         if (entry.value.velocities)

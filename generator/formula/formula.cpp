@@ -6,7 +6,7 @@
 //     power   = primary [ ^ signed ]
 //     primary = number | name [ '[' sum { , sum } ']' ] [ ' ] | function ( sum ) | ( sum )
 //             | name ( sum { , sum } )  of a body
-//             | sum ( name = sum .. sum , sum ) | mod ( sum , sum )
+//             | sum ( name = sum .. sum , sum ) | mod ( sum , sum ) | table ( "file" , sum )
 #include "generator/formula/formula.hpp"
 
 #include <fmt/format.h>
@@ -38,6 +38,8 @@ std::string kind_of(const Name& name) {
             return "a coordinate";
         case Name::Role::parameter:
             return "a parameter";
+        case Name::Role::input:
+            return "an input";
         case Name::Role::definition:
             return "a definition";
         case Name::Role::time:
@@ -208,6 +210,7 @@ private:
             ++next_;
             if (first.text == "sum") return follow(read_series(first));
             if (first.text == "mod") return follow(read_remainder(first));
+            if (first.text == "table") return follow(read_table(first));
             const Function* function = find_function(std::string(first.text));
             if (function == nullptr && is_function_name(std::string(first.text))) return follow(read_pieced(first));
             return follow(function != nullptr ? read_call(first, *function) : read_name(first));
@@ -287,6 +290,24 @@ private:
         remainder.operands.push_back(read_sum());
         expect(')', open);
         return remainder;
+    }
+
+    Syntax read_table(const Token& name) {
+        constexpr std::string_view form = "table(\"file.csv\", a)";
+        refuse_without_parenthesis(name, std::string(form));
+        const Token open = tokens_[next_++], file = token();
+        if (file.kind != Token::Kind::text)
+            fail(file, fmt::format("measured values are written {}, with the name of a file in quotes", form));
+        if (!tokens_[++next_].is(',')) fail(token(), fmt::format("measured values are written {}", form));
+        ++next_;
+        if (++function_depth_ > ExpressionLimits::function_depth)
+            fail(name, fmt::format("functions of functions in {} are more than {} deep; write it with fewer",
+                                   scope_.formula, ExpressionLimits::function_depth));
+        Syntax table = node(Kind::table, name, read_sum());
+        --function_depth_;
+        table.file = file;
+        expect(')', open);
+        return table;
     }
 
     // The order of a and b in if(a < b, c, d) is turned round.
@@ -416,13 +437,14 @@ private:
 
     void refuse_by_role(const Syntax& formula, std::string_view base) const {
         const Name::Role role = formula.name->role;
-        if (formula.primed && (role == Name::Role::parameter || role == Name::Role::time))
+        if (formula.primed && role != Name::Role::coordinate && role != Name::Role::definition)
             fail(formula.at,
                  fmt::format("{} is {} and has no velocity; only coordinates have one", base, kind_of(*formula.name)));
         if (scope_.motion_allowed) return;
         std::string what;
         if (role == Name::Role::coordinate) what = formula.primed ? "the velocity" : "the coordinate";
         if (role == Name::Role::time) what = "the time";
+        if (role == Name::Role::input) what = "the input";
         if (formula.primed && role == Name::Role::definition) what = "the velocity";
         if (!what.empty())
             fail(formula.at, fmt::format("{} {}{} cannot occur in {}: write it with numbers and parameters", what, base,
@@ -434,7 +456,7 @@ private:
         if (token().is('(')) {
             std::vector<std::string> names;
             for (const Function& function : functions()) names.push_back(function.name);
-            names.insert(names.end(), {"sum", "mod"});
+            names.insert(names.end(), {"sum", "mod", "table"});
             for (const auto& [name, form] : pieced_functions()) names.push_back(name);
             const std::string near = name == "ln" ? " Write log." : suggestion(name, names);
             fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula,

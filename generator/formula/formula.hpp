@@ -29,7 +29,8 @@ struct Syntax {
         call,
         series,     // sum(index = first .. last, term); operands: first, last, term
         remainder,  // mod(a, b)
-        pieced      // abs(a), sign(a), min(a, b), max(a, b), hypot(a, b), if(a > b, c, d) by its operands a, b, c, d
+        table,      // table("file", a)
+        pieced      // abs(a), sign(a), min(a, b), max(a, b), hypot(a, b), atan2(a, b), if(a > b, c, d): a, b, c, d
     };
     Kind kind = Kind::number;
     Token at;  // a number, a name, an operator: what an error of it points at
@@ -40,6 +41,7 @@ struct Syntax {
     std::size_t index = 0;       // index: how many indices enclose the one it is
     std::string index_name;      // series
     const Function* function = nullptr;  // call
+    Token file;                          // table
 };
 
 // The names a formula may use, and how to speak of the formula in an error ("the Lagrangian").
@@ -52,7 +54,8 @@ struct Scope {
 
 // Grammar: + - * / ^ (right-associative; -x^2 is -(x^2), 2^-1 is allowed), parentheses, numbers, pi, the functions
 // sqrt sin cos tan exp log sinh cosh tanh asin acos atan, x[i] and x[i]', sum(i = first .. last, formula), mod(a, b),
-// and those of pieced_functions(). Throws InputError. Marks the names that occur as used. The tree refers to `text`.
+// table("file", a) and those of pieced_functions(). Throws InputError. Marks the names that occur as used. The tree
+// refers to `text`.
 Syntax parse_formula(const Source& source, const Text& text, const Scope& scope);
 
 // "left = right", "left = right rising", "left = right falling".

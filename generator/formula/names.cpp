@@ -13,6 +13,13 @@ Name& Names::add_parameter(const std::string& name, const std::vector<GiNaC::ex>
     return added;
 }
 
+Name& Names::add_input(const std::string& name, const std::vector<GiNaC::ex>& values, bool array) {
+    Name& added = add_parameter(name, values, array);
+    added.role = Name::Role::input;
+    for (Operand& value : added.values) value.inputs = true;
+    return added;
+}
+
 Name& Names::add_coordinate(const std::string& name, const std::vector<GiNaC::symbol>& positions,
                             const std::vector<GiNaC::symbol>& velocities, bool array) {
     Name& added = all[name];
@@ -41,7 +48,8 @@ std::vector<Spelling> Names::spellings(bool motion_allowed) const {
     std::vector<Spelling> result;
     for (const auto& [name, meaning] : all) {
         const bool coordinate = meaning.role == Name::Role::coordinate;
-        if (!motion_allowed && (coordinate || meaning.role == Name::Role::time)) continue;
+        const bool changes = coordinate || meaning.role == Name::Role::time || meaning.role == Name::Role::input;
+        if (!motion_allowed && changes) continue;
         std::string written = name;
         if (meaning.array) written += "[i]";
         if (meaning.definition && !meaning.definition->indices.empty())

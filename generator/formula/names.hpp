@@ -29,7 +29,7 @@ struct Definition {
 };
 
 struct Name {
-    enum class Role { coordinate, parameter, time, definition };
+    enum class Role { coordinate, parameter, input, time, definition };
     Role role = Role::parameter;
     bool array = false;                      // of coordinates or parameters, written x[1] ... x[n]
     std::vector<Operand> values;             // one, or one an element; a constant parameter's is its exact value
@@ -63,15 +63,23 @@ struct Switch {
     Position at;
 };
 
+// A file of measured values: the number of its spline, and where it is named first.
+struct TableUse {
+    int spline;
+    Position at;
+};
+
 struct Names {
     std::vector<Switch> switches;
     std::vector<DomainCondition> conditions;
     bool records = true;  // conditions
     std::map<std::string, Name, std::less<>> all;
+    std::map<std::string, TableUse, std::less<>> tables;  // files that were read
     Flow flow;
     Work work;
 
     Name& add_parameter(const std::string& name, const std::vector<GiNaC::ex>& values, bool array = false);
+    Name& add_input(const std::string& name, const std::vector<GiNaC::ex>& values, bool array = false);
     Name& add_coordinate(const std::string& name, const std::vector<GiNaC::symbol>& positions,
                          const std::vector<GiNaC::symbol>& velocities, bool array = false);
     Name& add_time(const std::string& name, const GiNaC::symbol& time);

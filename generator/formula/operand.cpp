@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "generator/formula/spline.hpp"
+
 namespace lobatto {
 namespace {
 
@@ -170,6 +172,7 @@ Operand Arithmetic::compute(const std::string& operation, const std::vector<cons
         rational = rational && is_a<numeric>(operand->expression);
         result.moves = result.moves || operand->moves;
         result.velocities = result.velocities || operand->velocities;
+        result.inputs = result.inputs || operand->inputs;
     }
     work_.spend(parts);
     try {
@@ -290,12 +293,36 @@ Operand Arithmetic::call(const Function& function, const Operand& argument) cons
     Operand result = compute(
         function.name, {&argument}, bound, [&] { return function.symbolic(argument.expression); },
         [&] { return real_function(function, real_value(*argument.value)); });
-    const bool as_written = is_a<GiNaC::function>(result.expression) || is_a<numeric>(result.expression);
-    if (!as_written) {  // sqrt(q) is a power, sin(asin(q)) is q
-        measure(result);
-        check(result);
-    }
+    check_call(result);
     return result;
+}
+
+void Arithmetic::check_call(Operand& result) const {
+    const bool as_written = is_a<GiNaC::function>(result.expression) || is_a<numeric>(result.expression);
+    if (as_written) return;  // sqrt(q) is a power, sin(asin(q)) is q
+    measure(result);
+    check(result);
+}
+
+Operand Arithmetic::angle(const Operand& y, const Operand& x) const {
+    Bounds bound = joined(y.extent, x.extent);
+    bound.function_depth += 1;
+    if (y.expression.is_zero() && x.expression.is_zero()) throw Refusal("atan2(0, 0) is no angle");
+    Operand result = compute(
+        "atan2", {&y, &x}, bound, [&] { return GiNaC::atan2(y.expression, x.expression); },
+        [&] { return real_angle(real_value(*y.value), real_value(*x.value)); });
+    check_call(result);
+    return result;
+}
+
+Operand Arithmetic::table(int spline, const Operand& argument) const {
+    Bounds bound = argument.extent;
+    bound.size += 4;
+    bound.levels += 1;
+    bound.function_depth += 1;
+    return compute(
+        "a table", {&argument}, bound, [&] { return ex(table_value(spline, 0, argument.expression)); },
+        [&] { return real_table(spline, 0, real_value(*argument.value)); });
 }
 
 Operand Arithmetic::derivative(const Operand& a, const Flow& flow) const {

@@ -44,6 +44,7 @@ struct Operand {
     // What occurs in it.
     bool moves = false;  // positions or the time
     bool velocities = false;
+    bool inputs = false;
 };
 
 // What a formula asks for and cannot have, as a sentence without its place.
@@ -80,6 +81,8 @@ public:
     Operand invert(const Operand& a) const;
     Operand raise(const Operand& base, const Operand& exponent) const;
     Operand call(const Function& function, const Operand& argument) const;
+    Operand angle(const Operand& y, const Operand& x) const;   // atan2(y, x)
+    Operand table(int spline, const Operand& argument) const;  // its value there
     // d/dt of an expression without velocities.
     Operand derivative(const Operand& a, const Flow& flow) const;
 
@@ -88,6 +91,7 @@ private:
     Operand compute(const std::string& operation, const std::vector<const Operand*>& operands, const Bounds& bound,
                     const Compute& expression, const Value& value) const;
     void check(Operand& result) const;
+    void check_call(Operand& result) const;
     void measure(Operand& operand) const;
     [[noreturn]] void fail_number() const;
     [[noreturn]] void fail_size() const;

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "generator/formula/spline.hpp"
+
 namespace lobatto {
 namespace {
 
@@ -93,14 +95,14 @@ const Function* find_function(const std::string& name) {
 
 const std::vector<std::pair<std::string, std::string>>& pieced_functions() {
     static const std::vector<std::pair<std::string, std::string>> all = {
-        {"abs", "abs(a)"},    {"sign", "sign(a)"},      {"min", "min(a, b)"},
-        {"max", "max(a, b)"}, {"hypot", "hypot(a, b)"}, {"if", "if(a > b, c, d)"}};
+        {"abs", "abs(a)"},        {"sign", "sign(a)"},      {"min", "min(a, b)"},     {"max", "max(a, b)"},
+        {"hypot", "hypot(a, b)"}, {"atan2", "atan2(y, x)"}, {"if", "if(a > b, c, d)"}};
     return all;
 }
 
 bool is_function_name(const std::string& name) {
     const auto is_named = [&](const auto& function) { return function.first == name; };
-    return name == "sum" || name == "mod" || find_function(name) != nullptr ||
+    return name == "sum" || name == "mod" || name == "table" || find_function(name) != nullptr ||
            std::any_of(pieced_functions().begin(), pieced_functions().end(), is_named);
 }
 
@@ -164,6 +166,22 @@ numeric real_function(const Function& function, const numeric& argument) {
     return result;
 }
 
+numeric real_angle(const numeric& y, const numeric& x) {
+    if (y.is_zero() && x.is_zero()) throw NoValue("atan2(0, 0) is no angle");
+    return checked([&] { return GiNaC::atan(y, x); }, fmt::format("atan2 of {} and {}", shown(y), shown(x)));
+}
+
+numeric real_table(int number, int order, const numeric& u) {
+    const Spline& spline = spline_of(number);
+    const cln::cl_R place = cln::the<cln::cl_R>(u.to_cl_N());
+    if (!spline.covers(place)) {
+        const auto end = [](const cln::cl_R& x) { return cln::double_approx(x); };
+        throw NoValue(fmt::format("{} lies outside of the table {}, which goes from {:.6g} to {:.6g}", shown(u),
+                                  spline.file(), end(spline.x().front()), end(spline.x().back())));
+    }
+    return checked([&] { return numeric(spline(order, place)); }, "a value of the table " + spline.file());
+}
+
 numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {
     const auto visit = [&](const ex& operand) { return real_value(operand, symbols); };
     if (is_a<numeric>(expression)) return real_value(ex_to<numeric>(expression));
@@ -177,6 +195,12 @@ numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {
     if (is_a<GiNaC::add>(expression)) return real_sum(each_operand(expression, visit));
     if (is_a<GiNaC::mul>(expression)) return real_product(each_operand(expression, visit));
     if (is_a<GiNaC::power>(expression)) return real_power(visit(expression.op(0)), visit(expression.op(1)));
+    if (is_table_value(expression))
+        return real_table(ex_to<numeric>(expression.op(0)).to_int(), ex_to<numeric>(expression.op(1)).to_int(),
+                          visit(expression.op(2)));
+    if (is_a<GiNaC::function>(expression) && expression.nops() == 2 &&
+        ex_to<GiNaC::function>(expression).get_name() == "atan2")
+        return real_angle(visit(expression.op(0)), visit(expression.op(1)));
     const Function* function =
         is_a<GiNaC::function>(expression) ? find_function(ex_to<GiNaC::function>(expression).get_name()) : nullptr;
     if (function == nullptr) throw NoValue("it is not a formula of known functions");

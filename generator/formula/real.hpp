@@ -24,7 +24,7 @@ struct Function {
 };
 const std::vector<Function>& functions();
 const Function* find_function(const std::string& name);  // nullptr: there is none of this name
-// Functions that are put together from smooth pieces, by their forms: abs(a), max(a, b) ...
+// Functions that are put together from smooth pieces, and others of two arguments, by their forms: abs(a), max(a, b)
 const std::vector<std::pair<std::string, std::string>>& pieced_functions();
 bool is_function_name(const std::string& name);  // also sum and mod
 
@@ -35,6 +35,8 @@ GiNaC::numeric real_sum(const std::vector<GiNaC::numeric>& terms);  // a sum tha
 GiNaC::numeric real_product(const std::vector<GiNaC::numeric>& factors);
 GiNaC::numeric real_power(const GiNaC::numeric& base, const GiNaC::numeric& exponent);
 GiNaC::numeric real_function(const Function& function, const GiNaC::numeric& argument);
+GiNaC::numeric real_angle(const GiNaC::numeric& y, const GiNaC::numeric& x);  // atan2(y, x)
+GiNaC::numeric real_table(int number, int order, const GiNaC::numeric& u);    // a value of a spline
 // The value of a whole expression, its symbols replaced by numbers (60 digits) before anything is computed.
 GiNaC::numeric real_value(const GiNaC::ex& expression, const GiNaC::exmap& symbols = {});
 

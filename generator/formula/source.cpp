@@ -90,9 +90,9 @@ Source::Source(std::string path, std::string content) : path_(std::move(path)), 
                                      content_.size(), largest_file));
 }
 
-Source Source::read(const std::string& path) {
+Source Source::read(const std::string& path, const std::string& what) {
     const auto refuse = [&](const std::string& why) {
-        throw InputError(fmt::format("{}: cannot read the scene: {}", printable(path), why));
+        throw InputError(fmt::format("{}: cannot read the {}: {}", printable(path), what, why));
     };
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
@@ -113,6 +113,8 @@ Source Source::read(const std::string& path) {
     file.read(content.data(), static_cast<std::streamsize>(content.size()));
     content.resize(static_cast<std::size_t>(file.gcount()));
     if (file.bad()) refuse("the file could not be read to its end");
+    if (what != "scene" && content.size() > largest_file)
+        refuse(fmt::format("it has more than {} bytes", largest_file));
     return Source(path, std::move(content));
 }
 

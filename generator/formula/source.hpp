@@ -28,7 +28,8 @@ public:
 class Source {
 public:
     Source(std::string path, std::string content);
-    static Source read(const std::string& path);  // InputError when the file cannot be read or is too large
+    // InputError when the file cannot be read or is too large; `what`: "scene", "table".
+    static Source read(const std::string& path, const std::string& what = "scene");
 
     const std::string& path() const { return path_; }
     const std::string& content() const { return content_; }

@@ -58,7 +58,9 @@ public:
                 tokens.push_back({Token::Kind::end, value_.substr(next_), text_.at[next_]});
                 return tokens;
             }
-            tokens.push_back(read_token());
+            const bool names_file =
+                tokens.size() > 1 && tokens.back().is('(') && tokens[tokens.size() - 2].text == "table";
+            tokens.push_back(names_file && at(0) == '"' ? read_text() : read_token());
         }
     }
 
@@ -86,6 +88,15 @@ private:
         next_ += range ? 2 : 1;
         if (prime && at(0) == '\'') fail_acceleration("x[...]''");
         return token(Token::Kind::sign);
+    }
+
+    // What stands between quotes.
+    Token read_text() {
+        const std::size_t end = value_.find_first_of("\"\n", next_ + 1);
+        if (end == std::string_view::npos || value_[end] != '"') fail(next_, "these quotes are not closed: add a \"");
+        Token file{Token::Kind::text, value_.substr(next_ + 1, end - next_ - 1), text_.at[next_ + 1]};
+        next_ = end + 1;
+        return file;
     }
 
     // 12, 0.5, 1.5e-3, not the points of 1..n; the e belongs to the number only when digits follow.

@@ -11,7 +11,13 @@
 namespace lobatto {
 
 struct Token {
-    enum class Kind { number, name, sign, end };  // sign: one of + - * / ^ ( ) [ ] , = < > .. and the ' after a ]
+    enum class Kind {
+        number,
+        name,
+        text,
+        sign,
+        end
+    };  // text: a file, in quotes; sign: one of + - * / ^ ( ) [ ] , = < > .. and the ' after a ]
     Kind kind = Kind::end;
     std::string_view text;  // as written; a name includes its prime
     Position at;

@@ -41,7 +41,9 @@ enum class Op : std::uint8_t {
     pair_cosine,  // the two halves of a sincos_pair
     raise,        // first operand ^ second operand, any real exponent
     multiply,
-    add  // n-ary
+    add,    // n-ary
+    atan2,  // of two operands, y and x
+    table   // a derivative of a spline; index: 4 times its number plus the order
 };
 
 // When a value is known; of an operation, the maximum over its operands. Hoisting is a partition by phase.
@@ -50,7 +52,7 @@ enum class Phase : std::uint8_t { constant, parameter, step_size, step, iterate 
 struct Node {
     Op op = Op::constant;
     Phase phase = Phase::constant;
-    int index = 0;             // constant, input: which; power: the exponent
+    int index = 0;             // constant, input: which; power: the exponent; table
     std::vector<Id> operands;  // add, multiply: sorted
 };
 

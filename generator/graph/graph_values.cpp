@@ -6,6 +6,7 @@
 
 #include <optional>
 
+#include "generator/formula/spline.hpp"
 #include "generator/graph/graph.hpp"
 
 namespace lobatto {
@@ -27,7 +28,7 @@ std::optional<Op> function_op(const std::string& name) {
     static const std::map<std::string, Op> ops = {{"sin", Op::sin},   {"cos", Op::cos},   {"tan", Op::tan},
                                                   {"exp", Op::exp},   {"log", Op::log},   {"sinh", Op::sinh},
                                                   {"cosh", Op::cosh}, {"tanh", Op::tanh}, {"asin", Op::asin},
-                                                  {"acos", Op::acos}, {"atan", Op::atan}};
+                                                  {"acos", Op::acos}, {"atan", Op::atan}, {"atan2", Op::atan2}};
     const auto found = ops.find(name);
     return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
 }
@@ -102,6 +103,12 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
             return real_part_of(cln::acos(real(x[0])), "acos");
         case Op::atan:
             return cln::zerop(x[0]) ? cln::cl_R(0) : cln::cl_R(cln::atan(real(x[0])));
+        case Op::atan2:
+            if (!cln::zerop(x[0])) return cln::atan(real(x[1]), real(x[0]));
+            if (cln::zerop(x[1])) throw DomainError("atan2 of 0 and 0");
+            return cln::minusp(x[1]) ? cln::cl_R(cln::pi(format)) : cln::cl_R(0);
+        case Op::table:  // beyond its ends as at them: near a start there may be samples that no motion meets
+            return spline_of(exponent / 4)(exponent % 4, real(x[0]));
         case Op::raise:
             if (cln::abs(x[1]) <= 4096 && cln::round1(x[1]) == x[1])
                 return apply(Op::power, cln::cl_I_to_int(cln::round1(x[1])), {x[0]});  // real for a negative base too
@@ -214,9 +221,17 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
             }
         } else if (GiNaC::is_a<GiNaC::function>(e)) {
             const std::string name = GiNaC::ex_to<GiNaC::function>(e).get_name();
+            if (is_table_value(e)) {
+                const auto whole = [&](std::size_t i) { return GiNaC::ex_to<GiNaC::numeric>(e.op(i)).to_int(); };
+                id = raw(Op::table, {self(self, e.op(2))}, 4 * whole(0) + whole(1));
+                done.emplace(e, id);
+                return id;
+            }
             const auto op = function_op(name);
-            if (!op || e.nops() != 1) throw std::logic_error("a function the graph does not know: " + name);
-            id = function(*op, self(self, e.op(0)));
+            if (!op) throw std::logic_error("a function the graph does not know: " + name);
+            std::vector<Id> arguments;
+            for (const auto& argument : e) arguments.push_back(self(self, argument));
+            id = raw(*op, arguments);
         } else {
             throw std::logic_error("an expression the graph does not know");
         }

@@ -12,6 +12,8 @@
 #include <cstdlib>
 #include <sstream>
 
+#include "generator/formula/spline.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -61,6 +63,8 @@ std::string_view function_name(Op op) {
             return "acos";
         case Op::atan:
             return "atan";
+        case Op::atan2:
+            return "atan2";
         default:
             return "";
     }
@@ -112,6 +116,8 @@ public:
             case Op::pair_sine:
             case Op::pair_cosine:
                 return {call(function_name(node.op), graph_[node.operands[0]].operands), atom};
+            case Op::table:
+                return {table_text(node), atom};
             default:
                 return {call(function_name(node.op), node.operands), atom};
         }
@@ -121,18 +127,39 @@ private:
     bool is_cpp() const { return notation_ == Notation::cpp || notation_ == Notation::plain; }
 
     std::string call(std::string_view name, const std::vector<Id>& operands) const {
+        std::string arguments = print(operands[0]).text;
+        for (std::size_t i = 1; i < operands.size(); ++i) arguments += ", " + print(operands[i]).text;
         if (notation_ == Notation::latex)
             return "\\" +
-                   std::string(name == "asin"   ? "arcsin"
-                               : name == "acos" ? "arccos"
-                               : name == "atan" ? "arctan"
-                                                : name) +
-                   "\\left(" + print(operands[0]).text + "\\right)";
+                   std::string(name == "asin"    ? "arcsin"
+                               : name == "acos"  ? "arccos"
+                               : name == "atan"  ? "arctan"
+                               : name == "atan2" ? "operatorname{atan2}"
+                                                 : name) +
+                   "\\left(" + arguments + "\\right)";
         std::string text(name);
         if (is_cpp()) text.insert(0, notation_ == Notation::plain ? "std::" : "lobatto::");
-        text += "(" + print(operands[0]).text;
-        for (std::size_t i = 1; i < operands.size(); ++i) text += ", " + print(operands[i]).text;
-        return text + ")";
+        return text + "(" + arguments + ")";
+    }
+
+    // table("torque.csv", t), table'("torque.csv", t); in code the piece of a cubic that holds the argument.
+    std::string table_text(const Node& node) const {
+        const int number = node.index / 4, order = node.index % 4;
+        const std::string argument = print(node.operands[0]).text;
+        if (is_cpp()) return fmt::format("lobatto::spline<{}, {}>({})", spline_name(number), order, argument);
+        const std::string primes(static_cast<std::size_t>(order), '\'');
+        if (notation_ == Notation::latex)
+            return fmt::format("\\operatorname{{table}}{}\\left(\\text{{{}}}, {}\\right)", primes,
+                               latex_text(spline_of(number).file()), argument);
+        return fmt::format("table{}(\"{}\", {})", primes, spline_of(number).file(), argument);
+    }
+    static std::string latex_text(const std::string& text) {
+        std::string safe;
+        for (const char c : text) {
+            if (std::string_view("#$%&_{}").find(c) != std::string_view::npos) safe += '\\';
+            safe += c == '~' || c == '^' ? '-' : c;
+        }
+        return safe;
     }
 
     std::string enclosed(const Printed& printed, Strength needed) const {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "generator/formula/expansion.hpp"
+#include "generator/formula/spline.hpp"
 #include "generator/graph/graph.hpp"
 
 namespace lobatto {
@@ -142,6 +143,10 @@ private:
                 return GiNaC::acos(operands[0]);
             case Op::atan:
                 return GiNaC::atan(operands[0]);
+            case Op::atan2:
+                return GiNaC::atan2(operands[0], operands[1]);
+            case Op::table:
+                return table_value(node.index / 4, node.index % 4, operands[0]);
             default:
                 throw std::logic_error("an operation that no formula has");
         }

@@ -32,9 +32,9 @@ void refuse_impacts(const Scene& scene, const std::string& what) {
     if (!scene.impacts.empty())
         scene.source.fail(scene.impacts.front().when.at,
                           what + " knows no impacts; run, sweep, emit, derive, check and verify do");
-    if (!scene.switches.empty())
+    if (!scene.switches.empty() || !scene.tables.empty())
         scene.source.fail(
-            scene.switches.front().at,
+            scene.switches.empty() ? scene.tables.front().at : scene.switches.front().at,
             what + " knows smooth formulas only; run, sweep, emit, derive, check and verify know such as this");
 }
 

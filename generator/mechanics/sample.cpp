@@ -77,6 +77,15 @@ cln::cl_R size_of(const Node& node, const Sized& result, const std::vector<Sized
             return cln::max(
                 size, size * cln::max(cln::abs(exponent.value) * base.size / base.value, logarithm * exponent.size));
         }
+        case Op::table: {
+            const cln::cl_R slope =
+                node.index % 4 == 3 ? cln::cl_R(0) : apply(Op::table, node.index + 1, {operands[0].value});
+            return cln::max(size, operands[0].size * cln::abs(slope));
+        }
+        case Op::atan2: {
+            const cln::cl_R &y = operands[0].value, &x = operands[1].value, r = cln::square(x) + cln::square(y);
+            return cln::max(size, (cln::abs(x) * operands[0].size + cln::abs(y) * operands[1].size) / r);
+        }
         default:
             return cln::max(size, operands[0].size * cln::abs(slope(node, operands[0].value, result.value)));
     }

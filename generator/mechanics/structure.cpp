@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "generator/formula/expansion.hpp"
+#include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/routhian.hpp"
 #include "generator/mechanics/sample.hpp"
@@ -186,7 +187,8 @@ private:
         const bool takes_mass = separable_.diagonal_mass || interior_ <= full_mass_limit;
         if (!system_.separable || (!takes_mass && !separable_.is_explicit))
             form_ = Form::general;
-        else if (system_.linear && system_.autonomous && n_ <= linear_map_limit && !polynomial_wanted && takes_mass)
+        else if (system_.linear && system_.autonomous && system_.inputs.empty() && n_ <= linear_map_limit &&
+                 !polynomial_wanted && takes_mass)
             form_ = Form::linear_map;
         if (!separable_.is_explicit) return;
         result_.linear = form_ == Form::linear_map;
@@ -334,6 +336,12 @@ private:
         if (result_.linear || separable_.clean || separable_.is_explicit || interior_ == 0 || !separable_.diagonal_mass)
             return;
         separable_.constant_hessian = SparseMatrix(n_, n_);
+        const auto& curvatures = system_.hessian.entries();
+        if (std::any_of(curvatures.begin(), curvatures.end(),
+                        [&](const auto& entry) { return has_any(entry.second, system_.inputs); })) {
+            find("quadratic part absorbed", false, "the second derivatives of V change with inputs");
+            return;
+        }
         std::vector<GiNaC::symbol> variables = system_.q;
         variables.push_back(system_.t);
         std::vector<ex> whole, rest;
@@ -445,10 +453,11 @@ private:
         const std::string of = system_.separable ? "V" : "L";
         for (const auto& [matrix, by_velocity, then_velocity] : blocks)
             for (const auto& [place, value] : matrix->entries()) {
-                const char* on = has_any(value, system_.q)   ? "position"
-                                 : has_any(value, system_.v) ? "velocity"
-                                 : value.has(system_.t)      ? "time"
-                                                             : nullptr;
+                const char* on = has_any(value, system_.q)        ? "position"
+                                 : has_any(value, system_.v)      ? "velocity"
+                                 : value.has(system_.t)           ? "time"
+                                 : has_any(value, system_.inputs) ? "inputs"
+                                                                  : nullptr;
                 if (on == nullptr) continue;
                 const std::string row = name(place.first), column = name(place.second) + (then_velocity ? "'" : "");
                 const bool outer =
@@ -506,11 +515,44 @@ private:
         find("no forces", driven.empty(),
              driven.empty() ? "all forces come from L, so every step is symplectic"
                             : "forces beside L act on " + names(driven) + ", so energy is gained or lost");
+        if (!system_.inputs.empty()) {
+            std::string list;
+            for (const GiNaC::symbol& input : system_.inputs) list += (list.empty() ? "" : ", ") + input.get_name();
+            find("inputs", true,
+                 list + ": a program may change them before each step with set_inputs(), and the energy with them");
+        }
+        measured_values();
         if (!scene_.constants.empty()) {
             std::string list;
             for (const Parameter& parameter : scene_.constants) list += (list.empty() ? "" : ", ") + parameter.name;
             find("constant parameters", true, list + ": numbers in the formulas, not arguments of them");
         }
+    }
+
+    // What is not smooth in them, and not cut at; where atan2 jumps.
+    void measured_values() {
+        std::set<int> numbers;
+        bool has_angle = false;
+        const auto look_at = [&](const ex& formula) {
+            for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
+                if (!GiNaC::is_a<GiNaC::function>(*part)) continue;
+                if (is_table_value(*part)) numbers.insert(GiNaC::ex_to<GiNaC::numeric>(part->op(0)).to_int());
+                has_angle = has_angle || GiNaC::ex_to<GiNaC::function>(*part).get_name() == "atan2";
+            }
+        };
+        look_at(system_.lagrangian);
+        for (const ex& force : system_.outer_force) look_at(force);
+        for (const Constraint& constraint : system_.constraints) look_at(constraint.value);
+        for (const int number : numbers)
+            find(
+                "measured values", true,
+                fmt::format("{}: cubic polynomials between {} knots, smooth to the second derivative (C2). A step "
+                            "across a knot errs by h^4 where a force is this table, by h^3 where a potential is; steps "
+                            "that end at knots keep the order of the method",
+                            spline_of(number).file(), spline_of(number).x().size()));
+        if (has_angle)
+            find("angles of atan2", true,
+                 "atan2(y, x) jumps by 2*pi where y passes 0 and x is below 0, and no step is cut there");
     }
 
     const Scene& scene_;

@@ -14,6 +14,7 @@
 #include <map>
 #include <set>
 
+#include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/mass_equations.hpp"
 #include "generator/mechanics/sample.hpp"
@@ -83,25 +84,38 @@ ex sum_of(const exvector& terms) {
     return terms.empty() ? ex(0) : ex(GiNaC::add(terms));
 }
 
-// Which of q, v, t the derivatives of a system depend on, from their values at sample points.
+// Which of q, v, t and the inputs the derivatives of a system depend on, from their values at sample points.
 class Dependence {
 public:
     struct Kind {
-        bool zero = true, on_q = false, on_v = false, on_t = false;
+        bool zero = true, on_q = false, on_v = false, on_t = false, on_inputs = false;
+        bool constant() const { return !on_q && !on_v && !on_t && !on_inputs; }
     };
 
     Dependence(const Scene& scene, const System& system, const Symbols& motion)
         : scene_(scene), system_(system), motion_(motion) {}
 
-    // A root or other broken power of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2) does: what
-    // holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a point is
-    // constant.
+    // A root, other broken power or table of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2)
+    // does: what holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a
+    // point is constant.
     bool is_broken(const ex& expression) const {
         for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
-            if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::integer) &&
-                !motion_.in(*part).empty())
-                return true;
+            if (is_pieced(*part) && !motion_.in(*part).empty()) return true;
         return false;
+    }
+    // Whether something broken holds positions or velocities.
+    bool is_bent(const ex& expression) const {
+        const std::size_t n = system_.q.size();
+        for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
+            if (is_pieced(*part))
+                for (const std::size_t variable : motion_.in(*part))
+                    if (variable < 2 * n) return true;
+        return false;
+    }
+
+    static bool is_pieced(const ex& part) {
+        return is_table_value(part) ||
+               (GiNaC::is_a<GiNaC::power>(part) && !part.op(1).info(GiNaC::info_flags::integer));
     }
 
     std::vector<Kind> of(const std::vector<ex>& expressions) const {
@@ -111,7 +125,10 @@ public:
             if (!is_broken(expressions[i])) continue;
             kinds[i].zero = false;
             for (const std::size_t variable : motion_.in(expressions[i]))
-                (variable < n ? kinds[i].on_q : variable < 2 * n ? kinds[i].on_v : kinds[i].on_t) = true;
+                (variable < n        ? kinds[i].on_q
+                 : variable < 2 * n  ? kinds[i].on_v
+                 : variable == 2 * n ? kinds[i].on_t
+                                     : kinds[i].on_inputs) = true;
         }
         return kinds;
     }
@@ -168,15 +185,17 @@ private:
             kinds[i].on_q |= hides(i, system_.q);
             kinds[i].on_v |= hides(i, system_.v);
             kinds[i].on_t |= hides(i, {system_.t});
+            kinds[i].on_inputs |= hides(i, system_.inputs);
         }
         moved(system_.q, &Kind::on_q);
         moved(system_.v, &Kind::on_v);
         moved({system_.t}, &Kind::on_t);
+        if (!system_.inputs.empty()) moved(system_.inputs, &Kind::on_inputs);
     }
 
     const Scene& scene_;
     const System& system_;
-    const Occurrences motion_;  // q, v, t
+    const Occurrences motion_;  // q, v, t, inputs
     const std::shared_ptr<Formulas> formulas_ = std::make_shared<Formulas>();
 };
 
@@ -334,10 +353,12 @@ private:
             system_.outer_force.push_back(coordinate.force);
         }
         for (const Parameter& parameter : scene_.parameters) system_.parameters.push_back(parameter.symbol);
+        system_.inputs = scene_.inputs();
         system_.lagrangian = scene_.lagrangian;
         motion_ = system_.q;
         motion_.insert(motion_.end(), system_.v.begin(), system_.v.end());
         motion_.push_back(system_.t);
+        motion_.insert(motion_.end(), system_.inputs.begin(), system_.inputs.end());
         system_.terms = terms_of(system_.lagrangian, motion_);
         system_.momentum = gradient_of(system_.terms, system_.v);
         system_.force = gradient_of(system_.terms, system_.q);
@@ -371,7 +392,7 @@ private:
             for (const auto& [place, value] : derived[block].entries()) {
                 const Dependence::Kind& kind = kinds[next++];
                 if (kind.zero) continue;
-                const bool constant = !kind.on_q && !kind.on_v && !kind.on_t;
+                const bool constant = kind.constant();
                 const ex kept_value = constant ? constant_form(value, of_motion) : value;
                 kept[block]->put(place.first, place.second, kept_value);
                 system_.linear = system_.linear && constant;
@@ -398,7 +419,8 @@ private:
         if (block == 0 && !constant)
             refuse_separable(text() + (kind.on_v   ? " depends on the velocity"
                                        : kind.on_q ? " depends on the position"
-                                                   : " depends on the time"));
+                                       : kind.on_t ? " depends on the time"
+                                                   : " depends on an input"));
         if (block == 1) refuse_separable(text() + ": the momentum depends on the position");
         if (block == 2) refuse_separable(text() + ": the force depends on the velocity");
     }
@@ -410,7 +432,7 @@ private:
             ex& value = i < n ? system_.momentum[i] : system_.force[i - n];
             if (kinds[i].zero) value = 0;
             if (kinds[i].on_t) system_.autonomous = false;
-            if (!dependence.is_broken(value)) continue;
+            if (!dependence.is_bent(value)) continue;
             system_.linear = false;
             if (kinds[i].on_v && i >= n)
                 refuse_separable("f_" + coordinate_of(i - n) + ": the force depends on the velocity");
@@ -452,7 +474,7 @@ private:
 
     const Scene& scene_;
     System system_;
-    Symbols motion_;  // positions, velocities and time
+    Symbols motion_;  // positions, velocities, time and inputs
 };
 
 }  // namespace

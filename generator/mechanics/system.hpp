@@ -22,6 +22,7 @@ struct System {
     std::vector<GiNaC::symbol> q, v;        // n each: positions, velocities
     GiNaC::symbol t;                        // time
     std::vector<GiNaC::symbol> parameters;  // run-time parameters, scene order
+    std::vector<GiNaC::symbol> inputs;      // those of them that may change between steps
     GiNaC::ex lagrangian;                   // L(q, v, t)
     std::vector<GiNaC::ex> terms;           // L is their sum; a sum of n bodies is n terms
 

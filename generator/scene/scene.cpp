@@ -60,6 +60,7 @@ public:
         system_.read_view();
         system_.add_switches();
         refuse_beside_impacts();
+        for (const auto& [file, use] : system_.tables()) scene_.tables.push_back(use);
         system_.refuse_unused();
         return std::move(scene_);
     }
@@ -157,6 +158,10 @@ private:
         const Scope scope = system_.scope_of("the clock", true);
         Clock clock;
         clock.at = entry.value.at;
+        if (!scene_.inputs().empty())
+            fail(clock.at,
+                 "a clock needs a motion that keeps its energy, but inputs change it; remove the clock, or declare the "
+                 "inputs under [parameters]");
         if (entry.value.kind == Value::Kind::text) clock.text = collapsed(entry.value.text.value);
         clock.is_automatic = clock.text == "auto";
         if (clock.is_automatic) {
@@ -290,6 +295,13 @@ void Outputs::watch_kept() {
         one.event = events.size();
         events.push_back(one.crossing);
     }
+}
+
+std::vector<GiNaC::symbol> Scene::inputs() const {
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : parameters)
+        if (parameter.is_input) symbols.push_back(parameter.symbol);
+    return symbols;
 }
 
 std::vector<Event> Scene::reported() const {

@@ -32,6 +32,7 @@ struct Parameter {
     GiNaC::ex value;  // exact, free of symbols
     GiNaC::symbol symbol;
     std::string written = name;  // in formulas: m[3]
+    bool is_input = false;       // the host program may give it another value before each step
 };
 
 // An event: the value crosses zero. Located on the step's own polynomial.
@@ -150,7 +151,7 @@ struct Scene {
     std::vector<Coordinate> coordinates;
     bool has_time = false;              // whether the scene declares the time; else no formula holds it
     GiNaC::symbol time{"t"};            // prints as the name the scene gives it
-    std::vector<Parameter> parameters;  // run-time parameters, in the order of the file
+    std::vector<Parameter> parameters;  // run-time parameters, in the order of the file; then inputs
     std::vector<Parameter> constants;   // declared constant: already substituted everywhere
     std::string lagrangian_text;        // as written, white space collapsed, without comments
     GiNaC::ex lagrangian;               // in position and velocity symbols, time and run-time parameters
@@ -166,11 +167,14 @@ struct Scene {
     std::vector<Constraint> constraints;
     std::vector<Impact> impacts;
     std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
+    std::vector<TableUse> tables;             // measured values in any formula
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     Method method;
     std::optional<Clock> clock;
     Run run;
     Outputs outputs;
+
+    std::vector<GiNaC::symbol> inputs() const;
 
     // All that a kernel looks for in each step: events, then stops, impacts, switches.
     std::vector<Event> watched() const;

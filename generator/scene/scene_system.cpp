@@ -78,22 +78,32 @@ void SystemReader::read_time() {
     names_.add_time(name, scene_.time);
 }
 
+// Inputs are parameters whose values the host program may change before each step.
 void SystemReader::read_parameters() {
-    const Entry* section = root_.find("parameters");
+    read_parameters("parameters", "parameter");
+    read_parameters("inputs", "input");
+    for (const Parameter& parameter : scene_.parameters)
+        parameter_values_[parameter.symbol] = real_value(parameter.value);
+}
+
+void SystemReader::read_parameters(const std::string& name, const std::string& what) {
+    const Entry* section = root_.find(name);
     if (section == nullptr) return;
-    const std::vector<Entry>& entries = table_of(source_, *section, "[parameters] with lines such as m = 1");
-    std::size_t count = 0;
+    const bool are_inputs = what == "input";
+    const std::vector<Entry>& entries =
+        table_of(source_, *section, fmt::format("[{}] with lines such as {} = 1", name, are_inputs ? "tau" : "m"));
+    std::size_t count = scene_.parameters.size() + scene_.constants.size();
     for (const Entry& entry : entries) {
-        declarations_.declare(entry.key, entry.at, "parameter");
+        declarations_.declare(entry.key, entry.at, what);
         const Entry* value = &entry;
         std::string unit;
         bool constant = false;
         if (entry.value.kind == Value::Kind::table) {
-            const Table table(source_, entry.value.entries, entry.at, "parameter " + entry.key,
-                              keys_of_section("parameters"));
+            const Table table(source_, entry.value.entries, entry.at, what + " " + entry.key, keys_of_section(name));
             value = &table.get("value", "a number, for example value = 1");
             if (const Entry* given = table.find("unit")) unit = label_of(source_, *given, longest_unit);
-            if (const Entry* flag = table.find("constant")) constant = boolean_of(source_, *flag);
+            if (const Entry* flag = are_inputs ? nullptr : table.find("constant"))
+                constant = boolean_of(source_, *flag);
         }
         const bool array = value->value.kind == Value::Kind::list;
         const std::vector<Parameter> elements =
@@ -104,13 +114,15 @@ void SystemReader::read_parameters() {
         std::vector<GiNaC::ex> values;
         for (const Parameter& parameter : elements) {
             values.push_back(constant ? parameter.value : GiNaC::ex(parameter.symbol));
-            (constant ? scene_.constants : scene_.parameters).push_back(parameter);
-            (constant ? scene_.constants : scene_.parameters).back().unit = unit;
+            Parameter& added = (constant ? scene_.constants : scene_.parameters).emplace_back(parameter);
+            added.unit = unit;
+            added.is_input = are_inputs;
         }
-        names_.add_parameter(entry.key, values, array);
+        if (are_inputs)
+            names_.add_input(entry.key, values, array);
+        else
+            names_.add_parameter(entry.key, values, array);
     }
-    for (const Parameter& parameter : scene_.parameters)
-        parameter_values_[parameter.symbol] = real_value(parameter.value);
 }
 
 Parameter SystemReader::read_parameter(const Entry& entry, const Entry& value) {
@@ -491,11 +503,13 @@ void SystemReader::refuse_unused() const {
     for (const auto& [name, entry] : definition_lines_)
         if (!name->used)
             fail(entry->at, fmt::format("definition {} occurs in no formula; use it or remove it", entry->key));
-    const Entry* section = root_.find("parameters");
-    if (section == nullptr) return;
-    for (const Entry& entry : section->value.entries)
-        if (!names_.all.at(entry.key).used)
-            fail(entry.at, fmt::format("parameter {0} occurs in no formula; use it or remove it", entry.key));
+    for (const auto& [name, what] : {std::pair{"parameters", "parameter"}, std::pair{"inputs", "input"}}) {
+        const Entry* section = root_.find(name);
+        if (section == nullptr) continue;
+        for (const Entry& entry : section->value.entries)
+            if (!names_.all.at(entry.key).used)
+                fail(entry.at, fmt::format("{} {} occurs in no formula; use it or remove it", what, entry.key));
+    }
 }
 
 // A formula whose value with the parameters of the scene must be a real number that a double can hold.

@@ -33,6 +33,7 @@ public:
     // How further formulas are read: those that may hold what moves, and those in parameters.
     // What the formulas read so far ask for.
     const std::vector<DomainCondition>& conditions() const { return names_.conditions; }
+    const auto& tables() const { return names_.tables; }
     Scope scope_of(const std::string& formula, bool motion_allowed) { return {&names_, formula, motion_allowed, {}}; }
     // A formula whose value with the parameters of the scene must be a real number that a double can hold.
     GiNaC::ex read_formula(const Entry& entry, const Scope& scope, GiNaC::numeric* value = nullptr);
@@ -58,6 +59,7 @@ private:
 
     void read_time();
     void read_parameters();
+    void read_parameters(const std::string& section, const std::string& what);
     Parameter read_parameter(const Entry& entry, const Entry& value);
     std::vector<Parameter> read_elements(const Entry& entry, const Entry& list);
     void read_coordinates();

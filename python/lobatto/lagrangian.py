@@ -37,7 +37,8 @@ def _coordinate(name, value):
     return table
 
 
-def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output=None, extra="", **variables):
+def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output=None, inputs=(), extra="",
+               **variables):
     """A scene from a Lagrangian and the values of its names.
 
     A name that stands in the Lagrangian with a prime, as q in ``m*q'^2/2``, is a coordinate. Its value is its initial
@@ -45,7 +46,8 @@ def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output
     other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``.
 
     ``method``: a table such as ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
-    scene file. ``extra``: more of a scene file, as text.
+    scene file. ``inputs``: names of parameters that ``Stepper.set`` may change before each step. ``extra``: more of a
+    scene file, as text.
     """
     moving = set(re.findall(r"([A-Za-z_]\w*)'", lagrangian))
     lines = []
@@ -63,8 +65,16 @@ def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output
         if table:
             lines.append(f"[{heading}]")
             lines += [f"{name} = {_value(value)}" for name, value in table.items()]
+    for name in inputs:
+        if name in moving or name not in variables:
+            raise InputError(f"'{name}' is to be an input; give its value: Lagrangian(..., {name}=0, "
+                             f"inputs=[{name!r}])")
     lines.append("[parameters]")
-    lines += [f"{name} = {_value(value)}" for name, value in variables.items() if name not in moving]
+    lines += [f"{name} = {_value(value)}" for name, value in variables.items()
+              if name not in moving and name not in inputs]
+    if inputs:
+        lines.append("[inputs]")
+        lines += [f"{name} = {_value(variables[name])}" for name in inputs]
     lines.append("[run]")
     lines += [f"step = {_value(step)}", f"until = {_value(until)}"]
     if method:

@@ -123,6 +123,12 @@ lobatto_status LoadedStepper<real>::advance(lobatto_advance& call) {
 }
 
 template <class real>
+lobatto_status LoadedStepper<real>::set_inputs(const std::vector<real>& parameters) {
+    assert(std::ssize(parameters) == kernel_->parameters);
+    return static_cast<lobatto_status>(kernel_->set_inputs(stepper_, parameters.data()));
+}
+
+template <class real>
 void LoadedStepper<real>::state(real& time, std::vector<real>& q, std::vector<real>& p) const {
     q.resize(kernel_->coordinates);
     p.resize(kernel_->coordinates);

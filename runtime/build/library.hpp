@@ -66,6 +66,7 @@ public:
     lobatto_status prepare(const std::vector<real>& parameters, real step);
     lobatto_status start(real time, const std::vector<real>& q, const std::vector<real>& p);
     lobatto_status advance(lobatto_advance& call);
+    lobatto_status set_inputs(const std::vector<real>& parameters);  // of a kernel with inputs: abi.h
     void state(real& time, std::vector<real>& q, std::vector<real>& p) const;
 
     // Position and velocity as sums of two numbers, of a kernel with clean arithmetic; false for others.

@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 8u
+#define LOBATTO_ABI_VERSION 9u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -94,6 +94,8 @@ typedef struct lobatto_kernel {
     int32_t form;           /* lobatto_form */
     int32_t coordinates;    /* n */
     int32_t parameters;     /* run-time parameters, in the order of the scene */
+    int32_t inputs;         /* of these, which set_inputs may change */
+    int32_t first_input;    /* they are one after another */
     int32_t nodes;          /* of the quadrature, both ends included where they are nodes */
     int32_t order;          /* of accuracy, in h */
     int32_t unknowns;       /* N; 0: no equations to solve */
@@ -118,6 +120,9 @@ typedef struct lobatto_kernel {
                      const void* p); /* forgets what earlier steps left */
     int32_t (*advance)(void* stepper, lobatto_advance* call);
     void (*state)(const void* stepper, void* time, void* q, void* p);
+    /* Between two steps: values of all parameters, of which those of inputs are taken; null without inputs. What it
+     * refuses must be set again before the next step. */
+    int32_t (*set_inputs)(void* stepper, const void* parameters);
     /* Position and velocity, each the sum of two numbers, q + q_rest; null without clean arithmetic. */
     void (*two_fold_state)(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest);
     /* Position and velocity at t + theta h inside the last step, on its polynomial. */

@@ -11,6 +11,16 @@
 
 namespace lobatto {
 
+// How many inputs K has; without any it says nothing of them.
+template <class K, class = void>
+struct InputsOf {
+    static constexpr int count = 0;
+};
+template <class K>
+struct InputsOf<K, std::void_t<decltype(K::inputs)>> {
+    static constexpr int count = K::inputs;
+};
+
 // In a library of single trajectories, and where trajectories side by side would be no faster.
 struct NoEnsemble {
     static constexpr std::int32_t lanes = 0, bytes = 0, alignment = 0;
@@ -63,6 +73,7 @@ struct Export {
     static constexpr bool is_whole = E::lanes == 0;
     static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
     static constexpr int constraint_count = constraints_of<K>();
+    static constexpr int inputs = is_whole ? InputsOf<K>::count : 0;
     static constexpr bool has_switches = is_whole && switches_of<K>() > 0;
     static constexpr bool has_walls = has_switches || (is_whole && impacts_of<K>() > 0);
     static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
@@ -102,6 +113,38 @@ struct Export {
         for (int i = 0; i < switches_of<K>(); ++i)
             stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
         stepper.prepare(stepper.parameters, stepper.step_size);
+    }
+    static std::int32_t take_inputs(void* stepper, const void* parameters) {
+        if constexpr (inputs > 0) {
+            S& here = *static_cast<S*>(stepper);
+            typename K::Parameters values;
+            for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
+            if constexpr (event_count > 0) {  // the sides of switches stay
+                for (int i = K::first_input; i < K::first_input + inputs; ++i)
+                    K::parameter(here.parameters, i) = K::parameter(values, i);
+                values = here.parameters;
+            }
+            Status status = set_inputs(here, values);
+            if constexpr (has_walls) {
+                if (status == Status::ok) status = look_around(here);
+            }
+            return code(status);
+        }
+        return LOBATTO_UNSUPPORTED;
+    }
+    static constexpr auto inputs_taken = inputs > 0 ? take_inputs : nullptr;
+    // After a change of formulas: the sides of switches, and of walls, where the motion is.
+    static Status look_around(S& stepper) {
+        const real time = stepper.time();
+        real q[n], p[n];
+        for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
+        stepper.momentum(p);
+        if constexpr (has_switches) {
+            take_sides(stepper, time, q, p);
+            const Status status = stepper.restart(q, p, stepper.steps);
+            if (status != Status::ok) return status;
+        }
+        return side_of_walls(stepper, time, q, p);
     }
     // What `use` makes of the stepper as it is at a state.
     template <class Use>
@@ -391,6 +434,12 @@ struct Export {
                : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE
                                                       : LOBATTO_FLOAT128;
     }
+    static constexpr std::int32_t first_input() {
+        if constexpr (inputs > 0)
+            return K::first_input;
+        else
+            return 0;
+    }
     static constexpr std::int32_t events_of_step() {
         if constexpr (event_count > 0)
             return Watch<K>::most;
@@ -410,6 +459,8 @@ struct Export {
                                              static_cast<std::int32_t>(K::form),
                                              n,
                                              K::parameter_count,
+                                             inputs,
+                                             first_input(),
                                              S::nodes,
                                              K::order,
                                              S::N,
@@ -430,6 +481,7 @@ struct Export {
                                              start,
                                              advance,
                                              state,
+                                             inputs_taken,
                                              two_fold_state,
                                              dense,
                                              to_parts,

@@ -102,7 +102,7 @@ private:
             }
         }
         const std::string x = formula(depth - 1);
-        switch (whole(0, 15)) {
+        switch (whole(0, 16)) {
             case 0:
             case 1:
                 return fmt::format("({} + {})", x, formula(depth - 1));
@@ -131,6 +131,8 @@ private:
                 return fmt::format("1/(1 + ({})^2)", x);
             case 14:
                 return fmt::format("sinh(tanh({}))*cosh({:.3f})", x, uniform(0, 1));
+            case 15:
+                return fmt::format("atan2({}, 2 + sin({}))", x, formula(depth - 1));
             default:
                 return fmt::format("(2 + cos({}))^({}/3)", x, whole(1, 5));
         }
@@ -267,6 +269,8 @@ private:
                 return std::acos(x(0));
             case Op::atan:
                 return std::atan(x(0));
+            case Op::atan2:
+                return std::atan2(x(0), x(1));
             case Op::raise:
                 return std::pow(x(0), x(1));
             case Op::multiply: {

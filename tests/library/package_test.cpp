@@ -57,7 +57,9 @@ TEST_SUITE("slow") {
             std::string computed = output_of({build + "/kernel"});
             computed.pop_back();
             CHECK(wanted.starts_with(computed + ","));
-            CHECK(output_of({build + "/control", folder / "project/arm.toml"}).starts_with("t = 4.00 s: a = -0.01924"));
+            const std::string controlled = output_of({build + "/control", folder / "project/arm.toml"});
+            CHECK(controlled.starts_with("t = 4.00 s: a = -0.01924"));
+            CHECK(output_of({build + "/feedback"}) == controlled);
             CHECK(output_of({build + "/swing", folder / "project/arm.toml"}).find("1000 of 1000") != std::string::npos);
             // Nothing is made again, until the scene changes.
             CHECK(output_of({"cmake", "--build", build}).find("Deriving") == std::string::npos);

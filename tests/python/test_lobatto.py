@@ -81,6 +81,19 @@ def test_a_step_costs_less_than_a_microsecond_beyond_its_kernel(pendulum):
     assert stepper.t == pytest.approx(1000)
 
 
+def test_inputs_are_set_before_steps():
+    scene = lobatto.Lagrangian("x'^2/2 - x^2/2 + u*x", x=1, u=0.5, inputs=["u"], step=0.1, method=dict(points=9))
+    assert [one.name for one in scene.inputs] == ["u"]
+    stepper = lobatto.Stepper(scene)
+    stepper.set_inputs([1])  # then x = 1 stays
+    stepper.advance(10)
+    assert abs(stepper.q[0] - 1) < 1e-12 and stepper.parameter("u") == 1
+    with pytest.raises(lobatto.InputError, match="needs 1 numbers, one for each input"):
+        stepper.set_inputs([1, 2])
+    with pytest.raises(lobatto.InputError, match="'v' is to be an input"):
+        lobatto.Lagrangian("x'^2/2 - x^2/2 + u*x", x=1, u=0.5, inputs=["v"])
+
+
 def test_a_stepper_goes_where_it_is_sent(pendulum):
     stepper = lobatto.Stepper(pendulum, points=6)
     stepper.start(1.0, [0.3], velocity=[0.5])

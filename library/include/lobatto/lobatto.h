@@ -55,6 +55,8 @@ LOBATTO_C_API size_t lobatto_scene_parameters(const lobatto_scene* scene);
 LOBATTO_C_API const char* lobatto_scene_parameter_name(const lobatto_scene* scene, size_t index);
 LOBATTO_C_API const char* lobatto_scene_parameter_unit(const lobatto_scene* scene, size_t index);
 LOBATTO_C_API double lobatto_scene_parameter_value(const lobatto_scene* scene, size_t index);
+LOBATTO_C_API size_t lobatto_scene_inputs(const lobatto_scene* scene); /* they are parameters too */
+LOBATTO_C_API const char* lobatto_scene_input_name(const lobatto_scene* scene, size_t index);
 LOBATTO_C_API size_t lobatto_scene_events(const lobatto_scene* scene);
 LOBATTO_C_API const char* lobatto_scene_event_text(const lobatto_scene* scene, size_t index);
 
@@ -100,6 +102,8 @@ LOBATTO_C_API int lobatto_integrator_start_from_velocity(lobatto_integrator* int
 LOBATTO_C_API int lobatto_integrator_advance(lobatto_integrator* integrator, int64_t steps);
 LOBATTO_C_API int lobatto_integrator_advance_to(lobatto_integrator* integrator, double t);
 LOBATTO_C_API int lobatto_integrator_set(lobatto_integrator* integrator, const char* parameter, double value);
+/* All inputs of the scene, in its order: from the next step on, at the cost of a small part of a step. */
+LOBATTO_C_API int lobatto_integrator_set_inputs(lobatto_integrator* integrator, const double* values);
 LOBATTO_C_API int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity); /* n */
 /* Position and velocity at a time inside the last step, n each. */
 LOBATTO_C_API int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, double* velocity);

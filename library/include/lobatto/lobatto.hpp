@@ -99,9 +99,10 @@ public:
     const std::string& text() const;        ///< of the file
     const std::string& lagrangian() const;  ///< as written
     const std::vector<Variable>& coordinates() const;
-    const std::vector<Variable>& parameters() const;
-    const std::vector<std::string>& events() const;  ///< as written: events, then stops, then impacts
-    std::string method() const;                      ///< "Lobatto, 4 points"
+    const std::vector<Variable>& parameters() const;  ///< inputs too
+    const std::vector<Variable>& inputs() const;      ///< those that may change between steps at hardly any cost
+    const std::vector<std::string>& events() const;   ///< as written: events, then stops, then impacts
+    std::string method() const;                       ///< "Lobatto, 4 points"
     double step() const;
     double until() const;
     bool starts_with_momenta() const;  ///< else with velocities
@@ -137,7 +138,8 @@ public:
     int order() const;
     double step() const;  ///< h; with a clock in its time
     const std::vector<Variable>& coordinates() const;
-    const std::vector<Variable>& parameters() const;  ///< with the values of the settings
+    const std::vector<Variable>& parameters() const;  ///< with the values of the settings; inputs too
+    const std::vector<Variable>& inputs() const;
     const std::vector<std::string>& events() const;
 
     struct Parts;
@@ -177,6 +179,7 @@ public:
     ~Stepper();
 
     std::size_t coordinates() const;
+    std::size_t inputs() const;
     double step_size() const;
     /// Another place to go on from. n positions; n momenta, or n velocities.
     void start(double t, const double* q, const double* p);
@@ -202,9 +205,12 @@ public:
     /// One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The trajectory stays where it is.
     std::vector<double> tangent() const;
 
-    /// A parameter, from the next step on. What controls a motion changes between steps.
+    /// A parameter or an input, from the next step on. Another parameter prepares the kernel anew; what controls a
+    /// motion should be an input of the scene, which costs a small part of a step.
     double parameter(const std::string& name) const;
     void set(const std::string& name, double value);
+    /// All inputs, in the order of inputs().
+    void set_inputs(const double* values);
 
     std::vector<EventHit> take_events();  ///< since the last call
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Inverse sine, cosine and tangent of packs.
+// Inverse sine, cosine and tangent of packs, and the angle of a point.
 #ifndef LOBATTO_KERNEL_ARC_HPP
 #define LOBATTO_KERNEL_ARC_HPP
 
@@ -94,11 +94,59 @@ LOBATTO_INLINE Doubles<width> acos(const Doubles<width>& x) {
     return select(arc.large, select(x < 0.0, near_minus_one, near_one), small);
 }
 
+// The angle of (x, y), -pi to pi: atan of the smaller over the larger of |x| and |y|, from the axis that is near.
+template <int width>
+LOBATTO_INLINE Doubles<width> atan2(const Doubles<width>& y, const Doubles<width>& x) {
+    using P = Doubles<width>;
+    const P up = fabs(y), along = fabs(x);
+    const Where<width> steep = up > along, behind = x < 0.0;
+    const P near = atan(select(steep, along, up) / select(steep, up, along));
+    const P axis = select(steep, P(half_pi), select(behind, P(2.0 * half_pi), P(0.0)));
+    const P axis_low = select(steep, P(half_pi_low), select(behind, P(2.0 * half_pi_low), P(0.0)));
+    const P turned = select(steep, select(behind, near, -near), select(behind, -near, near));
+    return with_sign_of(y, axis + (turned + axis_low));
+}
+
 }  // namespace functions
 
 LOBATTO_FUNCTION(asin)
 LOBATTO_FUNCTION(acos)
 LOBATTO_FUNCTION(atan)
+
+#define LOBATTO_FUNCTION_OF_TWO(type, suffix)                   \
+    template <class real>                                       \
+    inline Only<real, type> atan2(real y, Only<real, type> x) { \
+        return __builtin_atan2##suffix(y, x);                   \
+    }
+LOBATTO_FUNCTION_OF_TWO(float, f)
+LOBATTO_FUNCTION_OF_TWO(double, )
+LOBATTO_FUNCTION_OF_TWO(long double, l)
+#undef LOBATTO_FUNCTION_OF_TWO
+#ifdef LOBATTO_USE_FLOAT128
+inline __float128 atan2(__float128 y, __float128 x) {
+    return atan2q(y, x);
+}
+#endif
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> atan2(const Pack<real, width>& y, const Pack<real, width>& x) {
+    using Numbers = Pack<real, width>;
+    constexpr int count = Numbers::count;
+    if constexpr (std::is_same_v<real, double>) {
+        LOBATTO_PARTS(Numbers, functions::atan2(functions::single(y, i), functions::single(x, i)).part[0]);
+    } else if constexpr (std::is_same_v<real, float>) {
+        return functions::narrowed(atan2(functions::widened(y), functions::widened(x)));
+    } else {
+        LOBATTO_PARTS(Numbers, lobatto::atan2(y.part[i], x.part[i]));
+    }
+}
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> atan2(const Pack<real, width>& y, real_of<Pack<real, width>> x) {
+    return atan2(y, Pack<real, width>(x));
+}
+template <class real, int width>
+LOBATTO_INLINE Pack<real, width> atan2(real_of<Pack<real, width>> y, const Pack<real, width>& x) {
+    return atan2(Pack<real, width>(y), x);
+}
 
 }  // namespace lobatto
 

@@ -461,6 +461,20 @@ LOBATTO_CALLED Pack<DoubleDouble, width> atan(const Pack<DoubleDouble, width>& x
     return functions::where(high == high, value, high);
 }
 
+// As that of doubles.
+template <int width>
+LOBATTO_CALLED Pack<DoubleDouble, width> atan2(const Pack<DoubleDouble, width>& y, const Pack<DoubleDouble, width>& x) {
+    using X = Pack<DoubleDouble, width>;
+    const X up = fabs(y), along = fabs(x);
+    const auto steep = up > along, behind = x < 0.0;
+    const X near = atan(select(steep, along, up) / select(steep, up, along));
+    const X half = X(functions::wide_half_pi), none = X(0.0);
+    const X axis = select(steep, half, select(behind, half + half, none));
+    const X turned = select(steep, select(behind, near, -near), select(behind, -near, near));
+    const X angle = accurate_sum(axis, turned);
+    return select(y < 0.0, -angle, angle);
+}
+
 // Of one number: a pack of one lane, so that a lone trajectory and a lane of many have the same bits.
 #define LOBATTO_OF_ONE(f)                                  \
     LOBATTO_INLINE DoubleDouble f(const DoubleDouble& x) { \
@@ -480,6 +494,9 @@ LOBATTO_OF_ONE(tanh)
 #undef LOBATTO_OF_ONE
 LOBATTO_INLINE DoubleDouble pow(const DoubleDouble& x, const DoubleDouble& y) {
     return pow(Pack<DoubleDouble, 1>(x), Pack<DoubleDouble, 1>(y))[0];
+}
+LOBATTO_INLINE DoubleDouble atan2(const DoubleDouble& y, const DoubleDouble& x) {
+    return atan2(Pack<DoubleDouble, 1>(y), Pack<DoubleDouble, 1>(x))[0];
 }
 LOBATTO_INLINE void sincos(const DoubleDouble& x, DoubleDouble& sine, DoubleDouble& cosine) {
     Pack<DoubleDouble, 1> one_sine, one_cosine;

@@ -76,6 +76,16 @@ struct WatchedStepper : Stepper<K> {
     static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
     real wall_scale[wall_room]{};  // the most that went into each wall's function so far
 
+    // At a state at one of its own times.
+    Status restart(const real* position, const real* momentum, std::int64_t steps_since) {
+        const real begin = this->start_time;
+        this->steps = steps_since;
+        const Status status = this->start(this->time(), position, momentum);
+        this->start_time = begin;
+        this->steps = steps_since;
+        return status;
+    }
+
     // The side of a switch: 1 or -1.
     real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
 };

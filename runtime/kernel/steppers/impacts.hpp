@@ -177,12 +177,8 @@ private:
     }
     // A state at one of the stepper's own times, with its parameters.
     static void put(S& stepper, const real* position, const real* momentum, std::int64_t steps) {
-        const real start = stepper.start_time;
         if constexpr (switches_of<K>() > 0) stepper.prepare(stepper.parameters, stepper.step_size);
-        stepper.steps = steps;
-        stepper.start(stepper.time(), position, momentum);
-        stepper.start_time = start;
-        stepper.steps = steps;
+        stepper.restart(position, momentum, steps);
     }
 
     Status look_with_walls(S& stepper, real* rows, std::int64_t& count) {

@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <string>
 
 using GiNaC::ex;
@@ -144,6 +145,23 @@ TEST_CASE("every function of the grammar means GiNaC's function of that name") {
     CHECK(parse("atan(q)").is_equal(atan(q)));
 }
 
+TEST_CASE("atan2 is the angle of a point, first y, then x") {
+    CHECK(parse("atan2(q', q + 1)").is_equal(GiNaC::atan2(velocity, q + 1)));
+    CHECK(parse("atan2(1, 1)").is_equal(GiNaC::Pi / 4));
+    CHECK(parse("atan2(1, -1)").is_equal(3 * GiNaC::Pi / 4));
+    CHECK(parse("atan2(-2, 0)").is_equal(-GiNaC::Pi / 2));
+    CHECK(parse("atan2(0, -3)").is_equal(GiNaC::Pi));
+    CHECK(lobatto::real_value(parse("atan2(-sqrt(2), -1)")).to_double() ==
+          doctest::Approx(std::atan2(-std::sqrt(2.0), -1)));
+    // Derivatives, against those of sine and cosine of the angle: r^2 dphi = x dy - y dx.
+    const GiNaC::ex angle = parse("atan2(omega*q, m + q)");
+    const GiNaC::ex rate = (angle.diff(q) * (pow(omega * q, 2) + pow(m + q, 2))).normal();
+    CHECK((rate - (omega * (m + q) - omega * q)).expand().is_zero());
+    check_error("atan2(0, 0)", 1, "atan2(0, 0) is no angle");
+    check_error("atan2(q)", 8, "atan2 is written atan2(y, x)");
+    check_error("atan2 q", 1, "atan2 needs parentheses: write atan2(y, x)");
+}
+
 TEST_CASE("the names that occur are collected, even where they cancel") {
     Language language;
     parse("0*m + q'^2", language.scope);
@@ -183,10 +201,10 @@ TEST_CASE("unknown names come with the declared ones and the nearest") {
     check_error("xyz", 1, "unknown name 'xyz' in the Lagrangian; declared: m, omega, q, q'.");
     check_error("ln(q)", 1,
                 "unknown function 'ln' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, tanh, "
-                "asin, acos, atan, sum, mod, abs, sign, min, max, hypot, if. Write log.");
+                "asin, acos, atan, sum, mod, table, abs, sign, min, max, hypot, atan2, if. Write log.");
     check_error("coss(q)", 1,
                 "unknown function 'coss' in the Lagrangian; there are sqrt, sin, cos, tan, exp, log, sinh, cosh, "
-                "tanh, asin, acos, atan, sum, mod, abs, sign, min, max, hypot, if. Did you mean 'cos'?");
+                "tanh, asin, acos, atan, sum, mod, table, abs, sign, min, max, hypot, atan2, if. Did you mean 'cos'?");
 }
 
 TEST_CASE("primes belong to coordinates, one each") {

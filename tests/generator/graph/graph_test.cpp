@@ -104,6 +104,10 @@ TEST_CASE("values have 60 digits") {
     CHECK(g.value(g.graph.power(g.x, -3), 2) == cln::cl_RA("1/8"));
     CHECK(g.value(g.graph.raise(g.x, g.graph.number(3)), -2) == -8);
     CHECK(g.value(g.graph.function(Op::sqrt, g.x), cln::cl_RA("9/4")) == cln::cl_RA("3/2"));
+    // atan2(1, -1) = 3 pi/4
+    CHECK(near(g.value(g.graph.raw(Op::atan2, {g.x, g.graph.number(-1)}), one),
+               "2.356194490192344928846982537459627163147877049531329365731208_70") < 1e-58);
+    CHECK(g.value(g.graph.raw(Op::atan2, {g.graph.number(0), g.x}), 3) == 0);
 }
 
 TEST_CASE("what is not real is a domain error") {
@@ -115,6 +119,7 @@ TEST_CASE("what is not real is a domain error") {
     CHECK(error_of(g.graph.function(Op::sqrt, g.x), -1) == "square root of a negative number");
     CHECK(error_of(g.graph.function(Op::log, g.x), 0) == "logarithm of a number that is not positive");
     CHECK(error_of(g.graph.function(Op::asin, g.x), 2) == "asin of a value outside its domain");
+    CHECK(error_of(g.graph.raw(Op::atan2, {g.x, g.x}), 0) == "atan2 of 0 and 0");
     CHECK(error_of(g.graph.raise(g.x, g.graph.number(1, 2)), -2) == "real power of a number that is not positive");
 }
 

@@ -243,6 +243,9 @@ int main() {
     check("pow 2.5", {0.5, 2, 0, 1e3, 0, 1e120}, [](const auto& x) { return pow(x, 2.5f); }, [](long double x) { return std::pow(x, 2.5L); });
     check("pow -60.5", {0.5, 2, 0.01, 100}, [](const auto& x) { return pow(x, -60.5f); }, [](long double x) { return std::pow(x, -60.5L); });
     check("pow of 3", {-1, 1, -600, 600}, [](const auto& x) { return pow(3.0f, x); }, [](long double x) { return std::pow(3.0L, x); });
+    check("atan2 ahead", {-0.5, 0.5, -3, 3, -1e3, 1e3, -1e10, 1e10}, [](const auto& y) { return atan2(y, 1.5f); }, [](long double y) { return std::atan2(y, 1.5L); });
+    check("atan2 behind", {-0.5, 0.5, -3, 3, -1e3, 1e3, -1e10, 1e10}, [](const auto& y) { return atan2(y, -1.5f); }, [](long double y) { return std::atan2(y, -1.5L); });
+    check("atan2 above", {-0.5, 0.5, -3, 3, -1e3, 1e3, -1e10, 1e10}, [](const auto& x) { return atan2(2.5f, x); }, [](long double x) { return std::atan2(2.5L, x); });
     check_pow_specials<1>();
     check_pow_specials<4>();
     check_pow_specials<8>();
@@ -306,6 +309,9 @@ const std::map<std::string, double> bounds = {
     {"asin", 0.77},                           // 0.755
     {"acos", 0.85},                           // 0.834
     {"atan", 0.78},                           // 0.762
+    {"atan2 ahead", 1.6},                     // 1.546
+    {"atan2 behind", 1.4},                    // less
+    {"atan2 above", 1.45},                    // 1.405
     {"pow 2.5", 0.88},                        // 0.866
     {"pow -60.5", 0.86},                      // 0.844
     {"pow of 3", 0.87},                       // 0.855

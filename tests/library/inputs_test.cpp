@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Inputs: values that a program sets between steps, in every form of a step, against motions known otherwise.
+#include <doctest/doctest.h>
+
+#include <lobatto/lobatto.h>
+#include <lobatto/lobatto.hpp>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace {
+
+namespace lob = lobatto::api;
+
+// A scene of one coordinate q that starts at 1 with momentum 0, with the input u = 0.5.
+std::string scene_of(const std::string& lagrangian, const std::string& more, const std::string& step = "0.05") {
+    return "lagrangian = \"" + lagrangian +
+           "\"\n[coordinates]\nq = { position = 1, momentum = 0 }\n[inputs]\nu = 0.5\n[run]\nstep = " + step +
+           "\nuntil = 1\n" + more;
+}
+lob::Stepper stepper_of(const std::string& text) {
+    return lob::Stepper(lob::compile(lob::Scene::from_text(text, "inputs.toml")));
+}
+std::string error_of(const std::string& text) {
+    try {
+        static_cast<void>(stepper_of(text));
+    } catch (const lob::InputError& error) {
+        const std::string message = error.what();
+        return message.substr(0, message.find('\n'));
+    }
+    return "nothing was thrown";
+}
+double input_at(int step) {
+    return 1.5 + std::sin(0.7 * step);
+}
+
+// q'' = f(q, u) with u as in input_at, by 400 steps of Runge and Kutta's method of order 4 to a step.
+struct Reference {
+    double q = 1, v = 0;
+    void step(double h, double u, const std::function<double(double, double)>& f) {
+        const double s = h / 400;
+        for (int i = 0; i < 400; ++i) {
+            const double k1 = f(q, u), k2 = f(q + s / 2 * v, u), k3 = f(q + s / 2 * v + s * s / 4 * k1, u),
+                         k4 = f(q + s * v + s * s / 2 * k2, u);
+            q += s * v + s * s / 6 * (k1 + k2 + k3);
+            v += s / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+        }
+    }
+};
+
+// The largest error of positions and momenta in 60 steps with changing inputs, of a mass 1.
+double error_with(lob::Stepper stepper, const std::function<double(double, double)>& f) {
+    Reference reference;
+    double worst = 0;
+    for (int i = 0; i < 60; ++i) {
+        stepper.set("u", input_at(i));
+        stepper.step();
+        reference.step(stepper.step_size(), input_at(i), f);
+        worst = std::fmax(worst,
+                          std::fmax(std::fabs(stepper.q()[0] - reference.q), std::fabs(stepper.p()[0] - reference.v)));
+    }
+    CHECK(stepper.t() == doctest::Approx(60 * stepper.step_size()).epsilon(1e-14));
+    return worst;
+}
+
+}  // namespace
+
+TEST_CASE("a pendulum with a torque that changes before each step moves as an independent integrator says") {
+    const std::string pendulum = "q'^2/2 + cos(q) + u*q";
+    const auto f = [](double q, double u) { return u - std::sin(q); };
+    for (const char* method : {"points = 6", "points = 2", "family = \"gauss\"\nstages = 4", "arithmetic = \"clean\"",
+                               "family = \"splitting\"\nstages = 17"}) {
+        CAPTURE(method);
+        const bool is_rough = std::string(method) == "points = 2";  // of order 2: 9e-4; the others: 2e-11 at most
+        const double error = error_with(stepper_of(scene_of(pendulum, std::string("[method]\n") + method)), f);
+        CHECK(error < (is_rough ? 2e-3 : 1e-10));
+        CHECK(error > 0);
+    }
+}
+
+TEST_CASE("a linear system with an input is exact piece by piece, though its matrix is factored once") {
+    for (const char* method : {"points = 9", "family = \"gauss\"\nstages = 8"}) {
+        CAPTURE(method);
+        lob::Stepper stepper = stepper_of(scene_of("q'^2/2 - q^2/2 + u*q", std::string("[method]\n") + method, "0.3"));
+        double q = 1, p = 0;
+        for (int i = 0; i < 100; ++i) {
+            const double u = input_at(i), c = std::cos(0.3), s = std::sin(0.3), distance = q - u;
+            stepper.set_inputs(&u);
+            stepper.step();
+            q = u + distance * c + p * s;
+            p = p * c - distance * s;
+        }
+        CHECK(std::fabs(stepper.q()[0] - q) < 1e-12);
+        CHECK(std::fabs(stepper.p()[0] - p) < 1e-12);
+    }
+}
+
+TEST_CASE("an input may change stiffness and mass: the momentum goes on through the change") {
+    lob::Stepper stiff = stepper_of(scene_of("q'^2/2 - u*q^2/2", "[method]\npoints = 9", "0.3"));
+    lob::Stepper heavy = stepper_of(scene_of("u*q'^2/2 - q^2/2", "[method]\npoints = 9", "0.3"));
+    double q[2] = {1, 1}, p[2] = {0, 0};
+    for (int i = 0; i < 50; ++i) {
+        const double u = input_at(i), stiffness[2] = {u, 1}, mass[2] = {1, u};
+        stiff.set("u", u);
+        heavy.set("u", u);
+        stiff.step();
+        heavy.step();
+        for (int k = 0; k < 2; ++k) {
+            const double w = std::sqrt(stiffness[k] / mass[k]), c = std::cos(0.3 * w), s = std::sin(0.3 * w),
+                         from = q[k];
+            q[k] = from * c + p[k] * s / (mass[k] * w);
+            p[k] = p[k] * c - mass[k] * w * from * s;
+        }
+    }
+    CHECK(std::fabs(stiff.q()[0] - q[0]) < 1e-12);
+    CHECK(std::fabs(heavy.q()[0] - q[1]) < 1e-12);
+    CHECK(std::fabs(heavy.p()[0] - p[1]) < 1e-12);
+}
+
+TEST_CASE("a wall that an input moves past the motion changes the side of its switch at once") {
+    const auto f = [](double q, double u) { return -q - (q > u - 1.2 ? 20 * (q - u + 1.2) : 0.0); };
+    const double error =
+        error_with(stepper_of(scene_of("q'^2/2 - q^2/2 - 10*max(q - u + 1.2, 0)^2", "[method]\npoints = 8", "0.1")), f);
+    CHECK(error < 1e-6);  // 4e-8, of the reference, which does not stop at the wall
+}
+
+TEST_CASE("a rod is as long as the input says at the end of every step") {
+    const std::string text =
+        "lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\nx = { position = 0.6, velocity = 0 }\n"
+        "y = { position = -0.8, velocity = 0 }\n[constraints]\nrod = \"x^2 + y^2 = l^2\"\n";
+    lob::Stepper winch = stepper_of(text + "[inputs]\nl = 1\n[run]\nstep = 0.001\nuntil = 1\n");
+    // The same with a length that grows evenly.
+    std::string even = "time = \"t\"\n" + text + "[run]\nstep = 0.001\nuntil = 1\n";
+    even.replace(even.find("= l^2"), 5, "= (1 + t/5)^2");
+    even.replace(even.find("position = 0.6, velocity = 0"), 28, "position = 0.6, velocity = 0.12");
+    even.replace(even.find("position = -0.8, velocity = 0"), 29, "position = -0.8, velocity = -0.16");
+    lob::Stepper grown = stepper_of(even);
+    for (int i = 1; i <= 1000; ++i) {
+        const double l = 1 + 0.0002 * i;
+        winch.set("l", l);
+        winch.step();
+        grown.step();
+        CHECK(std::fabs(std::hypot(winch.q()[0], winch.q()[1]) - l) < 1e-14);
+    }
+    CHECK(std::fabs(winch.q()[0] - grown.q()[0]) < 2e-4);  // 5e-5, of first order in the step
+    CHECK(std::fabs(winch.q()[0] - 0.6) > 0.5);
+}
+
+TEST_CASE("an input that is set acts as a parameter does, for which the kernel is prepared anew") {
+    const std::string arm = LOBATTO_SOURCE_DIR "/examples/cmake/arm.toml";
+    const lob::Scene scene(arm);
+    REQUIRE(scene.inputs().size() == 1);
+    CHECK(scene.inputs()[0].name == "torque");
+    CHECK(scene.inputs()[0].unit == "N m");
+    CHECK(scene.parameters().back().name == "torque");
+    std::string text = scene.text();
+    text.erase(text.find("[inputs]\n"), 9);
+    lob::Stepper with_input{lob::compile(scene)}, with_parameter = stepper_of(text);
+    for (int i = 0; i < 100; ++i) {
+        for (lob::Stepper* stepper : {&with_input, &with_parameter}) {
+            stepper->set("torque", -2 * stepper->velocity()[0]);
+            stepper->step();
+        }
+        for (int k = 0; k < 2; ++k) CHECK(std::fabs(with_input.q()[k] - with_parameter.q()[k]) < 1e-13);
+    }
+    CHECK(with_input.parameter("torque") == doctest::Approx(with_parameter.parameter("torque")).epsilon(1e-10));
+    CHECK(with_input.parameter("torque") != 0);
+    // Copies go on alike.
+    lob::Stepper copy = with_input;
+    copy.step();
+    with_input.step();
+    CHECK(copy.q()[0] == with_input.q()[0]);
+}
+
+TEST_CASE("an input that leads nowhere is refused, and the motion goes on with the one before") {
+    lob::Stepper stepper = stepper_of(scene_of("q'^2/2 + cos(q) + u*q", "")), same = stepper;
+    stepper.step();
+    same.step();
+    CHECK_THROWS_AS(stepper.set("u", std::numeric_limits<double>::infinity()), lob::ComputationError);
+    CHECK(stepper.parameter("u") == 0.5);
+    stepper.step();
+    same.step();
+    CHECK(stepper.q()[0] == doctest::Approx(same.q()[0]).epsilon(1e-14));
+}
+
+TEST_CASE("runs hold the value of the scene, and --set gives them another") {
+    const lob::Scene scene = lob::Scene::from_text(scene_of("q'^2/2 - q^2/2 + u*q", "[method]\npoints = 9"));
+    lob::RunOptions options;
+    options.set = {{"u", "1"}};  // then q = 1 stays
+    const lob::Trajectory held = lob::run(scene), other = lob::run(scene, options);
+    CHECK(held.q.back() == doctest::Approx(0.5 + 0.5 * std::cos(1.0)).epsilon(1e-13));
+    CHECK(other.q.back() == doctest::Approx(1).epsilon(1e-13));
+}
+
+TEST_CASE("C sets all inputs at once") {
+    const std::string text = scene_of("q'^2/2 - q^2/2 + u*q", "[method]\npoints = 9");
+    lobatto_scene* const scene = lobatto_scene_from_text(text.c_str(), "inputs.toml");
+    REQUIRE(lobatto_scene_inputs(scene) == 1);
+    CHECK(std::string(lobatto_scene_input_name(scene, 0)) == "u");
+    CHECK(lobatto_scene_input_name(scene, 1) == nullptr);
+    lobatto_integrator* const motion = lobatto_integrator_new(scene, nullptr);
+    const double one = 1;
+    CHECK(lobatto_integrator_set_inputs(motion, &one) == 0);
+    CHECK(lobatto_integrator_advance(motion, 20) == 0);
+    CHECK(lobatto_integrator_q(motion)[0] == doctest::Approx(1).epsilon(1e-13));
+    lobatto_integrator_free(motion);
+    lobatto_scene_free(scene);
+}
+
+TEST_CASE("inputs stand where formulas of the motion are, and errors say where not") {
+    const std::string scene = scene_of("q'^2/2 - q^2/2 + u*q", "");
+    const auto with = [&](const std::string& from, const std::string& to) {
+        std::string text = scene;
+        text.replace(text.find(from), from.size(), to);
+        return error_of(text);
+    };
+    CHECK(with("step = 0.05", "step = \"u/10\"") ==
+          "inputs.toml:7:9: the input u cannot occur in the step: write it with numbers and parameters");
+    CHECK(with("position = 1", "position = \"u\"") ==
+          "inputs.toml:3:19: the input u cannot occur in the initial position of q: write it with numbers and "
+          "parameters");
+    CHECK(with("step = 0.05", "step = \"v/10\"") ==
+          "inputs.toml:7:9: unknown name 'v' in the step: only numbers, pi and functions of them may stand here");
+    CHECK(with("u*q", "u'*q") == "inputs.toml:1:32: u is an input and has no velocity; only coordinates have one");
+    CHECK(with("+ u*q", "") == "inputs.toml:5:1: input u occurs in no formula; use it or remove it");
+    CHECK(with("u = 0.5", "u = { value = 0.5, constant = true }").starts_with("inputs.toml:5:20: unknown key"));
+    CHECK(error_of(scene_of("q'^2/2 - q^2/2 + u*q", "[method]\nclock = \"1 + q^2\"")) ==
+          "inputs.toml:10:9: a clock needs a motion that keeps its energy, but inputs change it; remove the clock, or "
+          "declare the inputs under [parameters]");
+    CHECK(error_of("lagrangian = \"q'^2/2 + d*q\"\n[definitions]\nd = \"2*u\"\n[coordinates]\nq = { position = \"d\", "
+                   "velocity = 0 }\n[inputs]\nu = 0\n[run]\nstep = 1\nuntil = 1\n") ==
+          "inputs.toml:5:19: the definition d holds an input, which cannot occur in the initial position of q: write "
+          "it with numbers and parameters");
+}
