@@ -10,6 +10,9 @@ namespace lobatto {
 namespace {
 
 constexpr double at_rest = 0x1p-40;  // of the place: what rounding moves it by
+// Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
+// squares it each time; a motion that small beside others is none.
+constexpr double held_at_zero = 0x1p-100;
 
 }  // namespace
 
@@ -35,14 +38,25 @@ void widen_to(std::vector<double>& least, std::vector<double>& most, const doubl
     }
 }
 
+std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most) {
+    const std::size_t n = least.size() / 2;
+    const auto place = [&](std::size_t i) { return std::fmax(std::fabs(least[i]), std::fabs(most[i])); };
+    double farthest[2] = {0, 0};  // of positions, of momenta
+    for (std::size_t i = 0; i < 2 * n; ++i) farthest[i / n] = std::fmax(farthest[i / n], place(i));
+    std::vector<bool> moves(2 * n);
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+        const double half = (most[i] - least[i]) / 2;
+        moves[i] = half > at_rest * place(i) && half > held_at_zero * farthest[i / n];
+    }
+    return moves;
+}
+
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
                                   const std::vector<int>& groups) {
     const std::size_t n = groups.size();
     std::vector<double> own(2 * n), shared(2 * n, 0.0);
-    for (std::size_t i = 0; i < 2 * n; ++i) {
-        const double place = std::fmax(std::fabs(least[i]), std::fabs(most[i])), half = (most[i] - least[i]) / 2;
-        own[i] = half > at_rest * place ? half : 0;
-    }
+    const std::vector<bool> moves = moving(least, most);
+    for (std::size_t i = 0; i < 2 * n; ++i) own[i] = moves[i] ? (most[i] - least[i]) / 2 : 0;
     for (std::size_t k = 0; k < n; ++k)
         if (own[k] == 0) own[n + k] = 0;  // what rests has the momentum that rounding gives it
     std::map<std::pair<bool, int>, double> largest;

@@ -21,6 +21,9 @@ std::vector<int> amplitude_groups(const Scene& scene);
 // Takes a row of `count` numbers into a range.
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
 
+// Of q then p: which move by more than rounding does.
+std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most);
+
 // Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding.
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
                                   const std::vector<int>& groups);

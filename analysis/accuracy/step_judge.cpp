@@ -19,7 +19,6 @@ namespace {
 constexpr std::size_t most_judged_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
-constexpr double still = 0x1p-40;            // of the place: what rounding moves it by
 
 // Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
 std::uint64_t scrambled(std::int64_t number) {
@@ -131,13 +130,12 @@ StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel
     judgement.limit = stability_limit(derivation.quadrature, judgement.radians);
 
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
-    std::vector<double> moving = scale;
-    for (std::size_t k = 0; k < n; ++k) {
-        const double way = (most_[k] - least_[k]) / 2, place = std::max(std::fabs(most_[k]), std::fabs(least_[k]));
-        if (!(way > still * place)) moving[k] = moving[n + k] = std::numeric_limits<double>::infinity();
-    }
+    const std::vector<bool> moves = moving(least_, most_);
+    std::vector<double> measure = scale;
+    for (std::size_t k = 0; k < n; ++k)
+        if (!moves[k]) measure[k] = measure[n + k] = std::numeric_limits<double>::infinity();
     const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,
-                                                              request.parameters, request.step, moving);
+                                                              request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};
     return judgement;
 }

@@ -456,12 +456,15 @@ private:
     }
 
     void keep_separable_parts() {
+        // Forces that do not depend on velocities may mention them, as turns do: cos^2 + sin^2 is no 1 for GiNaC.
+        const Occurrences of_v(system_.v);
+        const auto at_rest = [&](const ex& value) { return at(value, system_.v, of_v, 0); };
         system_.mass = system_.momentum_v;
-        system_.potential = -at(system_.lagrangian, system_.v, Occurrences(system_.v), 0);
+        system_.potential = -at_rest(system_.lagrangian);
         system_.hessian = SparseMatrix(system_.n, system_.n);
-        for (const ex& force : system_.force) system_.gradient.push_back(-force);
+        for (const ex& force : system_.force) system_.gradient.push_back(-at_rest(force));
         for (const auto& [place, value] : system_.force_q.entries())
-            system_.hessian.put(place.first, place.second, -value);
+            system_.hessian.put(place.first, place.second, -at_rest(value));
     }
 
     std::string coordinate_of(std::size_t k) const { return system_.q[k].get_name(); }

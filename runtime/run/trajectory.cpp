@@ -333,7 +333,8 @@ std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest
         case LOBATTO_SINGULAR_JACOBIAN:
             why =
                 "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
-                "This h meets a resonance of the forces there";
+                "This h meets a resonance of the forces there, or constraints depend on one another, as at a dead "
+                "point";
             advice = smaller + ", or a slightly different one";
             break;
         case LOBATTO_SINGULAR_MASS:

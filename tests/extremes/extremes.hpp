@@ -48,6 +48,8 @@ inline std::string name_of(lobatto_status status) {
             return "singular mass matrix";
         case LOBATTO_TIME_STANDS_STILL:
             return "the step is too small to move the time";
+        case LOBATTO_OFF_CONSTRAINTS:
+            return "the start is behind the wall";
         default:
             return "no stop";
     }

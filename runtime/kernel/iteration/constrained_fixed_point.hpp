@@ -283,9 +283,29 @@ private:
         for (int c = 0; c < n; ++c) a.inverse_scale[c] = real(1) / maximum(own[c] + joined[c], Limits<real>::smallest);
     }
 
+    // Whether the positions found keep the constraints, to half of the digits of what they are measured by. Where
+    // constraints depend on one another, multipliers grow until corrections are lost in their rounding: nothing moves
+    // any more, and nothing is solved.
+    bool keeps_constraints(const Arrays& a) const {
+        for (int part = 0; part < parts; ++part) {
+            V size[constraints];
+            for (int c = 0; c < constraints; ++c) size[c] = V(fabs(h)) * fabs(a.phi_t[part * constraints + c]);
+            for (int e = 0; e < slopes; ++e)
+                size[K::constraint_row[e]] =
+                    fused(fabs(a.G[part * slopes + e]), V(real(1) / a.inverse_scale[K::constraint_column[e]]),
+                          size[K::constraint_row[e]]);
+            V worst = V(real(0));
+            for (int c = 0; c < constraints; ++c)
+                worst = maximum(worst, fabs(a.phi[part * constraints + c]) - V(Limits<real>::root_epsilon) * size[c]);
+            if (!(largest(worst) <= real(0))) return false;
+        }
+        return true;
+    }
+
     // Formulas at the nodes once more; then the momentum, and the multiplier that keeps the velocity at the end (D46).
     bool finish(const Coefficients& k, real time, real* q, real* p, real* multipliers, Arrays& a) {
         evaluate(k, time, a);
+        if (!keeps_constraints(a)) return false;
         real q1[n], p1[n], G1[slopes], mu[constraints], not_finite = real(0);
         real pull[constraints];
         for (int c = 0; c < constraints; ++c) pull[c] = multipliers[c * s];

@@ -81,6 +81,7 @@ private:
                 change = fabs(a.delta[i]) > change ? fabs(a.delta[i]) : change;
                 size = fabs(a.Y[i]) > size ? fabs(a.Y[i]) : size;
             }
+            if (size < change) size = change;  // it came back to 0, where a constraint holds it
             if (change > e * size) e = change / size;
         }
         for (int c = active; c < blocks; ++c)

@@ -307,18 +307,42 @@ private:
         return Status::ok;
     }
 
+    // Whether positions at the end of the stages just solved keep the constraints, to half of the digits of the
+    // positions, of the way, and of how far the forces of the step move them.
+    bool keeps_constraints(const real* q1, const real* v, const real* phi, const real* phi_t, const real* G,
+                           const Arrays& a) const {
+        real size[multiplier_room], reach[n], momentum_there[n], M[K::mass_entries > 0 ? K::mass_entries : 1];
+        for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
+        for (int k = 0; k < n; ++k) reach[k] = fabs(q[k]) + fabs(q1[k]) + fabs(step_size * v[k]);
+        Formulas<K>::legendre(coefficients, this->next_time(), q1, v, +momentum_there, +M);
+        for (int e = 0; e < K::mass_entries; ++e)
+            for (int b = 0; b < active; ++b) {
+                if (K::mass_row[e] != K::active_index[b] || K::mass_column[e] != K::active_index[b] || M[e] == real(0))
+                    continue;
+                for (int i = 0; i < r; ++i)
+                    reach[K::active_index[b]] +=
+                        fabs(step_size * (step_size * K::b[i] * a.g[i * Z + active + b]) / M[e]);
+            }
+        for (int e = 0; e < K::constraint_entries; ++e)
+            size[K::constraint_row[e]] += fabs(G[e]) * reach[K::constraint_column[e]];
+        for (int c = 0; c < constraints; ++c)
+            if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return false;
+        return true;
+    }
+
     // (D46) The multipliers of the end, which keep dphi/dt = 0 there, and their part of the momentum p1.
-    Status end_on_constraints(const real* q1, real* p1) {
+    Status end_on_constraints(const real* q1, real* p1, const Arrays& a) {
         if constexpr (constraints > 0) {
             real v[n], mu[constraints], phi[constraints], phi_t[constraints], G[K::constraint_entries];
             const Status status = velocity(this->next_time(), q1, p1, v, mu);
             if (status != Status::ok) return status;
             Formulas<K>::constraint(coefficients, this->next_time(), q1, +phi, +phi_t, +G);
+            if (!keeps_constraints(q1, v, phi, phi_t, G, a)) return Status::singular_jacobian;
             for (int e = 0; e < K::constraint_entries; ++e)
                 p1[K::constraint_column[e]] -= G[e] * mu[K::constraint_row[e]];
             for (int c = 0; c < constraints; ++c) last_multiplier[c] = -mu[c] / (step_size * K::b[r - 1]);
         } else {
-            (void)q1, (void)p1;
+            (void)q1, (void)p1, (void)a;
         }
         return Status::ok;
     }
@@ -385,7 +409,7 @@ private:
             a.p1[k] = p[k];
         }
         if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.p1, n))) return Status::not_finite;
-        status = end_on_constraints(a.q1, a.p1);
+        status = end_on_constraints(a.q1, a.p1, a);
         if (status != Status::ok) return status;
         if constexpr (K::clocked) elapsed = time_passed(a);
         for (int k = 0; k < n; ++k) {

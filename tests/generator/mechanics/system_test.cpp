@@ -6,6 +6,7 @@
 
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/structure.hpp"
+#include "generator/pipeline.hpp"
 
 using namespace lobatto;
 
@@ -67,6 +68,22 @@ TEST_CASE("Lagrangians with other than constant mass are general, and the term i
     CHECK(reason("q'^2/2 - q'^4/8 - q^2", one) == "dp_q/dq' = 1 - 3*q'^2/2 depends on the velocity");
     CHECK(reason("(a'^2 + b'^2)/2 + w*(a*b' - b*a')", two, "w = 1\n") ==
           "dp_a/db = -w: the momentum depends on the position");
+}
+
+TEST_CASE("a force that mentions velocities and does not depend on them is written without them") {
+    // A point turned about an axis askew: the kinetic energy does not depend on q, but GiNaC does not see that.
+    const Scene scene =
+        read_scene(Source("scene.toml",
+                          "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 - z\"\n[definitions]\n"
+                          "x = \"cos(q) + 16/81*(1 - cos(q))\"\ny = \"16/81*(1 - cos(q)) + 7/9*sin(q)\"\n"
+                          "z = \"28/81*(1 - cos(q)) - 4/9*sin(q)\"\n[coordinates]\n" +
+                              one + "[run]\nstep = 0.1\nuntil = 1\n"));
+    const System system = build_system(scene);
+    REQUIRE(system.separable);
+    CHECK(system.force[0].has(system.v[0]));
+    CHECK(!system.gradient[0].has(system.v[0]));
+    CHECK(!system.hessian(0, 0).has(system.v[0]));
+    CHECK(!emit(derive(scene)).header.empty());  // a logic_error before
 }
 
 TEST_CASE("a degenerate Lagrangian is refused with the direction that no kinetic energy opposes") {
