@@ -39,7 +39,7 @@ struct ConstrainedFixedPoint {
     struct Arrays {
         V Q[parts * n], f[parts * n], phi[parts * constraints], phi_t[parts * constraints], G[parts * slopes],
             W[parts * n], pull[parts * constraints];
-        real flat[n * lanes], off[constraints * lanes], inverse_scale[n], start_W[n];
+        real flat[n * lanes], off[constraints * lanes], measure[n], inverse_scale[n], start_W[n];
         real start_f[n], start_phi[constraints], start_phi_t[constraints], start_G[slopes];
         real B[constraints * constraints];
         std::int32_t pivots[constraints];
@@ -280,7 +280,10 @@ private:
             const int c = K::constraint_column[e], row = K::constraint_row[e];
             joined[c] += inverse(c) * fabs(a.start_G[e]) * (size[row] / maximum(square[row], Limits<real>::smallest));
         }
-        for (int c = 0; c < n; ++c) a.inverse_scale[c] = real(1) / maximum(own[c] + joined[c], Limits<real>::smallest);
+        for (int c = 0; c < n; ++c) {
+            a.measure[c] = maximum(own[c] + joined[c], Limits<real>::smallest);
+            a.inverse_scale[c] = real(1) / a.measure[c];
+        }
     }
 
     // Whether the positions found keep the constraints, to half of the digits of what they are measured by. Where
@@ -291,9 +294,8 @@ private:
             V size[constraints];
             for (int c = 0; c < constraints; ++c) size[c] = V(fabs(h)) * fabs(a.phi_t[part * constraints + c]);
             for (int e = 0; e < slopes; ++e)
-                size[K::constraint_row[e]] =
-                    fused(fabs(a.G[part * slopes + e]), V(real(1) / a.inverse_scale[K::constraint_column[e]]),
-                          size[K::constraint_row[e]]);
+                size[K::constraint_row[e]] = fused(fabs(a.G[part * slopes + e]), V(a.measure[K::constraint_column[e]]),
+                                                   size[K::constraint_row[e]]);
             V worst = V(real(0));
             for (int c = 0; c < constraints; ++c)
                 worst = maximum(worst, fabs(a.phi[part * constraints + c]) - V(Limits<real>::root_epsilon) * size[c]);
