@@ -193,7 +193,9 @@ void add_emit(CommandLine& program) {
     const auto options = std::make_shared<EmitCommand>();
     Command command = program.command("emit", "Write the integrator of a scene as a C++ header");
     command.option("SCENE", options->scene, "Scene file").required();
-    command.option("-o,--output", options->folder, "Folder for NAME.hpp and the kernel.hpp that it includes; - prints one file")
+    command
+        .option("-o,--output", options->folder,
+                "Folder for NAME.hpp and the kernel.hpp that it includes; - prints one file")
         .required()
         .shown_as("FOLDER");
     options->method.add_to(command);
