@@ -501,11 +501,11 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
             case Op::raise:
                 parts.insert("base/exponential.hpp");
                 break;
-            case Op::asin:
-            case Op::acos:
             case Op::table:
                 parts.insert("base/spline.hpp");
                 break;
+            case Op::asin:
+            case Op::acos:
             case Op::atan:
             case Op::atan2:
                 parts.insert("base/arc.hpp");

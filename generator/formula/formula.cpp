@@ -457,7 +457,7 @@ private:
             std::vector<std::string> names;
             for (const Function& function : functions()) names.push_back(function.name);
             names.insert(names.end(), {"sum", "mod", "table"});
-            for (const auto& [name, form] : pieced_functions()) names.push_back(name);
+            for (const auto& [pieced, form] : pieced_functions()) names.push_back(pieced);
             const std::string near = name == "ln" ? " Write log." : suggestion(name, names);
             fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula,
                                  fmt::join(names, ", "), near));

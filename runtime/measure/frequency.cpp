@@ -41,6 +41,7 @@ template <class real>
 double largest_frequency(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
                          const std::vector<real>& p, const std::vector<double>& scale) {
     const std::size_t n = q.size();
+    if (stepper.kernel()->constraints > 0) return 0;
     const Equations<real> equations{stepper, time, n};
     std::vector<real> y = q;
     y.insert(y.end(), p.begin(), p.end());

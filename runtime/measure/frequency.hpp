@@ -12,7 +12,8 @@ namespace lobatto {
 // motion its largest frequency, else the fastest growth may be it. By power iteration on the squared derivative,
 // whose leading eigenvalue is -omega^2, with central differences: some per cent too small where several frequencies
 // are near. `stepper` is prepared. scale: how far each position and momentum moves, 2n, positive: differences are small
-// beside that, and the units do not matter. Not a number where the formulas fail.
+// beside that, and the units do not matter. Not a number where the formulas fail; 0 with constraints, whose pull is not
+// in these equations.
 template <class real>
 double largest_frequency(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
                          const std::vector<real>& p, const std::vector<double>& scale);

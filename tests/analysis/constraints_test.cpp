@@ -13,6 +13,7 @@
 #include "analysis/motion.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/pipeline.hpp"
+#include "runtime/measure/frequency.hpp"
 #include "runtime/measure/manifold.hpp"
 #include "runtime/measure/symmetry.hpp"
 #include "runtime/run/output.hpp"
@@ -158,6 +159,14 @@ TEST_CASE("constraints and their rates stay at rounding") {
     CHECK(integrate(kernel, request).status == LOBATTO_OK);
     CHECK(position < 4e-15);
     CHECK(rate < 2e-14);
+}
+
+TEST_CASE("no frequency is told of equations without the pull of the constraints") {
+    const Scene scene = scene_of(rod + method(4, 0.1, 1));
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    const TrajectoryRequest request = request_of(scene, 1, stepper);
+    CHECK(largest_frequency<double>(stepper, 0, request.q, request.p, {1, 1, 1, 1}) == 0);
 }
 
 TEST_CASE("fixed-point iteration with constraints finds the steps that Newton's finds") {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A project that takes this tree in as source, by add_subdirectory or FetchContent: what it then has, and what is not
-// forced upon it. tests/python/test_packages.py builds such projects whole, which takes minutes.
+// forced upon it. tests/packages/test_packages.py builds such a project whole, which takes minutes.
 #include <doctest/doctest.h>
 
 #include "tests/support.hpp"
