@@ -14,6 +14,7 @@
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/print/interruption.hpp"
+#include "cli/print/say.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/describe/explain.hpp"
 #include "runtime/error.hpp"
@@ -96,7 +97,10 @@ void print(const Checked& checked) {
 void check(const CheckCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    Say say;
+    say("deriving");
     const Checked checked = check_scene(std::move(scene), options.general);
+    say.clear();
     if (options.json)
         std::cout << json_of(checked) << '\n';
     else

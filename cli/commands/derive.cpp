@@ -6,6 +6,7 @@
 
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/print/say.hpp"
 #include "generator/describe/describe.hpp"
 #include "generator/pipeline.hpp"
 
@@ -23,7 +24,10 @@ struct DeriveCommand {
 void derive_scene(const DeriveCommand& options) {
     Scene scene = read_scene(options.scene);
     options.method.apply(scene);
+    Say say;
+    say("deriving");
     const Description description = describe(derive(scene));
+    say.clear();
     std::cout << (options.latex ? latex_of(description) : options.json ? json_of(description) : text_of(description));
 }
 

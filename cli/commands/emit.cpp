@@ -17,6 +17,7 @@
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/print/answers_json.hpp"
+#include "cli/print/say.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
@@ -154,7 +155,10 @@ void emit_scene(const EmitCommand& options) {
         emit_options.support_text = [&](const std::vector<std::string>& parts) {
             return support_text(options.ensemble ? with_ensemble(parts) : parts);
         };
+    Say say;
+    say("deriving");
     const KernelSource source = emit(derive(scene, options.general), emit_options);
+    say.clear();
     if (printed) {
         fmt::print(std::cout, "{}", source.header);
         return;

@@ -17,6 +17,7 @@
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
+#include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "cli/table/trajectory_output.hpp"
@@ -287,7 +288,10 @@ void run(const RunOptions& options) {
         throw InputError("--json: standard output has the trajectory; name a file with -o");
     Scene read = read_scene(options.scene);
     options.method.apply(read);
+    Say say;
+    if (!quiet) say("deriving and compiling");
     const PreparedRun run = prepare_run(std::move(read), options.overrides, options.general);
+    say.clear();
     const Scene& scene = run.scene;
     LoadedStepper<double> stepper(run.plain);
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);

@@ -14,6 +14,7 @@
 #include "cli/options/starts.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
+#include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/sweep_summary.hpp"
 #include "cli/print/tell.hpp"
@@ -233,7 +234,10 @@ void sweep(const SweepOptions& options) {
     const auto [number, of] = shard_of(options.starts.shard);
     if (!options.output.empty()) keep_scene(options.scene, options.output);
     const TableFormat format = options.table_format();
+    Say say;
+    if (!quiet) say("deriving and compiling");
     const std::unique_ptr<SweepStudy> study = study_of(options, threads);
+    say.clear();
     refuse_both(options, study->starts());
     refuse_too_much(*study);
     if (options.json && is_stream) throw InputError("--json: standard output has the table; name a file with -o");
