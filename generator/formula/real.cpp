@@ -190,7 +190,7 @@ numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {
         const auto found = symbols.find(expression);
         if (found == symbols.end())
             throw NoValue(fmt::format("'{}' has no value", ex_to<GiNaC::symbol>(expression).get_name()));
-        return real_value(ex_to<numeric>(found->second));
+        return visit(found->second);
     }
     if (is_a<GiNaC::add>(expression)) return real_sum(each_operand(expression, visit));
     if (is_a<GiNaC::mul>(expression)) return real_product(each_operand(expression, visit));

@@ -95,9 +95,9 @@ public:
     Dependence(const Scene& scene, const System& system, const Symbols& motion)
         : scene_(scene), system_(system), motion_(motion) {}
 
-    // A root, other broken power or table of the motion may jump or bend beyond the sampled points, as x/sqrt(x^2)
-    // does: what holds one is taken to depend on all that it mentions. Everything else is analytic: constant near a
-    // point is constant.
+    // A root, other broken power, atan2 or table of the motion may jump or bend beyond the sampled points, as
+    // x/sqrt(x^2) does: what holds one is taken to depend on all that it mentions. Everything else is analytic:
+    // constant near a point is constant.
     bool is_broken(const ex& expression) const {
         for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
             if (is_pieced(*part) && !motion_.in(*part).empty()) return true;
@@ -113,8 +113,11 @@ public:
         return false;
     }
 
+    static bool is_angle(const ex& part) {
+        return GiNaC::is_a<GiNaC::function>(part) && GiNaC::ex_to<GiNaC::function>(part).get_name() == "atan2";
+    }
     static bool is_pieced(const ex& part) {
-        return is_table_value(part) ||
+        return is_table_value(part) || is_angle(part) ||
                (GiNaC::is_a<GiNaC::power>(part) && !part.op(1).info(GiNaC::info_flags::integer));
     }
 
