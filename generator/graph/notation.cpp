@@ -352,9 +352,10 @@ private:
     bool fuses_, in_template_;
 };
 
-void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::ex>& symbols) {
+// By name; a formula of repeated terms may hold two symbols of one name, its own and a parameter.
+void collect_symbols(const GiNaC::ex& e, std::map<std::string, GiNaC::exset>& symbols) {
     for (auto part = e.preorder_begin(); part != e.preorder_end(); ++part)
-        if (GiNaC::is_a<GiNaC::symbol>(*part)) symbols.emplace(GiNaC::ex_to<GiNaC::symbol>(*part).get_name(), *part);
+        if (GiNaC::is_a<GiNaC::symbol>(*part)) symbols[GiNaC::ex_to<GiNaC::symbol>(*part).get_name()].insert(*part);
 }
 
 }  // namespace
@@ -396,11 +397,13 @@ std::string decimal(const cln::cl_R& value, int digits) {
 }
 
 std::string canonical_text(const GiNaC::ex& expression, Notation notation) {
-    std::map<std::string, GiNaC::ex> symbols;
+    std::map<std::string, GiNaC::exset> symbols;
     collect_symbols(expression, symbols);
     Graph graph;
     GiNaC::exmap inputs;
-    for (const auto& [name, symbol] : symbols) inputs[symbol] = graph.input({name, name, Phase::iterate});
+    for (const auto& [name, same] : symbols)
+        for (const GiNaC::ex& symbol : same)
+            inputs[symbol] = graph.input({name + std::to_string(inputs.size()), name, Phase::iterate});
     return formula(graph, graph.from(expression, inputs), notation);
 }
 

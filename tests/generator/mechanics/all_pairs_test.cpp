@@ -115,6 +115,15 @@ TEST_CASE("bodies in loops beside coordinates of their own, whose matrix has zer
     CHECK(jacobian_defect(derivation, exact, at.parameters, at.q, at.p, 0.05) < 1e-12);
 }
 
+TEST_CASE("parameters may have the names that loops give to what varies") {
+    const Scene scene = test::scene_of("sum(i = 1 .. 9, m[i]*x[i]'^2/2 - m[i]*a0*x0*x[i]^4)",
+                                       "x = { count = 9, position = \"i\", velocity = 0 }", 4,
+                                       "a0 = 2\nx0 = 3\nm = [1, 2, 3, 4, 5, 6, 7, 8, 9]");
+    const Kernel kernel = test::kernel_in_own_cache(derive(scene), Precision::double_);
+    const StartIn<double> start = start_in<double>(ExactStart(scene), kernel, 0.001);
+    CHECK(trajectory_leaves<double>(derive(scene), kernel, start.parameters, start.q, start.p, 0.001) < 4);
+}
+
 TEST_CASE("the text of a kernel does not grow with the number of pairs") {
     const auto size = [](int bodies) { return static_cast<double>(emit(derive(bodies_scene(bodies))).header.size()); };
     const double of_11 = size(11), of_14 = size(14), of_17 = size(17);
