@@ -384,8 +384,8 @@ TEST_CASE("what is wrong with a wall is said with its place") {
 }
 
 TEST_CASE("formulas with sides may start at numbers that are not rational") {
-    for (const char* position : {"sqrt(2)", "cos(1)", "2*cos(2*pi/17)"})
+    for (const std::string position : {"sqrt(2)", "cos(1)", "2*cos(2*pi/17)"})
         CHECK_NOTHROW(
-            derive(scene_of("lagrangian = \"q'^2/2\"\n[coordinates]\nq = { position = \"" + std::string(position) +
-                            "\", velocity = 0, force = \"-abs(q)\" }\n[run]\nstep = 0.1\nuntil = 1\n")));
+            derive(scene_of("lagrangian = \"q'^2/2\"\n[coordinates]\nq = { position = \"" + position +
+                            "\", velocity = 0 }\n[forces]\nq = \"-abs(q)\"\n[run]\nstep = 0.1\nuntil = 1\n")));
 }
