@@ -44,6 +44,24 @@ TEST_CASE("steps of every form leave rounding in their equations") {
     }
 }
 
+TEST_CASE("steps on constraints leave rounding, and those of another length of the rod leave more") {
+    const auto rod = [](const std::string& length) {
+        const std::string text =
+            "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 - y\"\n[coordinates]\n"
+            "x = { position = 0.6, velocity = 0.4 }\ny = { position = -0.8, velocity = 0.3 }\n"
+            "z = { position = 0, velocity = 0 }\n[constraints]\nrod = \"x^2 + y^2 = " +
+            length + "\"\nplane = \"z = 0\"\n[method]\npoints = 4\n[run]\nstep = 0.1\nuntil = 1\nassemble = true\n";
+        return derive(read_scene(Source("rod.toml", text)));
+    };
+    const auto leaves = [](const Derivation& derived, const Derivation& taken) {
+        const Kernel kernel = test::kernel_in_own_cache(taken, Precision::double_);
+        const StartIn<double> start = start_in<double>(ExactStart(taken.scene), kernel, 0.1);
+        return trajectory_leaves<double>(derived, kernel, start.parameters, start.q, start.p, 0.1);
+    };
+    CHECK(leaves(rod("1"), rod("1")) < 8);
+    CHECK(leaves(rod("1 + 1e-9*x"), rod("1")) > 1e4);
+}
+
 TEST_CASE("steps of another system, or of another method, leave more") {
     const Derivation pendulum = derive(test::pendulum_scene(4));
     const Derivation heavier =

@@ -308,21 +308,26 @@ private:
     }
 
     // Whether positions at the end of the stages just solved keep the constraints, to half of the digits of the
-    // positions, of the way, and of how far the forces of the step move them.
+    // positions, of the way, and of how far the forces of the step move them; of one that a constraint holds fixed, of
+    // the way of the others, in the metric of the mass.
     bool keeps_constraints(const real* q1, const real* v, const real* phi, const real* phi_t, const real* G,
                            const Arrays& a) const {
         real size[multiplier_room], reach[n], momentum_there[n], M[K::mass_entries > 0 ? K::mass_entries : 1];
         for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
         for (int k = 0; k < n; ++k) reach[k] = fabs(q[k]) + fabs(q1[k]) + fabs(step_size * v[k]);
         Formulas<K>::legendre(coefficients, this->next_time(), q1, v, +momentum_there, +M);
-        for (int e = 0; e < K::mass_entries; ++e)
-            for (int b = 0; b < active; ++b) {
-                if (K::mass_row[e] != K::active_index[b] || K::mass_column[e] != K::active_index[b] || M[e] == real(0))
-                    continue;
-                for (int i = 0; i < r; ++i)
-                    reach[K::active_index[b]] +=
-                        fabs(step_size * (step_size * K::b[i] * a.g[i * Z + active + b]) / M[e]);
-            }
+        real moved = real(0);  // sum M_kk (h v_k)^2
+        const auto each_mass = [&](const auto& use) {
+            for (int e = 0; e < K::mass_entries; ++e)
+                if (K::mass_row[e] == K::mass_column[e] && M[e] != real(0)) use(K::mass_row[e], fabs(M[e]));
+        };
+        each_mass([&](int k, real mass) { moved += mass * (step_size * v[k]) * (step_size * v[k]); });
+        each_mass([&](int k, real mass) {
+            reach[k] += sqrt(moved / mass);
+            for (int b = 0; b < active; ++b)
+                for (int i = 0; i < r && K::active_index[b] == k; ++i)
+                    reach[k] += fabs(step_size * (step_size * K::b[i] * a.g[i * Z + active + b]) / mass);
+        });
         for (int e = 0; e < K::constraint_entries; ++e)
             size[K::constraint_row[e]] += fabs(G[e]) * reach[K::constraint_column[e]];
         for (int c = 0; c < constraints; ++c)
