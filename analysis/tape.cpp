@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 
+#include "generator/formula/real.hpp"
 #include "generator/formula/spline.hpp"
 
 namespace lobatto {
@@ -41,10 +42,10 @@ bool Tape::append(const ex& formula, const std::vector<GiNaC::symbol>& variables
         if (is_table_value(formula)) {
             instruction.operation = Operation::table;
             instruction.operands = 1;
-            instruction.spline = GiNaC::ex_to<GiNaC::numeric>(formula.op(0)).to_int();
+            instruction.spline = &spline_of(GiNaC::ex_to<GiNaC::numeric>(formula.op(0)).to_int());
             instruction.order = GiNaC::ex_to<GiNaC::numeric>(formula.op(1)).to_int();
         } else if (is_function && formula.nops() == 2) {
-            if (GiNaC::ex_to<GiNaC::function>(formula).get_name() != "atan2") return false;
+            if (!is_angle(formula)) return false;
             instruction.operation = Operation::angle;
         } else if (is_function) {
             const auto found = functions.find(GiNaC::ex_to<GiNaC::function>(formula).get_name());
@@ -75,8 +76,7 @@ Tape::Value Tape::sized(const std::vector<double>& variables) const {
         double result = *first;
         if (instruction.operation == Operation::call) result = instruction.function(*first);
         if (instruction.operation == Operation::power) result = std::pow(first[0], first[1]);
-        if (instruction.operation == Operation::table)
-            result = spline_of(instruction.spline)(instruction.order, *first);
+        if (instruction.operation == Operation::table) result = (*instruction.spline)(instruction.order, *first);
         if (instruction.operation == Operation::angle) result = std::atan2(first[0], first[1]);
         size = std::fabs(result);
         for (auto operand = first + 1; operand != stack.end(); ++operand) {

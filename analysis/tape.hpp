@@ -9,6 +9,8 @@
 
 namespace lobatto {
 
+class Spline;
+
 class Tape {
 public:
     // Nothing: the formula holds a function or a symbol that is not known.
@@ -28,7 +30,8 @@ private:
         std::size_t variable = 0;
         int operands = 0;
         double (*function)(double) = nullptr;
-        int spline = 0, order = 0;  // table
+        const Spline* spline = nullptr;  // table
+        int order = 0;
     };
     bool append(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables);
 

@@ -38,7 +38,8 @@ private:
     std::vector<std::array<double, 4>> rounded_;
 };
 
-// Splines have numbers that follow from their content, so that the same scene gives the same text everywhere.
+// Splines that were read stay until the program ends. They have numbers that follow from their content, so that the
+// same scene gives the same text everywhere.
 constexpr int most_splines = 1 << 28;
 int number_of(Spline spline);
 const Spline& spline_of(int number);

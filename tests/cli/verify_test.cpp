@@ -2,6 +2,8 @@
 // lobatto verify from the outside: its table, its verdict, its exit codes.
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include "tests/support.hpp"
 
 using namespace lobatto::test;
@@ -59,6 +61,27 @@ TEST_CASE("a scene with a symmetry has its momentum in the table") {
     const Finished result = verify({(folder / "pair.toml").string()});
     CHECK(result.exit_code == 0);
     CHECK(contains(result.out, "  translation: p_x + p_y"));
+}
+
+TEST_CASE("measured values in a potential verify, also from a start on one of their knots") {
+    const TemporaryFolder folder;
+    std::string values;
+    for (int i = -20; i <= 20; ++i) values += std::to_string(i) + "e-1, " + std::to_string(std::sin(i / 10.0)) + "\n";
+    write_text(folder / "sine.csv", values);
+    write_text(folder / "pulled.toml",
+               "lagrangian = '''(x'^2 + y'^2)/2 - x^2 - table(\"sine.csv\", x)'''\n[coordinates]\n"
+               "x = { position = 0.5, velocity = 0.1 }\ny = { position = 0.3, velocity = 0.2 }\n[run]\nstep = 0.01\n"
+               "until = 2\n");
+    const Finished result = verify({(folder / "pulled.toml").string()});
+    INFO(result.out << result.err);
+    CHECK(result.exit_code == 0);
+    CHECK(contains(result.out, "tangent map against differences"));
+}
+
+TEST_CASE("coordinates that a constraint holds at 0 are not accused") {
+    const Finished result = verify({LOBATTO_SOURCE_DIR "/scenes/rod_loop.toml"});
+    INFO(result.out << result.err);
+    CHECK(result.exit_code == 0);
 }
 
 TEST_CASE("what forces and time take away is not promised, the rest is checked, for Gauss too") {
