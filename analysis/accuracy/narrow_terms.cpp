@@ -8,6 +8,8 @@
 #include <cmath>
 #include <map>
 
+#include "generator/formula/real.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -48,7 +50,7 @@ NarrowTerms::NarrowTerms(const System& system) {
             if (GiNaC::is_a<GiNaC::function>(*part)) {
                 const std::string name = GiNaC::ex_to<GiNaC::function>(*part).get_name();
                 if (const auto kind = kinds.find(name); kind != kinds.end()) add(kind->second, part->op(0));
-                if (name == "atan2") add(Kind::pole, GiNaC::pow(part->op(0), 2) + GiNaC::pow(part->op(1), 2));
+                if (is_angle(*part)) add(Kind::pole, GiNaC::pow(part->op(0), 2) + GiNaC::pow(part->op(1), 2));
                 if (name == "tan") add(Kind::pole, GiNaC::cos(part->op(0)));
                 if (name == "asin" || name == "acos") add(Kind::pole, 1 - GiNaC::pow(part->op(0), 2));
             } else if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::nonnegint)) {

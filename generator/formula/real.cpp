@@ -171,6 +171,10 @@ numeric real_angle(const numeric& y, const numeric& x) {
     return checked([&] { return GiNaC::atan(y, x); }, fmt::format("atan2 of {} and {}", shown(y), shown(x)));
 }
 
+bool is_angle(const ex& expression) {
+    return is_a<GiNaC::function>(expression) && ex_to<GiNaC::function>(expression).get_name() == "atan2";
+}
+
 numeric real_table(int number, int order, const numeric& u) {
     const Spline& spline = spline_of(number);
     const cln::cl_R place = cln::the<cln::cl_R>(u.to_cl_N());
@@ -198,9 +202,7 @@ numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {
     if (is_table_value(expression))
         return real_table(ex_to<numeric>(expression.op(0)).to_int(), ex_to<numeric>(expression.op(1)).to_int(),
                           visit(expression.op(2)));
-    if (is_a<GiNaC::function>(expression) && expression.nops() == 2 &&
-        ex_to<GiNaC::function>(expression).get_name() == "atan2")
-        return real_angle(visit(expression.op(0)), visit(expression.op(1)));
+    if (is_angle(expression)) return real_angle(visit(expression.op(0)), visit(expression.op(1)));
     const Function* function =
         is_a<GiNaC::function>(expression) ? find_function(ex_to<GiNaC::function>(expression).get_name()) : nullptr;
     if (function == nullptr) throw NoValue("it is not a formula of known functions");

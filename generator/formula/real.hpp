@@ -36,6 +36,7 @@ GiNaC::numeric real_product(const std::vector<GiNaC::numeric>& factors);
 GiNaC::numeric real_power(const GiNaC::numeric& base, const GiNaC::numeric& exponent);
 GiNaC::numeric real_function(const Function& function, const GiNaC::numeric& argument);
 GiNaC::numeric real_angle(const GiNaC::numeric& y, const GiNaC::numeric& x);  // atan2(y, x)
+bool is_angle(const GiNaC::ex& expression);                                   // atan2(y, x) of GiNaC
 GiNaC::numeric real_table(int number, int order, const GiNaC::numeric& u);    // a value of a spline
 // The value of a whole expression, its symbols replaced by numbers (60 digits) before anything is computed.
 GiNaC::numeric real_value(const GiNaC::ex& expression, const GiNaC::exmap& symbols = {});

@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "generator/formula/expansion.hpp"
+#include "generator/formula/real.hpp"
 #include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/routhian.hpp"
@@ -535,9 +536,8 @@ private:
         bool has_angle = false;
         const auto look_at = [&](const ex& formula) {
             for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
-                if (!GiNaC::is_a<GiNaC::function>(*part)) continue;
                 if (is_table_value(*part)) numbers.insert(GiNaC::ex_to<GiNaC::numeric>(part->op(0)).to_int());
-                has_angle = has_angle || GiNaC::ex_to<GiNaC::function>(*part).get_name() == "atan2";
+                has_angle = has_angle || is_angle(*part);
             }
         };
         look_at(system_.lagrangian);

@@ -14,6 +14,7 @@
 #include <map>
 #include <set>
 
+#include "generator/formula/real.hpp"
 #include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/mass_equations.hpp"
@@ -59,6 +60,19 @@ ex at(const ex& expression, const Symbols& variables, const Occurrences& occurre
     GiNaC::exmap found;
     for (const std::size_t i : occurrences.in(expression)) found[variables[i]] = value;
     return expression.subs(found, GiNaC::subs_options::no_pattern);
+}
+
+// A value that does not depend on what its formula mentions, without it: at the origin, or where that is a pole, beside
+// it.
+ex without(const ex& value, const Symbols& mentioned, const Occurrences& occurrences) {
+    for (const ex& place : {ex(0), ex(GiNaC::numeric(1, 2))}) try {
+            return at(value, mentioned, occurrences, place);
+        } catch (const std::exception&) {
+        }
+    GiNaC::exmap apart;
+    for (const std::size_t i : occurrences.in(value))
+        apart[mentioned[i]] = GiNaC::numeric(1, static_cast<long>(apart.size()) + 3);
+    return value.subs(apart, GiNaC::subs_options::no_pattern);
 }
 
 void append_terms(const ex& expression, const Occurrences& occurrences, std::vector<ex>& terms) {
@@ -113,9 +127,6 @@ public:
         return false;
     }
 
-    static bool is_angle(const ex& part) {
-        return GiNaC::is_a<GiNaC::function>(part) && GiNaC::ex_to<GiNaC::function>(part).get_name() == "atan2";
-    }
     static bool is_pieced(const ex& part) {
         return is_table_value(part) || is_angle(part) ||
                (GiNaC::is_a<GiNaC::power>(part) && !part.op(1).info(GiNaC::info_flags::integer));
@@ -293,13 +304,7 @@ bool mentions(const System& system, const GiNaC::symbol& t) {
 Scene without_time(const Scene& scene) {
     const Symbols time{scene.time};
     const Occurrences occurrences(time);
-    const auto still = [&](const ex& value) {
-        try {
-            return at(value, time, occurrences, 0);
-        } catch (const std::exception&) {  // a pole at the origin: one away from it
-            return at(value, time, occurrences, GiNaC::numeric(1, 2));
-        }
-    };
+    const auto still = [&](const ex& value) { return without(value, time, occurrences); };
     Scene result = scene;
     result.lagrangian = still(scene.lagrangian);
     for (Coordinate& coordinate : result.coordinates) coordinate.force = still(coordinate.force);
@@ -396,20 +401,11 @@ private:
                 const Dependence::Kind& kind = kinds[next++];
                 if (kind.zero) continue;
                 const bool constant = kind.constant();
-                const ex kept_value = constant ? constant_form(value, of_motion) : value;
+                const ex kept_value = constant ? without(value, motion_, of_motion) : value;
                 kept[block]->put(place.first, place.second, kept_value);
                 system_.linear = system_.linear && constant;
                 if (system_.separable) check_second_order(block, place, kept_value, kind, constant);
             }
-        }
-    }
-
-    // A value that does not depend on what its formula mentions is written without it.
-    ex constant_form(const ex& value, const Occurrences& of_motion) const {
-        try {
-            return at(value, motion_, of_motion, 0);
-        } catch (const std::exception&) {  // a pole at the origin: one away from it
-            return at(value, motion_, of_motion, GiNaC::numeric(1, 2));
         }
     }
 
@@ -461,13 +457,13 @@ private:
     void keep_separable_parts() {
         // Forces that do not depend on velocities may mention them, as turns do: cos^2 + sin^2 is no 1 for GiNaC.
         const Occurrences of_v(system_.v);
-        const auto at_rest = [&](const ex& value) { return at(value, system_.v, of_v, 0); };
+        const auto freed = [&](const ex& value) { return without(value, system_.v, of_v); };
         system_.mass = system_.momentum_v;
-        system_.potential = -at_rest(system_.lagrangian);
+        system_.potential = -at(system_.lagrangian, system_.v, of_v, 0);
         system_.hessian = SparseMatrix(system_.n, system_.n);
-        for (const ex& force : system_.force) system_.gradient.push_back(-at_rest(force));
+        for (const ex& force : system_.force) system_.gradient.push_back(-freed(force));
         for (const auto& [place, value] : system_.force_q.entries())
-            system_.hessian.put(place.first, place.second, -at_rest(value));
+            system_.hessian.put(place.first, place.second, -freed(value));
     }
 
     std::string coordinate_of(std::size_t k) const { return system_.q[k].get_name(); }

@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include "generator/formula/real.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/structure.hpp"
 #include "generator/pipeline.hpp"
@@ -84,6 +85,22 @@ TEST_CASE("a force that mentions velocities and does not depend on them is writt
     CHECK(!system.gradient[0].has(system.v[0]));
     CHECK(!system.hessian(0, 0).has(system.v[0]));
     CHECK(!emit(derive(scene)).header.empty());  // a logic_error before
+}
+
+TEST_CASE("so is one whose formula has no value at rest") {
+    const Scene scene = read_scene(
+        Source("scene.toml",
+               "lagrangian = \"(x'^2 + y'^2)/2\"\n[coordinates]\nx = { position = 0.5, velocity = 0.2 }\n"
+               "y = { position = 0.1, velocity = 0.4 }\n[forces]\n"
+               "x = \"(x'^2 - y'^2)/(x' - y')*x - (x' + y')*x - x^3\"\ny = \"exp(log(y'^2) - 2*log(y'))*y\"\n"
+               "[run]\nstep = 0.1\nuntil = 1\n"));
+    const System system = build_system(scene);
+    REQUIRE(system.separable);
+    const auto value = [&](const GiNaC::ex& formula) {
+        return real_value(formula, {{system.q[0], GiNaC::numeric(1, 2)}, {system.q[1], GiNaC::numeric(3)}}).to_double();
+    };
+    CHECK(value(system.gradient[0]) == doctest::Approx(0.125).epsilon(1e-15));
+    CHECK(value(system.gradient[1]) == doctest::Approx(-3).epsilon(1e-15));
 }
 
 TEST_CASE("a degenerate Lagrangian is refused with the direction that no kinetic energy opposes") {
