@@ -246,12 +246,17 @@ private:
             refuse(
                 "a table lies in the folder of its scene, or below it: write its place from there, without /.. and "
                 "without / at the beginning");
-        const std::filesystem::path whole = std::filesystem::path(source_.path()).parent_path() / path;
+        const std::filesystem::path folder = std::filesystem::path(source_.path()).parent_path(), whole = folder / path;
         std::error_code error;
         if (!std::filesystem::exists(whole, error))
             refuse(fmt::format("there is no file {} for this table", whole.string()));
         if (!std::filesystem::is_regular_file(whole, error))
             refuse(fmt::format("{} is no file that a table can be read from", whole.string()));
+        const std::filesystem::path home = std::filesystem::canonical(folder.empty() ? "." : folder, error),
+                                    target = std::filesystem::canonical(whole, error);
+        if (error || std::mismatch(home.begin(), home.end(), target.begin(), target.end()).first != home.end())
+            refuse(fmt::format("{} is a link to a file outside of the folder of the scene; copy the file",
+                               whole.string()));
         const int number = number_of(read_spline(Source::read(whole.string(), "table"), name));
         if (names_ != nullptr) names_->tables.emplace(name, TableUse{number, formula.at.at});
         return number;

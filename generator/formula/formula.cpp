@@ -25,7 +25,7 @@ using Kind = Syntax::Kind;
 constexpr std::pair<char, std::string_view> stray_signs[] = {
     {'[', "write ( instead"},
     {']', "write ) instead"},
-    {',', "decimals have a point, and every function one argument"},
+    {',', "decimals have a point, and functions have no more arguments"},
     {'=', "a formula is one side only"},
     {'.', "two points stand only in a sum, as in sum(i = 1 .. n, formula)"},
     {'\'', "a prime belongs directly after the name of a coordinate"}};

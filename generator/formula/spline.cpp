@@ -6,6 +6,7 @@
 
 #include <cln/cln.h>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -100,8 +101,21 @@ public:
         skip_blanks();
         return next_ == text_.size() || text_[next_] == '#';
     }
-    bool begins_number() const {
-        return next_ < text_.size() && (is_digit(text_[next_]) || std::string_view("+-.").find(text_[next_]) != npos);
+    // Words only: it begins with none of a number's signs, and no field between commas, semicolons or tabs is a number.
+    bool is_heading() const {
+        if (is_digit(text_[next_]) || std::string_view("+-.").find(text_[next_]) != std::string_view::npos)
+            return false;
+        for (std::size_t begin = next_; begin < text_.size();) {
+            const std::size_t end = std::min(text_.find_first_of(",;\t", begin), text_.size());
+            const std::size_t first = std::min(text_.find_first_not_of(" \r", begin), end),
+                              last = text_.find_last_not_of(" \r", end - 1) + 1;
+            double ignored = 0;
+            if (first < last &&
+                std::from_chars(text_.data() + first, text_.data() + last, ignored).ptr == text_.data() + last)
+                return false;
+            begin = end + 1;
+        }
+        return true;
     }
     // Exact; "1e-3" too.
     cl_R number(const char* what) {
@@ -141,7 +155,6 @@ public:
     std::size_t place() const { return next_; }
 
 private:
-    static constexpr auto npos = std::string_view::npos;
     static constexpr std::size_t most_digits = 100;
     static bool is_digit(char c) { return c >= '0' && c <= '9'; }
     void skip_blanks() {
@@ -255,7 +268,7 @@ Spline read_spline(const Source& file, const std::string& name) {
         Line line(file, std::string_view(content).substr(begin, end - begin), ++number);
         begin = end + 1;
         if (line.is_empty()) continue;
-        if (std::exchange(is_first, false) && !line.begins_number()) continue;  // a heading
+        if (std::exchange(is_first, false) && line.is_heading()) continue;
         const std::size_t place = line.place();
         x.push_back(line.number("the argument"));
         line.separator();

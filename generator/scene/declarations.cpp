@@ -12,6 +12,10 @@ constexpr std::size_t longest_name = 64;
 constexpr std::pair<std::string_view, std::string_view> reserved_names[] = {
     {"pi", "the number 3.14159..."}, {"h", "the time step"}, {"t", "the time"}, {"H", "the energy"}};
 
+std::string with_article(const std::string& what) {
+    return (std::string_view("aeiou").find(what.front()) == std::string_view::npos ? "a " : "an ") + what;
+}
+
 }  // namespace
 
 std::string element_name(const std::string& array, std::size_t k) {
@@ -20,9 +24,9 @@ std::string element_name(const std::string& array, std::size_t k) {
 
 void Declarations::declare(const std::string& name, Position at, const std::string& what) {
     if (!is_identifier(name) || name.find("__") != std::string::npos)
-        fail(at, fmt::format("'{}' cannot be the name of a {}: names are letters, digits and single underscores, and "
+        fail(at, fmt::format("'{}' cannot be the name of {}: names are letters, digits and single underscores, and "
                              "begin with a letter",
-                             name.substr(0, 40), what));
+                             name.substr(0, 40), with_article(what)));
     if (name.size() > longest_name)
         fail(at, fmt::format("a name of {} letters; at most {}", name.size(), longest_name));
     if (is_function_name(name))
@@ -35,7 +39,8 @@ void Declarations::declare(const std::string& name, Position at, const std::stri
     if (found->second.element)
         fail(at, fmt::format("'{}' is {} in the trajectory; rename one", name, found->second.what));
     if (found->second.what == what) fail(at, fmt::format("'{}' is declared twice", name));
-    fail(at, fmt::format("'{}' is both a {} and a {}; rename one", name, found->second.what, what));
+    fail(at,
+         fmt::format("'{}' is both {} and {}; rename one", name, with_article(found->second.what), with_article(what)));
 }
 
 void Declarations::declare_elements(const std::string& array, Position at, std::size_t count) {
@@ -43,8 +48,8 @@ void Declarations::declare_elements(const std::string& array, Position at, std::
         const std::string name = element_name(array, k);
         const auto [found, added] = taken_.insert({name, {fmt::format("element {} of {}", k, array), true}});
         if (!added)
-            fail(at, fmt::format("element {} of {} would be called {} in the trajectory, and that is a {}; rename one",
-                                 k, array, name, found->second.what));
+            fail(at, fmt::format("element {} of {} would be called {} in the trajectory, and that is {}; rename one", k,
+                                 array, name, with_article(found->second.what)));
     }
 }
 

@@ -221,8 +221,9 @@ TEST_CASE("characters of word processors come with what to type instead") {
     check_error("q²", 2, "unexpected character '²' in the Lagrangian: write ^2 instead");
     check_error("2*π", 3, "unexpected character 'π' in the Lagrangian: write pi instead");
     check_error("q′", 2, "unexpected character '′' in the Lagrangian: write ' instead");
-    check_error("0,5", 2,
-                "unexpected character ',' in the Lagrangian: decimals have a point, and every function one argument");
+    check_error(
+        "0,5", 2,
+        "unexpected character ',' in the Lagrangian: decimals have a point, and functions have no more arguments");
     check_error("q & m", 3, "unexpected character '&' in the Lagrangian");
     CHECK(error_of("é + \x1b[31m") == layout("é + \uFFFD[31m", 1, "unexpected character 'é' in the Lagrangian"));
     CHECK(error_of("\xff") == layout("\uFFFD", 1, "unexpected character '\uFFFD' in the Lagrangian"));
@@ -408,8 +409,9 @@ TEST_CASE("sums and brackets that are not written as such come with their form")
     check_error("1..q", 2,
                 "unexpected character '..' in the Lagrangian: two points stand only in a sum, as in "
                 "sum(i = 1 .. n, formula)");
-    check_error("sin(q, 1)", 6,
-                "unexpected character ',' in the Lagrangian: decimals have a point, and every function one argument");
+    check_error(
+        "sin(q, 1)", 6,
+        "unexpected character ',' in the Lagrangian: decimals have a point, and functions have no more arguments");
 }
 
 TEST_CASE("the time needs a declaration") {

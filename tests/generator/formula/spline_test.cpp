@@ -96,6 +96,10 @@ TEST_CASE("a bad file is told with line and column") {
     CHECK(error_of("0, 1e999\n1, 1\n") == "m.csv:1:4: this number is beyond 1e-300 to 1e300");
     CHECK(error_of("0, 1e9999\n1, 1\n").starts_with("m.csv:1:4: the value is missing"));
     CHECK(error_of("0, nan\n1, 1\n").starts_with("m.csv:1:4: the value is missing"));
+    for (const char* first : {"nan, 2", "O.5, 1", "\"0\", 1", "x; 1e3"})  // neither a heading nor two numbers
+        CHECK(error_of(std::string(first) + "\n1, 2\n2, 3\n").starts_with("m.csv:1:1: the argument is missing"));
+    for (const char* first : {"time, 2nd torque", "t M", "\"time (s)\"\t\"torque\""})
+        CHECK(spline_from(std::string(first) + "\n1, 2\n2, 3\n").x().size() == 2);
     CHECK(error_of("t, M\n1, 2\n") == "m.csv:2:1: a table needs two points or more, one a line: 0.5, 1.25");
     CHECK(error_of("") == "m.csv:1:1: a table needs two points or more, one a line: 0.5, 1.25");
     std::string many;
@@ -126,6 +130,11 @@ TEST_CASE("a table is a file beside its scene, of the right form") {
     CHECK(error_with("table(\"/etc/passwd\", t)").starts_with(begin + "8: a table lies in the folder of its scene"));
     CHECK(error_with("table(\"a/../../m.csv\", t)").starts_with(begin + "8: a table lies in the folder of its scene"));
     CHECK(error_with("table(\".\", t)").find("is no file that a table can be read from") != std::string::npos);
+    std::filesystem::create_symlink("/etc/passwd", folder / "link.csv");
+    CHECK(error_with("table(\"link.csv\", t)").find("is a link to a file outside of the folder of the scene") !=
+          std::string::npos);
+    std::filesystem::create_symlink("m.csv", folder / "near.csv");
+    CHECK(error_with("table(\"near.csv\", t)") == "");
     CHECK(error_with("table(\"\", t)") == begin + "8: the file of a table has no name");
     CHECK(error_with("table(\"a\\\\b\", t)") ==
           begin + "8: the name of a table holds no control characters and no backslashes");
