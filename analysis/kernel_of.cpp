@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "analysis/support_text.hpp"
+#include "generator/emit/support.hpp"
 #include "generator/mechanics/structure.hpp"
 
 namespace lobatto {

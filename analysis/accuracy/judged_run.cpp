@@ -83,9 +83,8 @@ std::string end_of_table(const PreparedRun& run, const TrajectoryRequest& reques
     const std::string what = observers.domains.text(observers.parameters, ahead.data());
     if (what.empty()) return "";
     return fmt::format(
-        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, and has no "
-        "value "
-        "there. Try an earlier end, or measure further.",
+        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, "
+        "and has no value there. Try an earlier end, or measure further.",
         result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), what);
 }
 

@@ -12,6 +12,7 @@
 #include "generator/emit/declarations.hpp"
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/looped.hpp"
+#include "generator/emit/support.hpp"
 #include "generator/emit/tables.hpp"
 #include "generator/formula/spline.hpp"
 #include "generator/mechanics/derivation.hpp"
@@ -470,62 +471,7 @@ private:
         angles_;  // of the function that the fixed-point iteration evaluates, where they may be near others
 };
 
-// Where the Stepper of a kernel is; as stepping_of in runtime/kernel/base/contract.hpp.
-std::string stepper_of(const Scene& scene, const Structure& structure) {
-    if (scene.clock) return "steppers/clocked.hpp";
-    if (structure.form() == Form::linear_map) return "steppers/linear.hpp";
-    if (structure.form() == Form::general) return "steppers/general.hpp";
-    return structure.clean()         ? "steppers/clean.hpp"
-           : structure.is_explicit() ? "steppers/splitting.hpp"
-                                     : "steppers/separable.hpp";
-}
-
-std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
-    std::set<std::string> parts = {stepper_of(derivation.scene, derivation.structure)};
-    if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
-    if (has_full_matrix(derivation)) parts.insert("base/full_matrix.hpp");
-    if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
-    if (!derivation.system.inputs.empty()) parts.insert("steppers/inputs.hpp");
-    for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
-            case Op::sin:
-            case Op::cos:
-            case Op::tan:
-            case Op::sincos_pair:
-                parts.insert("base/trigonometry.hpp");
-                break;
-            case Op::exp:
-            case Op::log:
-            case Op::sinh:
-            case Op::cosh:
-            case Op::tanh:
-            case Op::raise:
-                parts.insert("base/exponential.hpp");
-                break;
-            case Op::table:
-                parts.insert("base/spline.hpp");
-                break;
-            case Op::asin:
-            case Op::acos:
-            case Op::atan:
-            case Op::atan2:
-                parts.insert("base/arc.hpp");
-                break;
-            default:
-                break;
-        }
-    return {parts.begin(), parts.end()};
-}
-
 }  // namespace
-
-std::string before_support(Precision precision) {
-    if (precision == Precision::quadruple) return "#define LOBATTO_USE_FLOAT128\n";
-    if (precision == Precision::double_double)
-        return "#if defined(__GNUC__) && !defined(__clang__)\n"
-               "#pragma GCC optimize(\"no-tree-slp-vectorize\")  // with which g++ 12 loses the low parts of sums\n"
-               "#endif\n";
-    return "";
-}
 
 KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options) {
     KernelSource source;

@@ -21,9 +21,6 @@ struct EmitOptions {
     std::function<std::string(const std::vector<std::string>& parts)> support_text;
 };
 
-// What must stand before all that a kernel in these numbers is compiled from; empty: nothing.
-std::string before_support(Precision precision);
-
 struct KernelSource {
     Form form{};         // of its steps (generator/mechanics/structure.hpp)
     std::string name;    // struct lobatto::kernels::NAME, a C identifier

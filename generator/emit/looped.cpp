@@ -152,6 +152,7 @@ std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
             std::any_of(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.part == wanted; });
         if (!exists || program(name_of(wanted)).outputs.empty()) continue;
         const std::optional<AllPairs> pairs = all_pairs(element);
+        const std::size_t values = pairs ? static_cast<std::size_t>(pairs->bodies - 1) : element.rows.size();
         const std::string inside = statements(name_of(wanted), "    ");
         std::string begin;
         for (std::size_t j = 0; j < element.x.size(); ++j) {
@@ -170,8 +171,7 @@ std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
             const std::string value = fmt::format("a{}", j);
             if (mentions(inside, value))
                 begin += fmt::format("            const auto {} = {}{}_a[{} + {}];\n", value,
-                                     has_parameters(element) ? "k." : "", name,
-                                     j * coefficient_tables(element).front().size(),
+                                     has_parameters(element) ? "k." : "", name, j * values,
                                      !pairs                             ? "r"
                                      : pairs->coefficients[j].of_second ? "other - 1"
                                                                         : "body");
