@@ -144,7 +144,10 @@ int lobatto_integrator_set(lobatto_integrator* integrator, const char* parameter
         [&](api::Stepper& stepper) { stepper.set(parameter == nullptr ? "" : parameter, value); });
 }
 int lobatto_integrator_set_inputs(lobatto_integrator* integrator, const double* values) {
-    return integrator->with_stepper([&](api::Stepper& stepper) { stepper.set_inputs(values); });
+    return integrator->with_stepper([&](api::Stepper& stepper) {
+        if (values == nullptr) throw api::InputError("set_inputs: NULL was given; give a value for each input");
+        stepper.set_inputs(values);
+    });
 }
 int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity) {
     return integrator->with_stepper([&](api::Stepper& stepper) {

@@ -202,6 +202,8 @@ TEST_CASE("C sets all inputs at once") {
     lobatto_integrator* const motion = lobatto_integrator_new(scene, nullptr);
     const double one = 1;
     CHECK(lobatto_integrator_set_inputs(motion, &one) == 0);
+    CHECK(lobatto_integrator_set_inputs(motion, nullptr) == 2);
+    CHECK(std::string(lobatto_integrator_message(motion)).find("NULL was given") != std::string::npos);
     CHECK(lobatto_integrator_advance(motion, 20) == 0);
     CHECK(lobatto_integrator_q(motion)[0] == doctest::Approx(1).epsilon(1e-13));
     lobatto_integrator_free(motion);
