@@ -50,13 +50,10 @@ void check_method(const Scene& scene, const System& system, bool general) {
                               system.not_separable + "; use plain arithmetic (--arithmetic plain)");
 }
 
-}  // namespace
-
-Derivation derive(const Scene& scene, bool general) {
-    const DerivationLimits limits(scene.path);
+Derivation derived(const Scene& scene, bool general, bool is_short) {
     Derivation derivation;
     derivation.scene = in_clock_time(scene);
-    derivation.system = build_system(derivation.scene);
+    derivation.system = is_short ? build_short_system(derivation.scene) : build_system(derivation.scene);
     check_method(scene, derivation.system, general);
     check_impacts(derivation.scene, derivation.system);
     check_start(derivation.scene, derivation.system);
@@ -64,6 +61,25 @@ Derivation derive(const Scene& scene, bool general) {
     std::tie(derivation.structure, derivation.findings) =
         find_structure(derivation.scene, derivation.system, derivation.quadrature, general);
     return derivation;
+}
+
+// Terms that are not written out are in loops, or lost.
+bool is_whole(const Derivation& derivation) {
+    return derivation.system.unwritten.empty() || derivation.structure.looped;
+}
+
+}  // namespace
+
+Derivation derive(const Scene& scene, bool general) {
+    const DerivationLimits limits(scene.path);
+    return derived(scene, general, false);
+}
+
+Derivation derive_kernel(const Scene& scene, bool general) {
+    const DerivationLimits limits(scene.path);
+    if (general) return derived(scene, true, false);
+    Derivation derivation = derived(scene, false, true);
+    return is_whole(derivation) ? derivation : derived(scene, false, false);
 }
 
 Derivation with_method(const Derivation& derivation, const Method& method) {
@@ -75,6 +91,10 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
     other.quadrature = quadrature_of(method);
     std::tie(other.structure, other.findings) =
         find_structure(other.scene, other.system, other.quadrature, derivation.structure.full());
+    if (!is_whole(other)) {
+        other.system = build_system(other.scene);
+        std::tie(other.structure, other.findings) = find_structure(other.scene, other.system, other.quadrature);
+    }
     return other;
 }
 

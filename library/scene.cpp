@@ -178,7 +178,7 @@ std::pair<std::string, std::string> Scene::emit(const Settings& settings) const 
         const lobatto::Scene scene = with_method(*this, settings);
         EmitOptions options{scene.method.numbers, {}};
         options.support_text = [](const std::vector<std::string>& parts) { return support_text(parts); };
-        const KernelSource source = lobatto::emit(derive(scene), options);
+        const KernelSource source = lobatto::emit(derive_kernel(scene), options);
         return std::pair(source.name + ".hpp", source.header);
     });
 }

@@ -49,7 +49,7 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 "run(), which computes in all numbers",
                 changed.path, precision_name(changed.method.numbers)));
         changed.outputs.energy = true;
-        const Derivation derivation = derive(changed);
+        const Derivation derivation = derive_kernel(changed);
         const KernelSource source = lobatto::emit(derivation);
         const Overrides overrides = overrides_of(settings);
         apply(overrides, changed);

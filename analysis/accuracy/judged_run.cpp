@@ -115,7 +115,7 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
         scene.source.fail(scene.clock->at, "with a clock `lobatto run` computes in double, but numbers are \"" +
                                                precision_name(scene.method.numbers) +
                                                "\"; remove the clock, or give --numbers double");
-    Derivation derivation = derive(scene, general);
+    Derivation derivation = derive_kernel(scene, general);
     if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const Precision numbers = scene.method.numbers;
     const KernelSource source = emit(derivation, {numbers, {}});

@@ -106,7 +106,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
         // Steps and values are the kernel's arguments: the scene is derived as it was written.
         const auto& known = derived_.begin()->second.first;
         auto fresh = std::make_shared<Derivation>(known ? with_method(*known, method)
-                                                        : derive(starts_->with_settings(as_written_, first)));
+                                                        : derive_kernel(starts_->with_settings(as_written_, first)));
         if (!known && !options_.overrides.set.empty()) check_domains(scene_, fresh->system);
         if (EnergyWatch::can_watch(*fresh) || !scene_.outputs.kept.empty()) fresh->scene.outputs.energy = true;
         source = std::make_shared<const KernelSource>(emit(*fresh));

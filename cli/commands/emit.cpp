@@ -157,7 +157,7 @@ void emit_scene(const EmitCommand& options) {
         };
     Say say;
     say("deriving");
-    const KernelSource source = emit(derive(scene, options.general), emit_options);
+    const KernelSource source = emit(derive_kernel(scene, options.general), emit_options);
     say.clear();
     if (printed) {
         fmt::print(std::cout, "{}", source.header);

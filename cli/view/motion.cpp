@@ -223,11 +223,11 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
     viewed.motion.figures = figures_in(figures, channels);
     viewed.motion.is_profile = figures.front().profile;
     add_curves(viewed, scene, channels,
-               derive(scene).conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
+               derive_kernel(scene).conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
     const std::size_t most_frames = std::clamp<std::size_t>(most_numbers / channels.count(), 64, 36000);
     fill_steps(scene, most_frames);
 
-    const Derivation derivation = derive(scene);
+    const Derivation derivation = derive_kernel(scene);
     const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
     LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(scene, steps_of(scene, overrides).count, stepper);

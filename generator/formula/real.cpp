@@ -175,6 +175,11 @@ bool is_angle(const ex& expression) {
     return is_a<GiNaC::function>(expression) && ex_to<GiNaC::function>(expression).get_name() == "atan2";
 }
 
+bool is_pieced(const ex& expression) {
+    return is_table_value(expression) || is_angle(expression) ||
+           (is_a<GiNaC::power>(expression) && !expression.op(1).info(GiNaC::info_flags::integer));
+}
+
 numeric real_table(int number, int order, const numeric& u) {
     const Spline& spline = spline_of(number);
     const cln::cl_R place = cln::the<cln::cl_R>(u.to_cl_N());

@@ -37,7 +37,9 @@ GiNaC::numeric real_power(const GiNaC::numeric& base, const GiNaC::numeric& expo
 GiNaC::numeric real_function(const Function& function, const GiNaC::numeric& argument);
 GiNaC::numeric real_angle(const GiNaC::numeric& y, const GiNaC::numeric& x);  // atan2(y, x)
 bool is_angle(const GiNaC::ex& expression);                                   // atan2(y, x) of GiNaC
-GiNaC::numeric real_table(int number, int order, const GiNaC::numeric& u);    // a value of a spline
+// A root or another broken power, atan2 or a table: it may jump or bend. Everything else is analytic.
+bool is_pieced(const GiNaC::ex& expression);
+GiNaC::numeric real_table(int number, int order, const GiNaC::numeric& u);  // a value of a spline
 // The value of a whole expression, its symbols replaced by numbers (60 digits) before anything is computed.
 GiNaC::numeric real_value(const GiNaC::ex& expression, const GiNaC::exmap& symbols = {});
 

@@ -66,6 +66,43 @@ std::optional<AllPairs::Coefficient> coefficient_of_pairs(const Element& element
     return std::nullopt;
 }
 
+// The bodies of each row; empty where the rows are not all pairs of at least `fewest_bodies`.
+std::vector<std::pair<int, int>> pairs_of_bodies(const Element& element) {
+    const int bodies = bodies_of(element.rows.size());
+    if (bodies < fewest_bodies || element.x.size() < 2) return {};
+    // The first variable belongs to one of the two bodies, some other one to the other.
+    std::vector<std::pair<int, int>> pairs;
+    for (std::size_t other = 1; pairs.empty() && other < element.x.size(); ++other) {
+        pairs = pairs_told_by(element, 0, other, bodies);
+        if (pairs.empty()) pairs = pairs_told_by(element, other, 0, bodies);
+    }
+    return pairs;
+}
+
+// first[i] second[j] is the number of each pair (i, j).
+struct Product {
+    std::vector<GiNaC::numeric> first, second;
+};
+std::optional<Product> product_of(const Element& element, std::size_t coefficient, int bodies,
+                                  const std::vector<std::pair<int, int>>& pairs) {
+    std::map<std::pair<int, int>, GiNaC::numeric> numbers;
+    for (std::size_t r = 0; r < pairs.size(); ++r) {
+        const GiNaC::ex& value = element.coefficients[r][coefficient];
+        if (!GiNaC::is_a<GiNaC::numeric>(value) || !value.info(GiNaC::info_flags::rational)) return std::nullopt;
+        numbers[pairs[r]] = GiNaC::ex_to<GiNaC::numeric>(value);
+    }
+    const auto last = static_cast<std::size_t>(bodies - 1);
+    Product product{std::vector<GiNaC::numeric>(last, 1), std::vector<GiNaC::numeric>(last + 1)};
+    for (int j = 1; j < bodies; ++j) product.second[static_cast<std::size_t>(j)] = numbers.at({0, j});
+    for (int i = 1; i < bodies - 1; ++i)
+        product.first[static_cast<std::size_t>(i)] = numbers.at({i, bodies - 1}) / product.second[last];
+    for (const auto& [pair, number] : numbers)
+        if (number !=
+            product.first[static_cast<std::size_t>(pair.first)] * product.second[static_cast<std::size_t>(pair.second)])
+            return std::nullopt;
+    return product;
+}
+
 }  // namespace
 
 std::vector<std::vector<int>> rows_of(const AllPairs& pairs) {
@@ -81,15 +118,9 @@ std::vector<std::vector<int>> rows_of(const AllPairs& pairs) {
 
 std::optional<AllPairs> all_pairs(const Element& element) {
     AllPairs result;
-    result.bodies = bodies_of(element.rows.size());
-    if (result.bodies < fewest_bodies || element.x.size() < 2) return std::nullopt;
-    // The first variable belongs to one of the two bodies, some other one to the other.
-    std::vector<std::pair<int, int>> pairs;
-    for (std::size_t other = 1; pairs.empty() && other < element.x.size(); ++other) {
-        pairs = pairs_told_by(element, 0, other, result.bodies);
-        if (pairs.empty()) pairs = pairs_told_by(element, other, 0, result.bodies);
-    }
+    const std::vector<std::pair<int, int>> pairs = pairs_of_bodies(element);
     if (pairs.empty()) return std::nullopt;
+    result.bodies = bodies_of(element.rows.size());
     for (std::size_t j = 0; j < element.x.size(); ++j) {
         const auto variable = variable_of_pairs(element, j, pairs);
         if (!variable) return std::nullopt;
@@ -101,6 +132,24 @@ std::optional<AllPairs> all_pairs(const Element& element) {
         result.coefficients.push_back(std::move(*coefficient));
     }
     return result;
+}
+
+void split_products(Element& element) {
+    const std::vector<std::pair<int, int>> pairs = pairs_of_bodies(element);
+    if (pairs.empty()) return;
+    const int bodies = bodies_of(element.rows.size());
+    for (std::size_t j = 0, count = element.a.size(); j < count; ++j) {
+        if (coefficient_of_pairs(element, j, bodies, pairs)) continue;
+        const std::optional<Product> product = product_of(element, j, bodies, pairs);
+        if (!product) continue;
+        element.a.emplace_back("a" + std::to_string(element.a.size()));
+        element.term = element.term.subs(GiNaC::ex(element.a[j]) == element.a[j] * element.a.back(),
+                                         GiNaC::subs_options::no_pattern);
+        for (std::size_t r = 0; r < pairs.size(); ++r) {
+            element.coefficients[r][j] = product->first[static_cast<std::size_t>(pairs[r].first)];
+            element.coefficients[r].push_back(product->second[static_cast<std::size_t>(pairs[r].second)]);
+        }
+    }
 }
 
 }  // namespace lobatto

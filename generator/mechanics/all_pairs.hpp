@@ -31,6 +31,10 @@ std::optional<AllPairs> all_pairs(const Element& element);
 
 constexpr int fewest_bodies = 8;
 
+// A number of each pair that is a product of one for each body, as m_i m_j is where masses are numbers, becomes these
+// two: then a loop over pairs needs no table of all of them.
+void split_products(Element& element);
+
 // The rows in the order of the loops: first body by first body, and its partners one after another.
 std::vector<std::vector<int>> rows_of(const AllPairs& pairs);
 

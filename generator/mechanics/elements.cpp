@@ -12,6 +12,7 @@
 #include "generator/formula/expansion.hpp"
 #include "generator/formula/spline.hpp"
 #include "generator/graph/graph.hpp"
+#include "generator/mechanics/all_pairs.hpp"
 
 namespace lobatto {
 
@@ -208,6 +209,7 @@ public:
             else
                 add_to(*twin, element);
         }
+        for (Element& element : result.repeated) split_products(element);
         return result;
     }
 
@@ -336,6 +338,25 @@ bool are_neighbours(const Elements& elements) {
         }
     }
     return rows > 0 && 4 * in_runs >= 3 * rows;
+}
+
+ex of_row(const Element& element, const ex& formula, std::size_t row, const std::vector<GiNaC::symbol>& variables) {
+    GiNaC::exmap values;
+    for (std::size_t j = 0; j < element.x.size(); ++j)
+        values[element.x[j]] = variables[static_cast<std::size_t>(element.rows[row][j])];
+    for (std::size_t j = 0; j < element.a.size(); ++j) values[element.a[j]] = element.coefficients[row][j];
+    return formula.subs(values, GiNaC::subs_options::no_pattern);
+}
+
+std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element) {
+    std::vector<std::pair<std::size_t, std::size_t>> pairs;
+    for (std::size_t i = 0; i < element.x.size(); ++i) {
+        if (element.target >= 0 && static_cast<std::size_t>(element.target) != i) continue;
+        const ex slope = element.target >= 0 ? element.term : element.term.diff(element.x[i]);
+        for (std::size_t j = 0; j < element.x.size(); ++j)
+            if (!expanded(slope.diff(element.x[j])).is_zero()) pairs.emplace_back(i, j);
+    }
+    return pairs;
 }
 
 int row_reach(const Elements& elements) {

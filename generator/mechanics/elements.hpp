@@ -6,18 +6,10 @@
 
 #include <vector>
 
+#include "generator/mechanics/element.hpp"
 #include "generator/mechanics/system.hpp"
 
 namespace lobatto {
-
-// T(x; a), the same for every row; x_j stands for variable rows[r][j], a_j for coefficients[r][j].
-struct Element {
-    std::vector<GiNaC::symbol> x, a;
-    GiNaC::ex term;                      // in x, a, time and run-time parameters that are the same in all rows
-    std::vector<std::vector<int>> rows;  // rows x |x|: which variable
-    std::vector<std::vector<GiNaC::ex>> coefficients;  // rows x |a|: a number or a parameter
-    int target = -1;  // -1: the rows are terms of a potential; else: of the force on the variable x[target]
-};
 
 struct Elements {
     std::vector<Element> repeated;                        // of at least `fewest_rows` rows
@@ -34,6 +26,11 @@ struct RowRun {
 std::vector<RowRun> runs_of(const Element& element);
 // Whether most rows of all formulas stand in long runs, with the same distances between the variables of a row.
 bool are_neighbours(const Elements& elements);
+// A formula of the slots and coefficients of an element, for one of its rows.
+GiNaC::ex of_row(const Element& element, const GiNaC::ex& formula, std::size_t row,
+                 const std::vector<GiNaC::symbol>& variables);
+// The slots (i, j) whose second derivative is not zero, row by row.
+std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element);
 // How far the rows of long runs reach from the first coordinate, where all of them begin; -1 where some do not.
 int row_reach(const Elements& elements);
 // Whether the rows are one run, along all of `count` variables or all pairs or triples of neighbours.

@@ -10,6 +10,7 @@
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/mechanics/constrained_start.hpp"
+#include "generator/mechanics/elements.hpp"
 #include "generator/mechanics/sample.hpp"
 
 namespace lobatto {
@@ -39,28 +40,16 @@ public:
 
     // What formulas ask for as they are written, though they may have lost it since: a/a, sqrt(a)^2.
     void require_domains() {
+        std::vector<const DomainCondition*> conditions;
         for (const DomainCondition& condition : scene_.conditions) {
             const bool moves = scene_.start == Start::momentum &&
                                std::any_of(system_.v.begin(), system_.v.end(),
                                            [&](const auto& v) { return condition.expression.has(v); });
-            if (moves) continue;  // velocities are not known yet
-            std::string found;
-            try {
-                const Sized of = start_.evaluate_sized(start_.convert({condition.expression})).front();
-                const cln::cl_R value = of.vanishes() ? cln::cl_R(0) : of.value;
-                using Kind = DomainCondition::Kind;
-                const bool holds = condition.kind == Kind::nonzero       ? !cln::zerop(value)
-                                   : condition.kind == Kind::nonnegative ? !cln::minusp(value)
-                                   : condition.kind == Kind::positive    ? cln::plusp(value)
-                                                                         : cln::abs(value) <= 1;
-                if (holds) continue;
-                found = cln::zerop(value) ? "0" : decimal(value, 6);
-            } catch (const DomainError& error) {
-                found = error.what();
-            }
-            scene_.source.fail(condition.at,
-                               fmt::format("{} has no value at the start: it is of {} = {}{}", condition.operation,
-                                           short_text(condition.expression), found, start_text(condition.expression)));
+            if (!moves) conditions.push_back(&condition);  // else velocities are not known yet
+        }
+        for (const auto& [begin, end] : portions_of(conditions.size())) {
+            if (all_hold(conditions, begin, end)) continue;
+            for (std::size_t i = begin; i < end; ++i) require_domain(*conditions[i]);
         }
     }
 
@@ -110,6 +99,51 @@ private:
         return float_of(scene_.evaluate(expression, what));
     }
 
+    // Many formulas are evaluated together: what an evaluation costs besides them grows with all that are known.
+    static std::vector<std::pair<std::size_t, std::size_t>> portions_of(std::size_t count) {
+        constexpr std::size_t portion = 1000;
+        std::vector<std::pair<std::size_t, std::size_t>> result;
+        for (std::size_t begin = 0; begin < count; begin += portion)
+            result.emplace_back(begin, std::min(count, begin + portion));
+        return result;
+    }
+
+    static bool holds(const DomainCondition& condition, const Sized& of) {
+        using Kind = DomainCondition::Kind;
+        const cln::cl_R value = of.vanishes() ? cln::cl_R(0) : of.value;
+        return condition.kind == Kind::nonzero       ? !cln::zerop(value)
+               : condition.kind == Kind::nonnegative ? !cln::minusp(value)
+               : condition.kind == Kind::positive    ? cln::plusp(value)
+                                                     : cln::abs(value) <= 1;
+    }
+
+    bool all_hold(const std::vector<const DomainCondition*>& conditions, std::size_t begin, std::size_t end) {
+        std::vector<ex> expressions;
+        for (std::size_t i = begin; i < end; ++i) expressions.push_back(conditions[i]->expression);
+        try {
+            const std::vector<Sized> values = start_.evaluate_sized(start_.convert(expressions));
+            for (std::size_t i = begin; i < end; ++i)
+                if (!holds(*conditions[i], values[i - begin])) return false;
+            return true;
+        } catch (const DomainError&) {
+            return false;
+        }
+    }
+
+    void require_domain(const DomainCondition& condition) {
+        std::string found;
+        try {
+            const Sized of = start_.evaluate_sized(start_.convert({condition.expression})).front();
+            if (holds(condition, of)) return;
+            found = of.vanishes() ? "0" : decimal(of.value, 6);
+        } catch (const DomainError& error) {
+            found = error.what();
+        }
+        scene_.source.fail(condition.at,
+                           fmt::format("{} has no value at the start: it is of {} = {}{}", condition.operation,
+                                       short_text(condition.expression), found, start_text(condition.expression)));
+    }
+
     [[noreturn]] void refuse(const std::string& reason) const { scene_.source.fail(scene_.lagrangian_at, reason); }
 
     // "x = 0, x' = 1": what of the start an expression holds.
@@ -149,6 +183,24 @@ private:
         } catch (const DomainError&) {
             name_culprit();
         }
+        for (const Element& element : system_.unwritten.elements) require_rows(element);
+    }
+
+    // Of terms that are not written out: the first and second derivatives of their formula, row by row.
+    void require_rows(const Element& element) {
+        std::vector<ex> derivatives;
+        for (const auto& x : element.x) derivatives.push_back(element.term.diff(x));
+        for (const auto& [i, j] : pairs_of(element)) derivatives.push_back(derivatives[i].diff(element.x[j]));
+        std::size_t row = 0;
+        try {
+            at_rows(element, derivatives, system_, start_, [&](std::size_t done, const Numbers&) { row = done + 1; });
+        } catch (const DomainError& error) {
+            const ex term = of_row(element, element.term, row, system_.q);
+            refuse(
+                fmt::format("has derivatives without a value at the start, {}, because of its term {}: {}; start "
+                            "elsewhere, or mend the formula",
+                            values_in(term), short_text(-term), error.what()));
+        }
     }
 
     void name_culprit() {
@@ -161,10 +213,19 @@ private:
             }
         };
         const Position lagrangian = scene_.lagrangian_at;
-        for (const ex& term : system_.terms)
-            require(
-                term, [&] { return "the Lagrangian has no value because of its term " + short_text(term); },
-                lagrangian);
+        for (const auto& [begin, end] : portions_of(system_.terms.size())) {
+            const std::vector<ex> portion(system_.terms.begin() + static_cast<std::ptrdiff_t>(begin),
+                                          system_.terms.begin() + static_cast<std::ptrdiff_t>(end));
+            try {
+                start_(portion);
+                continue;
+            } catch (const DomainError&) {
+            }
+            for (const ex& term : portion)
+                require(
+                    term, [&] { return "the Lagrangian has no value because of its term " + short_text(term); },
+                    lagrangian);
+        }
         for (std::size_t k = 0; k < system_.outer_force.size(); ++k) {
             const ex& force = system_.outer_force[k];
             const std::string on = "the force on " + scene_.coordinates[k].written;

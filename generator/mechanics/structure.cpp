@@ -197,6 +197,15 @@ private:
              "asked for: positions and velocities move in turn, straight from node to node, and nothing is solved for");
     }
 
+    // Where V has second derivatives, row by row.
+    std::vector<std::pair<int, int>> places_of_hessian() const {
+        std::vector<std::pair<int, int>> written, places;
+        for (const auto& [place, value] : system_.hessian.entries()) written.push_back(place);
+        std::set_union(written.begin(), written.end(), system_.unwritten.places.begin(), system_.unwritten.places.end(),
+                       std::back_inserter(places));
+        return places;
+    }
+
     void separable() {
         std::string coupling;
         for (const auto& [place, value] : system_.mass.entries())
@@ -211,11 +220,12 @@ private:
         linearity();
         // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has
         // one.
+        const std::vector<std::pair<int, int>> curved = places_of_hessian();
         if (separable_.diagonal_mass) {
-            for (const auto& [place, value] : system_.hessian.entries()) separable_.entries.push_back(place);
+            separable_.entries = curved;
         } else {
             std::set<int> columns;
-            for (const auto& [place, value] : system_.hessian.entries()) columns.insert(place.second);
+            for (const auto& place : curved) columns.insert(place.second);
             for (int i = 0; i < n_; ++i)
                 for (const int j : columns) separable_.entries.emplace_back(i, j);
         }
@@ -227,7 +237,7 @@ private:
                                     separable_.entries.size(), n_ * n_));
         std::set<int> free;
         for (int k = 0; k < n_; ++k) free.insert(k);
-        for (const auto& [place, value] : system_.hessian.entries()) {
+        for (const auto& place : curved) {
             free.erase(place.first);
             free.erase(place.second);
         }
@@ -417,10 +427,13 @@ private:
             formulas.set(system_.q[k], float_of(scene_.evaluate(scene_.initial_position[k], "the initial position")));
         formulas.set(system_.t, cln::cl_float(0, cln::float_format(number_digits)));
         const std::vector<cln::cl_R> values = formulas(entries);
-        std::map<int, double> rows;
+        std::map<std::pair<int, int>, double> curvatures;
         std::size_t e = 0;
         for (const auto& [place, value] : system_.hessian.entries())
-            rows[place.first] += std::fabs(cln::double_approx(values[e++]));
+            curvatures[place] += cln::double_approx(values[e++]);
+        add_unwritten(curvatures, formulas);
+        std::map<int, double> rows;
+        for (const auto& [place, curvature] : curvatures) rows[place.first] += std::fabs(curvature);
         double largest = 0, stage = 0;
         for (const auto& [row, sum] : rows) largest = std::max(largest, sum);
         for (unsigned i = 0; i < quadrature_.A.rows(); ++i) {
@@ -431,6 +444,24 @@ private:
         }
         const double h = scene_.evaluate(scene_.run.step, "the step").to_double();
         return h * h * stage * largest;
+    }
+
+    // Entries of M^-1 V'' from terms that are not written out; their masses are constant.
+    void add_unwritten(std::map<std::pair<int, int>, double>& curvatures, Formulas& start) const {
+        std::vector<ex> masses;
+        for (std::size_t k = 0; k < system_.q.size(); ++k) masses.push_back(system_.mass(k, k));
+        const std::vector<cln::cl_R> mass = start(masses);
+        for (const Element& element : system_.unwritten.elements) {
+            const auto pairs = pairs_of(element);
+            std::vector<ex> derivatives;
+            for (const auto& [i, j] : pairs) derivatives.push_back(element.term.diff(element.x[i]).diff(element.x[j]));
+            at_rows(element, derivatives, system_, start, [&](std::size_t r, const std::vector<cln::cl_R>& values) {
+                for (std::size_t p = 0; p < pairs.size(); ++p) {
+                    const int row = element.rows[r][pairs[p].first], column = element.rows[r][pairs[p].second];
+                    curvatures[{row, column}] += cln::double_approx(values[p] / mass[static_cast<std::size_t>(row)]);
+                }
+            });
+        }
     }
 
     void linearity() {
@@ -444,9 +475,16 @@ private:
 
     // A second derivative that is not constant: "d2V/dadb = 2*a depends on the position".
     std::string curved() const {
+        SparseMatrix hessian = system_.hessian;
+        if (const Unwritten& unwritten = system_.unwritten; !unwritten.empty()) {
+            const auto& [row, column] = unwritten.places.front();
+            hessian.put(row, column,
+                        hessian(static_cast<std::size_t>(row), static_cast<std::size_t>(column)) +
+                            unwritten.at({row, column}, system_.q));
+        }
         const auto blocks =
             system_.separable
-                ? std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&system_.hessian, 0, 0}}
+                ? std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&hessian, 0, 0}}
                 : std::vector<std::tuple<const SparseMatrix*, bool, bool>>{{&system_.momentum_v, true, true},
                                                                            {&system_.momentum_q, true, false},
                                                                            {&system_.force_v, false, true},

@@ -15,7 +15,6 @@
 #include <set>
 
 #include "generator/formula/real.hpp"
-#include "generator/formula/spline.hpp"
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/mass_equations.hpp"
 #include "generator/mechanics/sample.hpp"
@@ -109,9 +108,8 @@ public:
     Dependence(const Scene& scene, const System& system, const Symbols& motion)
         : scene_(scene), system_(system), motion_(motion) {}
 
-    // A root, other broken power, atan2 or table of the motion may jump or bend beyond the sampled points, as
-    // x/sqrt(x^2) does: what holds one is taken to depend on all that it mentions. Everything else is analytic:
-    // constant near a point is constant.
+    // What is pieced may jump or bend beyond the sampled points, as x/sqrt(x^2) does: what holds it is taken to depend
+    // on all that it mentions. Everything else is analytic: constant near a point is constant.
     bool is_broken(const ex& expression) const {
         for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
             if (is_pieced(*part) && !motion_.in(*part).empty()) return true;
@@ -125,11 +123,6 @@ public:
                 for (const std::size_t variable : motion_.in(*part))
                     if (variable < 2 * n) return true;
         return false;
-    }
-
-    static bool is_pieced(const ex& part) {
-        return is_table_value(part) || is_angle(part) ||
-               (GiNaC::is_a<GiNaC::power>(part) && !part.op(1).info(GiNaC::info_flags::integer));
     }
 
     std::vector<Kind> of(const std::vector<ex>& expressions) const {
@@ -314,7 +307,7 @@ Scene without_time(const Scene& scene) {
 // Builds a System in the order of its parts; what a part finds against the separable form is kept as the reason.
 class SystemBuilder {
 public:
-    explicit SystemBuilder(const Scene& scene) : scene_(scene) {}
+    SystemBuilder(const Scene& scene, bool writes_all) : scene_(scene), writes_all_(writes_all) {}
 
     System build() {
         differentiate_once();
@@ -338,14 +331,15 @@ public:
         for (const Impact& impact : scene_.impacts)
             for (const auto* reset : {&impact.reset_position, &impact.reset_velocity})
                 for (const ex& value : *reset) watch_time(value);
-        if (system_.autonomous && mentions(system_, system_.t)) return build_system(without_time(scene_));
+        if (system_.autonomous && mentions(system_, system_.t))
+            return SystemBuilder(without_time(scene_), writes_all_).build();
         check_mass(scene_, system_);
         if (system_.separable) check_rest(dependence);
         system_.constant_mass = system_.separable;
         if (!system_.constraints.empty())
             refuse_separable("the constraint " + system_.constraints.front().written + " pulls on coordinates");
         if (system_.separable) keep_separable_parts();
-        return system_;
+        return may_stay_unwritten() ? system_ : SystemBuilder(scene_, true).build();
     }
 
 private:
@@ -368,10 +362,12 @@ private:
         motion_.push_back(system_.t);
         motion_.insert(motion_.end(), system_.inputs.begin(), system_.inputs.end());
         system_.terms = terms_of(system_.lagrangian, motion_);
-        system_.momentum = gradient_of(system_.terms, system_.v);
-        system_.force = gradient_of(system_.terms, system_.q);
+        std::vector<ex> written = system_.terms;
+        if (!writes_all_) system_.unwritten = set_apart(scene_, system_, written);
+        system_.momentum = gradient_of(written, system_.v);
+        system_.force = gradient_of(written, system_.q);
         for (std::size_t k = 0; k < system_.force.size(); ++k) system_.force[k] += system_.outer_force[k];
-        system_.linear = true;
+        system_.linear = system_.unwritten.empty();
         system_.separable = true;
         differentiate_constraints();
     }
@@ -466,6 +462,20 @@ private:
             system_.hessian.put(place.first, place.second, -freed(value));
     }
 
+    // What is written must not take away what is not.
+    bool may_stay_unwritten() const {
+        const Unwritten& unwritten = system_.unwritten;
+        if (unwritten.empty()) return true;
+        if (!system_.separable) return false;
+        for (const auto& [place, value] : system_.force_q.entries()) {
+            const auto known = std::lower_bound(unwritten.places.begin(), unwritten.places.end(), place);
+            if (known == unwritten.places.end() || *known != place) continue;
+            const int witness = unwritten.witnesses[static_cast<std::size_t>(known - unwritten.places.begin())];
+            if (value.has(system_.q[static_cast<std::size_t>(witness)])) return false;
+        }
+        return true;
+    }
+
     std::string coordinate_of(std::size_t k) const { return system_.q[k].get_name(); }
 
     // The first reason is told.
@@ -475,6 +485,7 @@ private:
     }
 
     const Scene& scene_;
+    const bool writes_all_;
     System system_;
     Symbols motion_;  // positions, velocities, time and inputs
 };
@@ -486,7 +497,11 @@ bool System::has_forces() const {
 }
 
 System build_system(const Scene& scene) {
-    return SystemBuilder(scene).build();
+    return SystemBuilder(scene, true).build();
+}
+
+System build_short_system(const Scene& scene) {
+    return SystemBuilder(scene, false).build();
 }
 
 }  // namespace lobatto

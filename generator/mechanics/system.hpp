@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "generator/mechanics/sparse.hpp"
+#include "generator/mechanics/unwritten.hpp"
 #include "generator/scene/scene.hpp"
 
 namespace lobatto {
@@ -25,6 +26,9 @@ struct System {
     std::vector<GiNaC::symbol> inputs;      // those of them that may change between steps
     GiNaC::ex lagrangian;                   // L(q, v, t)
     std::vector<GiNaC::ex> terms;           // L is their sum; a sum of n bodies is n terms
+
+    // Terms of L that are in no derivative below; of systems for kernels only.
+    Unwritten unwritten;
 
     std::vector<GiNaC::ex> outer_force;  // n: F_k(q, v, t) of the scene
     bool has_forces() const;             // one of them is not 0
@@ -58,6 +62,8 @@ struct System {
 // Throws InputError when L is degenerate (its second derivatives in the velocities are singular everywhere) or real
 // nowhere near the start, naming the direction or the reason. The start itself: generator/mechanics/start.hpp.
 System build_system(const Scene& scene);
+// The same for who only writes a kernel: terms that repeat often stay `unwritten` where they may.
+System build_short_system(const Scene& scene);
 
 // A direction in words: a' = -1, b' = 1; components that are zero left out.
 std::string direction_text(const System& system, const std::vector<cln::cl_R>& direction);

@@ -243,17 +243,6 @@ bool has_parameters(const Element& element) {
     return false;
 }
 
-std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element) {
-    std::vector<std::pair<std::size_t, std::size_t>> pairs;
-    for (std::size_t i = 0; i < element.x.size(); ++i) {
-        if (element.target >= 0 && static_cast<std::size_t>(element.target) != i) continue;
-        const ex slope = element.target >= 0 ? element.term : element.term.diff(element.x[i]);
-        for (std::size_t j = 0; j < element.x.size(); ++j)
-            if (!expanded(slope.diff(element.x[j])).is_zero()) pairs.emplace_back(i, j);
-    }
-    return pairs;
-}
-
 Programs looped_programs(const Derivation& derivation) {
     return LoopedBuilder(derivation).build();
 }

@@ -13,8 +13,6 @@ namespace lobatto {
 
 Programs looped_programs(const Derivation& derivation);
 
-// The slots (i, j) of an element whose second derivative is not zero, row by row.
-std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Element& element);
 // Whether all second derivatives are there, of so many variables that no table says where they stand: that of variables
 // i and j of N is number i N + j.
 bool has_full_matrix(const Derivation& derivation);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "generator/programs/builder.hpp"
 #include "generator/programs/identifier.hpp"
@@ -90,6 +91,7 @@ void ProgramBuilder::impacts() {
 
 Programs build_programs(const Derivation& derivation) {
     if (derivation.structure.looped) return looped_programs(derivation);
+    if (!derivation.system.unwritten.empty()) throw std::logic_error("terms that are not written out, and no loops");
     return derivation.structure.form() == Form::general ? general_programs(derivation) : separable_programs(derivation);
 }
 
