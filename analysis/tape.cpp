@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/tape.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -13,13 +12,13 @@ namespace lobatto {
 
 using GiNaC::ex;
 
-std::optional<Tape> Tape::of(const ex& formula, const std::vector<GiNaC::symbol>& variables) {
+std::optional<Tape> Tape::of(const ex& formula, const Variables& variables) {
     Tape tape;
     if (!tape.append(formula, variables)) return std::nullopt;
     return tape;
 }
 
-bool Tape::append(const ex& formula, const std::vector<GiNaC::symbol>& variables) {
+bool Tape::append(const ex& formula, const Variables& variables) {
     static const std::map<std::string, double (*)(double)> functions{
         {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"exp", std::exp},
         {"log", std::log},   {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh},
@@ -27,10 +26,10 @@ bool Tape::append(const ex& formula, const std::vector<GiNaC::symbol>& variables
     Instruction instruction{Operation::number};
     const bool is_function = GiNaC::is_a<GiNaC::function>(formula), is_power = GiNaC::is_a<GiNaC::power>(formula);
     if (GiNaC::is_a<GiNaC::symbol>(formula)) {
-        const auto found = std::find(variables.begin(), variables.end(), GiNaC::ex_to<GiNaC::symbol>(formula));
-        if (found == variables.end()) return false;
+        const auto found = variables.number.find(formula);
+        if (found == variables.number.end()) return false;
         instruction.operation = Operation::variable;
-        instruction.variable = static_cast<std::size_t>(found - variables.begin());
+        instruction.variable = found->second;
     } else if (is_function || is_power || GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula)) {
         for (std::size_t i = is_table_value(formula) ? 2 : 0; i < formula.nops(); ++i)
             if (!append(formula.op(i), variables)) return false;

@@ -4,6 +4,7 @@
 
 #include <ginac/ginac.h>
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -13,8 +14,15 @@ class Spline;
 
 class Tape {
 public:
+    // Symbols, numbered in this order.
+    struct Variables {
+        Variables(const std::vector<GiNaC::symbol>& symbols) {  // NOLINT(google-explicit-constructor)
+            for (const auto& symbol : symbols) number.emplace(symbol, number.size());
+        }
+        std::map<GiNaC::ex, std::size_t, GiNaC::ex_is_less> number;
+    };
     // Nothing: the formula holds a function or a symbol that is not known.
-    static std::optional<Tape> of(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables);
+    static std::optional<Tape> of(const GiNaC::ex& formula, const Variables& variables);
 
     struct Value {
         double value, size;  // size: the largest term, of a sum
@@ -33,7 +41,7 @@ private:
         const Spline* spline = nullptr;  // table
         int order = 0;
     };
-    bool append(const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& variables);
+    bool append(const GiNaC::ex& formula, const Variables& variables);
 
     std::vector<Instruction> instructions_;  // operands come before what is done with them
 };

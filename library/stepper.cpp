@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/derived_kernel.hpp"
 #include "generator/formula/suggest.hpp"
 #include "generator/mechanics/start.hpp"
-#include "generator/pipeline.hpp"
 #include "library/parts.hpp"
 
 namespace lobatto::api {
@@ -49,11 +49,10 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 "run(), which computes in all numbers",
                 changed.path, precision_name(changed.method.numbers)));
         changed.outputs.energy = true;
-        const Derivation derivation = derive_kernel(changed);
-        const KernelSource source = lobatto::emit(derivation);
+        const KernelSource source = derived_kernel(changed, {}).source;
         const Overrides overrides = overrides_of(settings);
         apply(overrides, changed);
-        if (!overrides.set.empty()) check_domains(changed, derivation.system);
+        if (!overrides.set.empty()) check_domains(changed);
         const Steps steps = steps_of(changed, overrides);
         const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
         LoadedStepper<double> stepper(kernel);

@@ -51,7 +51,7 @@ std::int64_t companion_steps(std::int64_t steps) {
     return taken;
 }
 
-Companion::Companion(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request)
+Companion::Companion(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request)
     : kernel_(kernel),
       parts_(static_cast<std::size_t>(kernel->parts)),
       groups_(amplitude_groups(derivation.scene)),

@@ -24,7 +24,7 @@
 #include "analysis/accuracy/amplitude.hpp"
 #include "analysis/accuracy/narrow_terms.hpp"
 #include "analysis/accuracy/pulses.hpp"
-#include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/outline.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {
@@ -62,7 +62,7 @@ std::string text_of(const MeasuredError& error, const Scene& scene);
 class Companion {
 public:
     // What is handed over is copied, but for what the kernel needs. `request`: the run's.
-    Companion(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request);
+    Companion(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request);
     ~Companion();
 
     // The kept states of the run go by.

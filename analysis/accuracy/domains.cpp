@@ -19,7 +19,7 @@ constexpr double rounding = 1e-14;  // of the terms of a sum: what is no more is
 
 // Functions of the Lagrangian and of forces whose derivatives are not real either where they are not: kernels stop
 // there by themselves. A logarithm's is.
-GiNaC::exset kept_operands(const System& system) {
+GiNaC::exset kept_operands(const SystemOutline& system) {
     GiNaC::exset kept;
     const auto look_at = [&](const GiNaC::ex& formula) {
         for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
@@ -37,23 +37,27 @@ GiNaC::exset kept_operands(const System& system) {
 
 }  // namespace
 
-Domains::Domains(const Scene& scene, const System& system)
+Domains::Domains(const Scene& scene, const SystemOutline& system)
     : n_(scene.coordinates.size()), knows_velocities_(scene.start == Start::velocity) {
-    std::vector<GiNaC::symbol> variables, velocities;
+    std::vector<GiNaC::symbol> variables;
+    GiNaC::exset velocities, moving{scene.time};
     for (const Parameter& parameter : scene.parameters) variables.push_back(parameter.symbol);
     variables.push_back(scene.time);
-    for (const Coordinate& coordinate : scene.coordinates) variables.push_back(coordinate.position);
-    for (const Coordinate& coordinate : scene.coordinates) velocities.push_back(coordinate.velocity);
-    const auto begin = variables.begin() + std::ssize(scene.parameters);
-    const std::vector<GiNaC::symbol> moving(begin, variables.end());
-    variables.insert(variables.end(), velocities.begin(), velocities.end());
-    const auto holds_any = [](const GiNaC::ex& formula, const std::vector<GiNaC::symbol>& symbols) {
-        return std::any_of(symbols.begin(), symbols.end(), [&](const auto& symbol) { return formula.has(symbol); });
+    for (const Coordinate& coordinate : scene.coordinates) {
+        variables.push_back(coordinate.position);
+        moving.insert(coordinate.position);
+        velocities.insert(coordinate.velocity);
+    }
+    for (const Coordinate& coordinate : scene.coordinates) variables.push_back(coordinate.velocity);
+    const Tape::Variables numbered(variables);
+    const auto holds_any = [](const GiNaC::ex& formula, const GiNaC::exset& symbols) {
+        return std::any_of(formula.preorder_begin(), formula.preorder_end(),
+                           [&](const GiNaC::ex& part) { return symbols.contains(part); });
     };
     const GiNaC::exset kept = kept_operands(system);
     for (const DomainCondition& written : scene.conditions) {
         if (!written.of_motion || conditions_.size() == most_conditions) continue;
-        std::optional<Tape> tape = Tape::of(written.expression, variables);
+        std::optional<Tape> tape = Tape::of(written.expression, numbered);
         if (!tape) continue;
         const bool has_velocity = holds_any(written.expression, velocities);
         // Quotients that have no value at a single place have one beside it, as sin(q)/q.

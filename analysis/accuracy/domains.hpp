@@ -16,7 +16,7 @@ namespace lobatto {
 
 class Domains {
 public:
-    Domains(const Scene& scene, const System& system);
+    Domains(const Scene& scene, const SystemOutline& system);
 
     // Whether all formulas have values at a start.
     bool hold_at_start(double time, const std::vector<double>& parameters, const std::vector<double>& q,

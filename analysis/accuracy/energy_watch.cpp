@@ -90,12 +90,12 @@ std::int64_t mixed_number(std::int64_t number) {
 
 }  // namespace
 
-bool EnergyWatch::can_watch(const Derivation& derivation) {
+bool EnergyWatch::can_watch(const Outline& derivation) {
     return !derivation.scene.clock && derivation.scene.switches.empty() && derivation.conserves_energy() &&
            derivation.system.q.size() <= ExactEnergy::most_coordinates;
 }
 
-EnergyWatch::EnergyWatch(const Derivation& derivation, const Kernel& kernel)
+EnergyWatch::EnergyWatch(const Outline& derivation, const Kernel& kernel)
     : watches_(kernel->has_energy != 0 && can_watch(derivation)),
       columns_(1 + 2 * derivation.system.q.size()),
       rows_a_step_(1 + derivation.scene.outputs.dense) {}
@@ -162,7 +162,7 @@ void EnergyWatch::restore(const std::vector<double>& saved) {
 }
 
 // In 60 digits: of small motions the energy in double is rounding.
-std::string EnergyWatch::departure(const Derivation& derivation, const Kernel& kernel,
+std::string EnergyWatch::departure(const Outline& derivation, const Kernel& kernel,
                                    const TrajectoryRequest& request) const {
     LoadedStepper<double> stepper(kernel);
     if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return "";

@@ -36,7 +36,7 @@ std::int64_t steps_taken(std::int64_t every) {
 
 }  // namespace
 
-EnsembleCompanion::EnsembleCompanion(const Derivation& derivation, const Kernel& kernel, const EnsembleRequest& request)
+EnsembleCompanion::EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const EnsembleRequest& request)
     : derivation_(derivation),
       kernel_(kernel),
       request_(request),

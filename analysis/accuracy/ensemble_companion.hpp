@@ -8,7 +8,7 @@
 
 #include "analysis/accuracy/narrow_terms.hpp"
 #include "analysis/accuracy/pulses.hpp"
-#include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/outline.hpp"
 #include "runtime/run/ensemble.hpp"
 
 namespace lobatto {
@@ -16,7 +16,7 @@ namespace lobatto {
 class EnsembleCompanion {
 public:
     // What is handed over outlives it. `request`: that of the sweep, with its start.
-    EnsembleCompanion(const Derivation& derivation, const Kernel& kernel, const EnsembleRequest& request);
+    EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const EnsembleRequest& request);
 
     struct Error {
         // Of the positions at the end, each by its own amplitude; the largest. The largest of all, where the two were
@@ -43,7 +43,7 @@ private:
     bool has_pulses(const EnsembleStart& start);
     Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
 
-    const Derivation& derivation_;
+    Outline derivation_;
     Kernel kernel_;
     const EnsembleRequest& request_;
     std::vector<int> groups_;

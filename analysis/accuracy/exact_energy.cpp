@@ -3,7 +3,7 @@
 
 namespace lobatto {
 
-ExactEnergy::ExactEnergy(const Derivation& derivation, const std::vector<double>& parameters)
+ExactEnergy::ExactEnergy(const Outline& derivation, const std::vector<double>& parameters)
     : system_(derivation.system) {
     for (std::size_t i = 0; i < parameters.size(); ++i)
         formulas_.set(system_.parameters[i], float_of(GiNaC::numeric(parameters[i])));

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/outline.hpp"
 #include "generator/mechanics/sample.hpp"
 
 namespace lobatto {
@@ -13,7 +13,7 @@ namespace lobatto {
 class ExactEnergy {
 public:
     // Of a system whose formulas hold no time; parameters in the order of the scene.
-    ExactEnergy(const Derivation& derivation, const std::vector<double>& parameters);
+    ExactEnergy(const Outline& derivation, const std::vector<double>& parameters);
 
     // H = q'.dL/dq' - L at positions and velocities, n each.
     struct Energy {
@@ -27,7 +27,7 @@ public:
     static constexpr std::size_t most_coordinates = 64;
 
 private:
-    const System& system_;
+    const SystemOutline& system_;
     Formulas formulas_;
     std::vector<Id> energy_;
 };

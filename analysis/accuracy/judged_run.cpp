@@ -6,10 +6,10 @@
 #include <chrono>
 #include <cmath>
 
+#include "analysis/derived_kernel.hpp"
 #include "analysis/stability/linear_departure.hpp"
 #include "generator/mechanics/automatic_clock.hpp"
 #include "generator/mechanics/start.hpp"
-#include "generator/pipeline.hpp"
 
 namespace lobatto {
 
@@ -115,18 +115,22 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
         scene.source.fail(scene.clock->at, "with a clock `lobatto run` computes in double, but numbers are \"" +
                                                precision_name(scene.method.numbers) +
                                                "\"; remove the clock, or give --numbers double");
-    Derivation derivation = derive_kernel(scene, general);
-    if (EnergyWatch::can_watch(derivation)) derivation.scene.outputs.energy = true;
     const Precision numbers = scene.method.numbers;
-    const KernelSource source = emit(derivation, {numbers, {}});
+    const DerivedKernel derived = derived_kernel(scene, {numbers, general, EnergyWatch::can_watch});
+    KernelSource in_double;
+    if (numbers != Precision::double_)
+        in_double =
+            derived_kernel(scene, {Precision::double_, general, EnergyWatch::can_watch}, derived.derivation.get())
+                .source;
     const std::chrono::duration<double> derivation_time = std::chrono::steady_clock::now() - start;
     apply(overrides, scene);  // after the derivation: one kernel serves all values
-    if (!overrides.set.empty()) check_domains(scene, derivation.system);
+    if (!overrides.set.empty()) check_domains(scene);
     const Steps steps = steps_of(scene, overrides);
     Compiled compiled;
-    const Kernel kernel = kernel_of(source, numbers, &compiled);
-    const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(emit(derivation), Precision::double_);
-    return {scene, derivation, source, compiled, kernel, plain, steps, derivation_time.count()};
+    const Kernel kernel = kernel_of(derived.source, numbers, &compiled);
+    const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(in_double, Precision::double_);
+    return {scene, derived.outline, derived.from_cache,     derived.source, compiled, kernel,
+            plain, steps,           derivation_time.count()};
 }
 
 RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,

@@ -15,14 +15,15 @@
 #include "analysis/accuracy/watch.hpp"
 #include "analysis/kernel_of.hpp"
 #include "analysis/motion.hpp"
-#include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/outline.hpp"
 
 namespace lobatto {
 
 // A scene, ready to run: its kernel compiled, its start in numbers.
 struct PreparedRun {
     Scene scene;
-    Derivation derivation;
+    Outline derivation;
+    bool derived_from_cache;
     KernelSource source;
     Compiled compiled;
     Kernel kernel;  // in the scene's numbers
@@ -44,7 +45,7 @@ public:
     // `measures`: whether a companion runs beside it.
     RunObservers(const PreparedRun& run, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
                  const std::vector<double>& velocity, bool measures)
-        : watch(run.scene, run.derivation.structure, stepper, velocity),
+        : watch(run.scene, run.derivation.closed_solution, stepper, velocity),
           judge(run.scene),
           energy(run.derivation, run.plain),
           domains(run.scene, run.derivation.system),

@@ -27,7 +27,7 @@ constexpr double flat = 20;       // tanh(20) is 1
 
 }  // namespace
 
-NarrowTerms::NarrowTerms(const System& system) {
+NarrowTerms::NarrowTerms(const SystemOutline& system) {
     if (system.q.size() > coordinate_limit) return;
     std::vector<GiNaC::symbol> moving{system.t};
     for (const auto* list : {&system.q, &system.v}) moving.insert(moving.end(), list->begin(), list->end());
@@ -36,10 +36,11 @@ NarrowTerms::NarrowTerms(const System& system) {
     };
     std::vector<GiNaC::symbol> variables = moving;
     variables.insert(variables.end(), system.parameters.begin(), system.parameters.end());
+    const Tape::Variables numbered(variables);
     GiNaC::exset known;
     const auto add = [&](Kind kind, const ex& u) {
         if (terms_.size() == most_terms || !moves(u) || !known.insert(u).second) return;
-        if (const auto tape = Tape::of(u, variables)) terms_.push_back({kind, *tape});
+        if (const auto tape = Tape::of(u, numbered)) terms_.push_back({kind, *tape});
     };
     static const std::map<std::string, Kind> kinds{{"exp", Kind::peak},  {"tanh", Kind::step}, {"sinh", Kind::step},
                                                    {"cosh", Kind::step}, {"atan", Kind::tail}, {"log", Kind::pole}};

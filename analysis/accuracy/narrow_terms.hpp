@@ -15,7 +15,7 @@ namespace lobatto {
 
 class NarrowTerms {
 public:
-    explicit NarrowTerms(const System& system);
+    explicit NarrowTerms(const SystemOutline& system);
 
     bool empty() const { return terms_.empty(); }
     void set_parameters(const std::vector<double>& parameters) { parameters_ = parameters; }

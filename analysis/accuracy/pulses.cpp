@@ -48,7 +48,8 @@ std::vector<std::complex<double>> roots_of(std::vector<double> c) {
 
 class PulseFinder {
 public:
-    PulseFinder(const System& system, const std::vector<double>& parameters, double begin, double end, double widest)
+    PulseFinder(const SystemOutline& system, const std::vector<double>& parameters, double begin, double end,
+                double widest)
         : t_(system.t), begin_(std::fmin(begin, end)), end_(std::fmax(begin, end)), widest_(widest) {
         for (std::size_t i = 0; i < parameters.size(); ++i)
             values_[system.parameters[i]] = GiNaC::numeric(parameters[i]);
@@ -167,8 +168,8 @@ private:
 
 }  // namespace
 
-std::vector<Pulse> find_pulses(const System& system, const std::vector<double>& parameters, double begin, double end,
-                               double widest) {
+std::vector<Pulse> find_pulses(const SystemOutline& system, const std::vector<double>& parameters, double begin,
+                               double end, double widest) {
     if (system.autonomous) return {};
     PulseFinder finder(system, parameters, begin, end, widest);
     finder.look_at(system.lagrangian);

@@ -17,7 +17,7 @@ struct Pulse {
 // Those between two times that are narrower than `widest`, with the parameters at these values (scene order): of
 // exp(u) where u(t) is largest, of u^-k near complex roots of u, of tanh, atan, sinh, cosh and exp of a linear u where
 // u passes zero; u holds the time and parameters alone. In the order of time, at most 1000.
-std::vector<Pulse> find_pulses(const System& system, const std::vector<double>& parameters, double begin, double end,
-                               double widest);
+std::vector<Pulse> find_pulses(const SystemOutline& system, const std::vector<double>& parameters, double begin,
+                               double end, double widest);
 
 }  // namespace lobatto

@@ -92,8 +92,8 @@ void StepJudge::restore(const std::vector<double>& saved) {
     }
 }
 
-StepJudge::Judgement StepJudge::judge(const Derivation& derivation, const Kernel& kernel,
-                                      const TrajectoryRequest& request, const TrajectoryResult& result) const {
+StepJudge::Judgement StepJudge::judge(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request,
+                                      const TrajectoryResult& result) const {
     Judgement judgement;
     LoadedStepper<double> stepper(kernel);
     if (some_.empty() || stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return judgement;

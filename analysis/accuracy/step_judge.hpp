@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "analysis/accuracy/hardest_steps.hpp"
-#include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/outline.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {
@@ -35,7 +35,7 @@ public:
         };
         std::optional<Unresolved> unresolved;  // the first such step that was found
     };
-    Judgement judge(const Derivation& derivation, const Kernel& kernel, const TrajectoryRequest& request,
+    Judgement judge(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
     // One warning a string.
     static std::vector<std::string> warnings(const Judgement& judgement);

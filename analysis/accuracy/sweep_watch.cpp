@@ -33,7 +33,7 @@ double kinetic_energy(const LoadedStepper<double>& stepper, double time, const s
 
 }  // namespace
 
-SweepWatch::SweepWatch(const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+SweepWatch::SweepWatch(const Outline& derivation, const KernelSource& source, const Kernel& kernel,
                        const EnsembleRequest& request)
     : derivation_(derivation),
       source_(source),

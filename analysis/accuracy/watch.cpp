@@ -18,11 +18,11 @@ long double nearest(const Scene& scene, const GiNaC::ex& value, const char* what
 
 }  // namespace
 
-Watch::Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
+Watch::Watch(const Scene& scene, const std::optional<ClosedSolution>& closed, const LoadedStepper<double>& stepper,
              const std::vector<double>& velocity)
     : between_(scene.outputs.dense) {
     if (!scene.is_cut()) {
-        closed_ = structure.closed_solution;
+        closed_ = closed;
         discrete_ = discrete_energy(stepper);
     }
     if (!closed_) return;

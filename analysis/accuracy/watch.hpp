@@ -15,7 +15,7 @@ namespace lobatto {
 class Watch {
 public:
     // The stepper is prepared; `velocity` is the initial one.
-    Watch(const Scene& scene, const Structure& structure, const LoadedStepper<double>& stepper,
+    Watch(const Scene& scene, const std::optional<ClosedSolution>& closed, const LoadedStepper<double>& stepper,
           const std::vector<double>& velocity);
 
     void observe(const Records& records);

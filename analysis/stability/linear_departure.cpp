@@ -24,7 +24,7 @@ double floor_of(std::size_t n) {
 
 }  // namespace
 
-std::string linear_departure(const Derivation& derivation, const Scene& scene, const Kernel& kernel,
+std::string linear_departure(const Outline& derivation, const Scene& scene, const Kernel& kernel,
                              const TrajectoryRequest& request, const TrajectoryResult& result) {
     const std::size_t n = scene.coordinates.size();
     const bool energy_tells = derivation.conserves_energy();
@@ -35,7 +35,8 @@ std::string linear_departure(const Derivation& derivation, const Scene& scene, c
     const double too_large = std::log(times_too_large) / static_cast<double>(result.steps_done);  // a step
     const auto measured = measured_rate(stepper, request.step, steps_measured);
     if (!measured || *measured - floor_of(n) < too_large) return "";
-    Linearisation linearisation(scene, derivation.system);
+    const System system = build_system(derivation.scene);
+    Linearisation linearisation(scene, system);
     const Eigen::VectorXd origin = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n));
     const double own = std::fmax(0, std::fabs(request.step) * linearisation.at(request.time, origin, origin).rate());
     const double excess = *measured - own - floor_of(n);

@@ -5,7 +5,7 @@
 
 namespace lobatto {
 
-Judges::Judges(const Scene& scene, const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+Judges::Judges(const Scene& scene, const Outline& derivation, const KernelSource& source, const Kernel& kernel,
                const EnsembleRequest& request, bool measures, bool accepts_lost)
     : request_(request),
       watch_(derivation, source, kernel, request),

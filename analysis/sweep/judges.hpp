@@ -10,7 +10,7 @@
 #include "analysis/accuracy/ensemble_companion.hpp"
 #include "analysis/accuracy/sweep_watch.hpp"
 #include "generator/emit/kernel.hpp"
-#include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/outline.hpp"
 #include "runtime/run/ensemble.hpp"
 
 namespace lobatto {
@@ -43,7 +43,7 @@ class Judges {
 public:
     // What is handed over outlives it. `measures`: errors, by companions; `accepts_lost`: trajectories of which nothing
     // is left are no failures.
-    Judges(const Scene& scene, const Derivation& derivation, const KernelSource& source, const Kernel& kernel,
+    Judges(const Scene& scene, const Outline& derivation, const KernelSource& source, const Kernel& kernel,
            const EnsembleRequest& request, bool measures, bool accepts_lost);
 
     Verdict judge(const EnsembleTrajectory& trajectory);

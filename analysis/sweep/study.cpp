@@ -8,9 +8,9 @@
 
 #include "analysis/accuracy/companion.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/derived_kernel.hpp"
 #include "analysis/reductions.hpp"
 #include "generator/mechanics/start.hpp"
-#include "generator/pipeline.hpp"
 #include "runtime/run/output.hpp"
 
 namespace lobatto {
@@ -104,13 +104,12 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     auto& [derivation, source] = derived_[{static_cast<int>(method.family), method.points}];
     if (!derivation) {
         // Steps and values are the kernel's arguments: the scene is derived as it was written.
-        const auto& known = derived_.begin()->second.first;
-        auto fresh = std::make_shared<Derivation>(known ? with_method(*known, method)
-                                                        : derive_kernel(starts_->with_settings(as_written_, first)));
-        if (!known && !options_.overrides.set.empty()) check_domains(scene_, fresh->system);
-        if (EnergyWatch::can_watch(*fresh) || !scene_.outputs.kept.empty()) fresh->scene.outputs.energy = true;
-        source = std::make_shared<const KernelSource>(emit(*fresh));
-        derivation = std::move(fresh);
+        if (number == 0 && !options_.overrides.set.empty()) check_domains(scene_);
+        Scene scene = starts_->with_settings(as_written_, first);
+        if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;
+        DerivedKernel derived = derived_kernel(scene, {Precision::double_, false, EnergyWatch::can_watch});
+        derivation = std::make_shared<const Outline>(std::move(derived.outline));
+        source = std::make_shared<const KernelSource>(std::move(derived.source));
     }
     setting->derivation = derivation;
     setting->source = source;

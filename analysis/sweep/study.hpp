@@ -52,7 +52,7 @@ public:
         std::int64_t number = -1;
         Scene scene;
         Steps steps;
-        std::shared_ptr<const Derivation> derivation;
+        std::shared_ptr<const Outline> derivation;
         std::shared_ptr<const KernelSource> source;
         std::optional<Kernel> kernel;
         std::string compiled;     // names the kernel with its compiler and processor: the same, the same bits
@@ -86,7 +86,7 @@ private:
     std::unique_ptr<SweepStarts> starts_;
     std::unique_ptr<SweepRows> rows_;
     // By family and number: what was derived and emitted.
-    std::map<std::pair<int, int>, std::pair<std::shared_ptr<const Derivation>, std::shared_ptr<const KernelSource>>>
+    std::map<std::pair<int, int>, std::pair<std::shared_ptr<const Outline>, std::shared_ptr<const KernelSource>>>
         derived_;
     std::unique_ptr<Setting> first_;
     std::unique_ptr<Setting> current_;

@@ -110,6 +110,15 @@ std::optional<double> defect_of(const Kernel& kernel, Precision numbers, const S
     }
 }
 
+// Where the kernel comes from.
+std::string origin_text(const PreparedRun& run) {
+    if (run.derived_from_cache && run.compiled.from_cache) return "found derived and compiled in the cache";
+    const std::string derived = run.derived_from_cache ? "found derived in the cache"
+                                                       : fmt::format("derived in {:.2f} s", run.derivation_seconds);
+    return derived + (run.compiled.from_cache ? ", found compiled in the cache"
+                                              : fmt::format(", compiled in {:.2f} s", run.compiled.seconds));
+}
+
 // Of the first step, its equations solved to rounding.
 bool has_defect(const PreparedRun& run) {
     return run.kernel.table().has_tangent != 0 && !run.derivation.system.has_forces();
@@ -122,7 +131,7 @@ std::string defect_text(const PreparedRun& run) {
 
 void print_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                  const Watch& watch) {
-    const Derivation& derivation = run.derivation;
+    const Outline& derivation = run.derivation;
     const Scene& scene = run.scene;
     const bool clocked = scene.clock.has_value();
     const std::string of_all =
@@ -305,10 +314,7 @@ void run(const RunOptions& options) {
         keep_foreign(event_path(options, scene));
     }
     if (!options.resume) keep_strangers(path);
-    if (!quiet && !options.json)
-        fmt::print("{}: kernel {}, derived in {:.2f} s, {}\n", scene.path, run.source.digest, run.derivation_seconds,
-                   run.compiled.from_cache ? "found compiled in the cache"
-                                           : fmt::format("compiled in {:.2f} s", run.compiled.seconds));
+    if (!quiet && !options.json) fmt::print("{}: kernel {}, {}\n", scene.path, run.source.digest, origin_text(run));
 
     const TrajectoryHeader header = header_of(scene, run.source, request);
     const std::string identity = identity_of(request, header, run.compiled.object);

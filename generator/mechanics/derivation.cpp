@@ -14,7 +14,7 @@ const Discretisation& Derivation::discretisation() const {
     return *discretisation_;
 }
 
-bool Derivation::conserves_energy() const {
+bool conserves_energy(const Scene& scene, const SystemOutline& system) {
     const auto gives_all_back = [&](const Impact& impact) {
         return impact.reset_position.empty() && impact.restitution.is_equal(1) && !impact.when.value.has(system.t);
     };

@@ -13,6 +13,9 @@
 
 namespace lobatto {
 
+// Whether the motion keeps its energy: no time, no forces, and walls that give all of it back.
+bool conserves_energy(const Scene& scene, const SystemOutline& system);
+
 struct Derivation {
     Scene scene;
     System system;
@@ -20,8 +23,7 @@ struct Derivation {
     Structure structure;
     std::vector<Finding> findings;  // what the structure rests on, and what was looked for in vain
 
-    // Whether the motion keeps its energy: no time, no forces, and walls that give all of it back.
-    bool conserves_energy() const;
+    bool conserves_energy() const { return lobatto::conserves_energy(scene, system); }
 
     // The equations of all nodes written out, for people and for checks; a kernel is assembled from one node's formulas
     // and does not need them. Made at the first call.

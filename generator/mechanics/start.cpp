@@ -414,8 +414,11 @@ StartOnConstraints start_on_constraints(const Scene& scene, const System& system
     return check.found();
 }
 
-void check_domains(const Scene& scene, const System& system) {
-    StartCheck(in_clock_time(scene), system).require_domains();
+void check_domains(const Scene& scene) {
+    const Scene in_time = in_clock_time(scene);
+    System system = undifferentiated(in_time);
+    system.formulas = std::make_shared<const Formulas>();
+    StartCheck(in_time, system).require_domains();
 }
 
 }  // namespace lobatto

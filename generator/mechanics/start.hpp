@@ -19,6 +19,6 @@ struct StartOnConstraints {
 StartOnConstraints start_on_constraints(const Scene& scene, const System& system);
 
 // That part of it which formulas cannot tell after they were simplified, for values set since: sqrt(a)^2 with a < 0.
-void check_domains(const Scene& scene, const System& system);
+void check_domains(const Scene& scene);
 
 }  // namespace lobatto

@@ -293,17 +293,6 @@ bool mentions(const System& system, const GiNaC::symbol& t) {
     return has(system.lagrangian) || std::any_of(system.outer_force.begin(), system.outer_force.end(), has);
 }
 
-// L(q, q', t) + f(t) moves as L does, and a time that drops out need not be known: any moment will do.
-Scene without_time(const Scene& scene) {
-    const Symbols time{scene.time};
-    const Occurrences occurrences(time);
-    const auto still = [&](const ex& value) { return without(value, time, occurrences); };
-    Scene result = scene;
-    result.lagrangian = still(scene.lagrangian);
-    for (Coordinate& coordinate : result.coordinates) coordinate.force = still(coordinate.force);
-    return result;
-}
-
 // Builds a System in the order of its parts; what a part finds against the separable form is kept as the reason.
 class SystemBuilder {
 public:
@@ -347,20 +336,8 @@ private:
         if (value.has(system_.t)) system_.autonomous = false;
     }
     void differentiate_once() {
-        system_.n = static_cast<int>(scene_.coordinates.size());
-        system_.t = scene_.time;
-        for (const Coordinate& coordinate : scene_.coordinates) {
-            system_.q.push_back(coordinate.position);
-            system_.v.push_back(coordinate.velocity);
-            system_.outer_force.push_back(coordinate.force);
-        }
-        for (const Parameter& parameter : scene_.parameters) system_.parameters.push_back(parameter.symbol);
-        system_.inputs = scene_.inputs();
-        system_.lagrangian = scene_.lagrangian;
-        motion_ = system_.q;
-        motion_.insert(motion_.end(), system_.v.begin(), system_.v.end());
-        motion_.push_back(system_.t);
-        motion_.insert(motion_.end(), system_.inputs.begin(), system_.inputs.end());
+        system_ = undifferentiated(scene_);
+        motion_ = system_.motion();
         system_.terms = terms_of(system_.lagrangian, motion_);
         std::vector<ex> written = system_.terms;
         if (!writes_all_) system_.unwritten = set_apart(scene_, system_, written);
@@ -492,7 +469,40 @@ private:
 
 }  // namespace
 
-bool System::has_forces() const {
+Scene without_time(const Scene& scene) {
+    const Symbols time{scene.time};
+    const Occurrences occurrences(time);
+    const auto still = [&](const ex& value) { return without(value, time, occurrences); };
+    Scene result = scene;
+    result.lagrangian = still(scene.lagrangian);
+    for (Coordinate& coordinate : result.coordinates) coordinate.force = still(coordinate.force);
+    return result;
+}
+
+System undifferentiated(const Scene& scene) {
+    System system;
+    system.n = static_cast<int>(scene.coordinates.size());
+    system.t = scene.time;
+    for (const Coordinate& coordinate : scene.coordinates) {
+        system.q.push_back(coordinate.position);
+        system.v.push_back(coordinate.velocity);
+        system.outer_force.push_back(coordinate.force);
+    }
+    for (const Parameter& parameter : scene.parameters) system.parameters.push_back(parameter.symbol);
+    system.inputs = scene.inputs();
+    system.lagrangian = scene.lagrangian;
+    return system;
+}
+
+std::vector<GiNaC::symbol> SystemOutline::motion() const {
+    Symbols all = q;
+    all.insert(all.end(), v.begin(), v.end());
+    all.push_back(t);
+    all.insert(all.end(), inputs.begin(), inputs.end());
+    return all;
+}
+
+bool SystemOutline::has_forces() const {
     return std::any_of(outer_force.begin(), outer_force.end(), [](const GiNaC::ex& F) { return !F.is_zero(); });
 }
 

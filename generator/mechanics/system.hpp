@@ -18,24 +18,33 @@ namespace lobatto {
 
 class Formulas;
 
-struct System {
+// What is known of a system beside its second derivatives; all that those ask for who only run a kernel.
+struct SystemOutline {
     int n = 0;                              // coordinates
     std::vector<GiNaC::symbol> q, v;        // n each: positions, velocities
     GiNaC::symbol t;                        // time
     std::vector<GiNaC::symbol> parameters;  // run-time parameters, scene order
     std::vector<GiNaC::symbol> inputs;      // those of them that may change between steps
     GiNaC::ex lagrangian;                   // L(q, v, t)
-    std::vector<GiNaC::ex> terms;           // L is their sum; a sum of n bodies is n terms
+    std::vector<GiNaC::ex> outer_force;     // n: F_k(q, v, t) of the scene
+    bool has_forces() const;                // one of them is not 0
+    std::vector<GiNaC::ex> momentum;        // n: p = dL/dv
+    SparseMatrix momentum_v;                // n x n: dp/dv, what vanishes identically left out
 
+    bool autonomous = true;  // neither L nor F nor a constraint depends on the time
+    bool linear = false;     // p and f are affine in q and v, with constant coefficients
+
+    std::vector<GiNaC::symbol> motion() const;  // q, v, t and the inputs: all that may change on the way
+};
+
+struct System : SystemOutline {
+    std::vector<GiNaC::ex> terms;  // L is their sum; a sum of n bodies is n terms
     // Terms of L that are in no derivative below; of systems for kernels only.
     Unwritten unwritten;
 
-    std::vector<GiNaC::ex> outer_force;  // n: F_k(q, v, t) of the scene
-    bool has_forces() const;             // one of them is not 0
-    std::vector<GiNaC::ex> momentum;     // n: p = dL/dv
-    std::vector<GiNaC::ex> force;        // n: f = dL/dq + F
-    // n x n each, what vanishes identically left out: dp/dv, dp/dq, df/dv, df/dq.
-    SparseMatrix momentum_v, momentum_q, force_v, force_q;
+    std::vector<GiNaC::ex> force;  // n: f = dL/dq + F
+    // n x n each, what vanishes identically left out: dp/dq, df/dv, df/dq.
+    SparseMatrix momentum_q, force_v, force_q;
 
     std::vector<Constraint> constraints;  // phi(q, t) = 0
     std::vector<GiNaC::ex> constraint_t;  // dphi/dt at fixed q, one each
@@ -44,8 +53,6 @@ struct System {
     // A graph that knows the derivatives above; its symbols have values of no meaning.
     std::shared_ptr<const Formulas> formulas;
 
-    bool autonomous = true;  // neither L nor F nor a constraint depends on the time
-    bool linear = false;     // p and f are affine in q and v, with constant coefficients
     // L = 1/2 v^T M v - V(q, t) with a constant M, and forces F(q, t): only interior nodes are implicit (D11 ... D17).
     bool separable = false;
     // The same but for constraints: M is constant, and forces hold no velocity.
@@ -62,6 +69,10 @@ struct System {
 // Throws InputError when L is degenerate (its second derivatives in the velocities are singular everywhere) or real
 // nowhere near the start, naming the direction or the reason. The start itself: generator/mechanics/start.hpp.
 System build_system(const Scene& scene);
+// The symbols of a scene, its Lagrangian and forces; nothing is differentiated.
+System undifferentiated(const Scene& scene);
+// L(q, q', t) + f(t) moves as L does, and a time that drops out need not be known: any moment will do.
+Scene without_time(const Scene& scene);
 // The same for who only writes a kernel: terms that repeat often stay `unwritten` where they may.
 System build_short_system(const Scene& scene);
 

@@ -210,17 +210,24 @@ void write_file(const std::string& path, const std::string& content) {
     if (error != 0) fail("write", path, error);
 }
 
-CacheEntry::CacheEntry(const std::string& name, std::string key)
-    : stem_(fmt::format("{}/{}-{}", cache_folder(), name, sha256(key).substr(0, 32))), key_(std::move(key)) {}
+CacheEntry::CacheEntry(const std::string& name, std::string key, std::string ending)
+    : stem_(fmt::format("{}/{}-{}", cache_folder(), name, sha256(key).substr(0, 32))),
+      key_(std::move(key)),
+      ending_(std::move(ending)) {}
 
 std::string CacheEntry::building_path() const {
     return fmt::format("{}.{}.building", stem_, ::getpid());
 }
 
 bool CacheEntry::is_valid() const {
+    return valid_object().has_value();
+}
+
+std::optional<std::string> CacheEntry::valid_object() const {
     const auto sealed_key = read_private_file(stem_ + ".key");
-    const auto object = read_private_file(object_path());
-    return sealed_key && object && *sealed_key == seal_of(*object) + key_;
+    auto object = read_private_file(object_path());
+    if (!sealed_key || !object || *sealed_key != seal_of(*object) + key_) return std::nullopt;
+    return object;
 }
 
 bool CacheEntry::is_there() const {

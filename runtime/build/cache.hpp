@@ -2,7 +2,7 @@
 // A folder of built objects, each found by the text that determines it; safe against crashes and other processes.
 //
 // An entry with stem STEM = NAME-<SHA-256 of the key text, shortened> consists of
-//     STEM.so        the object
+//     STEM.so        the object; other things that are built have other endings
 //     STEM.key       size and SHA-256 of the object, then the whole key text
 // and, while it is being built, of
 //     STEM.lock          locked by the builder (flock)
@@ -21,15 +21,17 @@ namespace lobatto {
 class CacheEntry {
 public:
     // In cache_folder(). `name` is for the reader of the folder only.
-    CacheEntry(const std::string& name, std::string key);
+    CacheEntry(const std::string& name, std::string key, std::string ending = ".so");
 
-    std::string object_path() const { return stem_ + ".so"; }
+    std::string object_path() const { return stem_ + ending_; }
     std::string building_path() const;
     std::string failed_path() const { return stem_ + ".failed"; }
 
     // Whether the object is there, belongs to exactly this key text, is whole and unaltered, and only we can write to
     // it.
     bool is_valid() const;
+    // The object, if it is all that.
+    std::optional<std::string> valid_object() const;
 
     // Whether object and key are there at all. Under the lock, an entry that is there and not valid was altered.
     bool is_there() const;
@@ -55,7 +57,7 @@ public:
 
 private:
     std::string stem_;  // with the folder
-    std::string key_;
+    std::string key_, ending_;
 };
 
 // Whole files, with MachineErrors that name the path and the reason.

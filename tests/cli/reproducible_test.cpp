@@ -31,7 +31,7 @@ TEST_CASE("a run has the same bytes again, from a new cache and from a copy of t
         };
         const std::string first = bytes(scene_file(name), "one", ", compiled in ");
         CHECK(first.size() > 10000);
-        CHECK(bytes(scene_file(name), "one", ", found compiled in the cache\n") == first);
+        CHECK(bytes(scene_file(name), "one", ", found derived and compiled in the cache\n") == first);
         std::filesystem::copy_file(scene_file(name), folder / (name + ".toml"));
         CHECK(bytes(folder / (name + ".toml"), "two", ", compiled in ") == first);
     }
