@@ -24,11 +24,11 @@ void append_part(std::string& whole, const std::string& text) {
 }
 
 // What a library of this kernel is compiled from.
-std::string support_of(const KernelSource& source, bool is_ensemble) {
+std::string support_of(const KernelSource& source, bool is_ensemble, bool is_refilled) {
     if (source.support.empty()) return support_text();
     std::vector<std::string> names = source.support;
     names.push_back("steppers/impacts.hpp");
-    return support_text(is_ensemble ? with_ensemble(names) : names);
+    return support_text(is_refilled ? with_refilled_ensemble(names) : is_ensemble ? with_ensemble(names) : names);
 }
 
 Kernel built(const KernelSource& source, const Translation& translation, Compiled* compiled) {
@@ -44,7 +44,7 @@ Kernel built(const KernelSource& source, const Translation& translation, Compile
 
 }  // namespace
 
-Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together) {
+Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together, bool refilled) {
     Translation translation;
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
@@ -52,8 +52,9 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     translation.text = before_support(precision);
     if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
         translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
+    if (refilled) translation.text += "#define LOBATTO_REFILLED\n";
     append_part(translation.text, std::string(kernel_abi_h_text));
-    append_part(translation.text, support_of(source, together > 0));
+    append_part(translation.text, support_of(source, together > 0, refilled));
     append_part(translation.text, source.header);
     append_part(translation.text, std::string(kernel_export_hpp_text));
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
@@ -64,8 +65,9 @@ Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* comp
     return built(source, translation_of(source, precision), compiled);
 }
 
-Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together, Compiled* compiled) {
-    return built(source, translation_of(source, precision, std::max<std::int64_t>(together, 1)), compiled);
+Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together, Compiled* compiled,
+                          bool refilled) {
+    return built(source, translation_of(source, precision, std::max<std::int64_t>(together, 1), refilled), compiled);
 }
 
 }  // namespace lobatto

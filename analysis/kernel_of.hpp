@@ -12,13 +12,15 @@ namespace lobatto {
 
 // The whole translation unit of a kernel: the support headers, the emitted header, the export.
 // `together` > 0: with what ensembles need of which a thread has so many trajectories; that takes longer to compile.
-Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together = 0);
+// `refilled`: of trajectories that end at times of their own, or are looked at after every step.
+Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together = 0,
+                           bool refilled = false);
 
 // Compiles it, or finds it in the cache, and loads it. `source` must have been emitted with this precision, without
 // standalone support.
 Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled = nullptr);
 // The same for ensembles, of which a thread has `together` trajectories: its table has lanes, where they are worth it.
 Kernel ensemble_kernel_of(const KernelSource& source, Precision precision, std::int64_t together,
-                          Compiled* compiled = nullptr);
+                          Compiled* compiled = nullptr, bool refilled = false);
 
 }  // namespace lobatto

@@ -54,16 +54,16 @@ void Reductions::observe(const double* rows, std::int64_t count) {
     const std::size_t columns = 1 + 2 * n_;
     for (std::int64_t i = 0; i < count; ++i) {
         const double* const row = rows + static_cast<std::size_t>(i) * columns;
-        const std::vector<double> q(row + 1, row + 1 + n_), p(row + 1 + n_, row + columns);
-        std::vector<double> v(n_, none);
+        q_.assign(row + 1, row + 1 + n_);
+        p_.assign(row + 1 + n_, row + columns);
         double energy = none;
-        if (needs_velocity_ && stepper_->velocity(row[0], q, p, v) != LOBATTO_OK) v.assign(n_, none);
-        if (needs_energy_ && stepper_->energy(row[0], q, p, energy) != LOBATTO_OK) energy = none;
+        if (!needs_velocity_ || stepper_->velocity(row[0], q_, p_, v_) != LOBATTO_OK) v_.assign(n_, none);
+        if (needs_energy_ && stepper_->energy(row[0], q_, p_, energy) != LOBATTO_OK) energy = none;
         auto at = variables_.begin() + static_cast<std::ptrdiff_t>(parameters_);
         *at++ = row[0];
-        at = std::copy(q.begin(), q.end(), at);
-        at = std::copy(v.begin(), v.end(), at);
-        at = std::copy(p.begin(), p.end(), at);
+        at = std::copy(q_.begin(), q_.end(), at);
+        at = std::copy(v_.begin(), v_.end(), at);
+        at = std::copy(p_.begin(), p_.end(), at);
         *at = energy;
         for (Part& part : parts_)
             if (part.formula) look(part, (*part.formula)(variables_), row[0]);

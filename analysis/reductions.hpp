@@ -38,6 +38,7 @@ private:
     bool needs_energy_ = false, needs_velocity_ = false;
     const LoadedStepper<double>* stepper_ = nullptr;
     std::vector<double> variables_;  // of the formulas: parameters, time, q, v, p, H
+    std::vector<double> q_, v_, p_;  // of the state that is looked at
     std::size_t parameters_;
     double first_time_ = 0, last_time_ = 0;
     bool has_begun_ = false;

@@ -57,6 +57,12 @@ std::vector<std::string> with_ensemble(std::vector<std::string> names) {
     return names;
 }
 
+std::vector<std::string> with_refilled_ensemble(std::vector<std::string> names) {
+    names = with_ensemble(std::move(names));
+    names.push_back("steppers/refilled.hpp");
+    return names;
+}
+
 std::string support_text() {
     std::vector<std::string> names;
     for (const SupportPart& part : support_parts) names.emplace_back(part.name);

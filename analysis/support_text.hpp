@@ -21,6 +21,8 @@ extern const std::string_view kernel_export_hpp_text;  // runtime/kernel/export.
 std::string support_text(const std::vector<std::string>& names);
 // The parts with those that trajectories side by side stand on too.
 std::vector<std::string> with_ensemble(std::vector<std::string> names);
+// And those that end at times of their own.
+std::vector<std::string> with_refilled_ensemble(std::vector<std::string> names);
 // All parts as one file: runtime/kernel/kernel.hpp.
 std::string support_text();
 

@@ -61,8 +61,8 @@ bool Tape::append(const ex& formula, const Variables& variables) {
 }
 
 Tape::Value Tape::sized(const std::vector<double>& variables) const {
-    std::vector<double> stack;
-    stack.reserve(instructions_.size());
+    static thread_local std::vector<double> stack;
+    stack.clear();
     double size = 0;
     for (const Instruction& instruction : instructions_) {
         if (instruction.operands == 0) {

@@ -114,14 +114,15 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     setting->derivation = derivation;
     setting->source = source;
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
-    // number of them changes what a trajectory becomes. Stops, impacts and what is kept are of single trajectories.
+    // number of them changes what a trajectory becomes. Impacts are of single trajectories.
     const std::int64_t count = starts_->count_of_setting();
-    const bool is_alone = !scene_.outputs.kept.empty() || !scene_.run.stops.empty() || scene_.is_cut();
+    const bool is_refilled = !scene_.outputs.kept.empty() || !scene_.run.stops.empty();
     const std::int64_t together =
         scene_.coordinates.size() > 2 ? std::min<std::int64_t>(count, 8) : count / thread_count(options_.threads);
     Compiled compiled;
-    setting->kernel = is_alone ? kernel_of(*source, Precision::double_, &compiled)
-                               : ensemble_kernel_of(*source, Precision::double_, together, &compiled);
+    setting->kernel = scene_.is_cut()
+                          ? kernel_of(*source, Precision::double_, &compiled)
+                          : ensemble_kernel_of(*source, Precision::double_, together, &compiled, is_refilled);
     setting->compiled = std::filesystem::path(compiled.object).stem().string();
     setting->request = request_of(*setting);
     return setting;

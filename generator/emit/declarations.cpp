@@ -12,11 +12,9 @@ namespace {
 const char* const in = "const real*";
 const char* const out = "real*";
 
-const Declaration of_events = {"event",
-                               "What is watched, at a state: the scene's events, stops and walls.",
-                               "void",
-                               {{in, "q"}, {in, "velocity"}, {out, "value"}},
-                               true};
+const Declaration of_events = {"event", "What is watched, at a state: the scene's events, stops and walls.",
+                               "void",  {{in, "q"}, {in, "velocity"}, {out, "value"}},
+                               true,    true};
 const Declaration of_impacts = {"impact",
                                 "(D52) Of each wall g(q, t) = 0: dg/dq, dg/dt at fixed q, and its restitution.",
                                 "void",

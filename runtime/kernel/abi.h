@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 9u
+#define LOBATTO_ABI_VERSION 10u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -80,6 +80,22 @@ typedef struct lobatto_advance {
     double increment_largest; /* largest last increment of a good step, relative to the unknowns */
     double increment_failed;  /* the relative increment at which a failed step stopped */
 } lobatto_advance;
+
+/* One call of `refilled_advance`. Arrays have an entry a lane. */
+typedef struct lobatto_refilled_advance {
+    /* in */
+    int64_t steps;          /* steps to take at most, of each lane whose status is LOBATTO_OK */
+    double tolerance;       /* as of lobatto_advance */
+    void* records;          /* room for rows of t, q[n], p[n] after each step, `capacity` a lane, at most so many steps */
+    int64_t capacity;       /* > 0 */
+    void* events;           /* room for rows as of lobatto_advance, event_capacity a lane; null: none are sought */
+    int64_t event_capacity; /* at least events_of_step */
+    /* in and out */
+    int32_t* status; /* LOBATTO_STOPPED: the last row of events says where and why, and the step is not among those
+                        done */
+    /* out */
+    int64_t *steps_done, *iterations, *events_written;
+} lobatto_refilled_advance;
 
 typedef struct lobatto_kernel {
     uint32_t abi_version; /* LOBATTO_ABI_VERSION */
@@ -170,6 +186,14 @@ typedef struct lobatto_kernel {
                              int64_t* iterations);
     void (*ensemble_state)(const void* ensemble, void* q, void* p);
     void (*ensemble_energy)(const void* ensemble, void* energy); /* H, one a lane; null without energy */
+
+    /* In a library for trajectories that end at times of their own or are looked at after every step, instead of the
+     * five functions above: a lane takes a trajectory when the one before has ended. refilled_prepare is the first
+     * call; a lane that was never filled has no status LOBATTO_OK. refilled_advance returns when a lane has ended. */
+    void (*refilled_prepare)(void* ensemble, const void* step);
+    int32_t (*refilled_fill)(void* ensemble, int32_t lane, const void* parameters, const void* time, const void* q,
+                             const void* p);
+    void (*refilled_advance)(void* ensemble, lobatto_refilled_advance* call);
 } lobatto_kernel;
 
 const lobatto_kernel* lobatto_kernel_table(void);

@@ -25,12 +25,14 @@ struct InputsOf<K, std::void_t<decltype(K::inputs)>> {
 struct NoEnsemble {
     static constexpr std::int32_t lanes = 0, bytes = 0, alignment = 0;
     static constexpr std::nullptr_t prepare{}, start{}, advance{}, state{}, energy{};
+    static constexpr std::nullptr_t refilled_prepare{}, fill{}, refilled_advance{};
+    static constexpr std::int32_t events_of_step = 0;
 };
 
 #ifdef LOBATTO_ENSEMBLES
 // The functions of `lanes` trajectories side by side.
 template <class K, int width>
-struct ExportEnsemble {
+struct ExportEnsemble : NoEnsemble {
     using real = typename K::real;
     using Side = Ensemble<K, width>;
     static constexpr std::int32_t lanes = width, bytes = sizeof(Side), alignment = alignof(Side);
@@ -63,6 +65,34 @@ struct ExportEnsemble {
     }
     static void energy(const void* ensemble, void* value) { static_cast<const Side*>(ensemble)->energy(out(value)); }
 };
+
+#ifdef LOBATTO_REFILLED
+template <class K, int width>
+struct ExportRefilled : NoEnsemble {
+    using real = typename K::real;
+    using Side = RefilledEnsemble<K, width>;
+    static constexpr std::int32_t lanes = width, bytes = sizeof(Side), alignment = alignof(Side);
+    static constexpr std::int32_t events_of_step = Side::Looks::most;
+
+    static void refilled_prepare(void* ensemble, const void* step) {
+        (new (ensemble) Side)->prepare(*static_cast<const real*>(step));
+    }
+    static std::int32_t fill(void* ensemble, std::int32_t lane, const void* parameters, const void* time, const void* q,
+                             const void* p) {
+        return static_cast<std::int32_t>(static_cast<Side*>(ensemble)->fill(
+            lane, static_cast<const real*>(parameters), *static_cast<const real*>(time), static_cast<const real*>(q),
+            static_cast<const real*>(p)));
+    }
+    static void refilled_advance(void* ensemble, lobatto_refilled_advance* call) {
+        ExportEnsemble<K, width>::with(call->status, [&](Status* status) {
+            static_cast<Side*>(ensemble)->advance(call->steps, static_cast<real>(call->tolerance),
+                                                  static_cast<real*>(call->records), call->capacity,
+                                                  static_cast<real*>(call->events), call->event_capacity, status,
+                                                  call->steps_done, call->iterations, call->events_written);
+        });
+    }
+};
+#endif
 #endif
 
 // The functions of one trajectory, and those of E.
@@ -444,7 +474,7 @@ struct Export {
         if constexpr (event_count > 0)
             return Watch<K>::most;
         else
-            return 0;
+            return E::events_of_step;
     }
 
     static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
@@ -502,12 +532,18 @@ struct Export {
                                              E::start,
                                              E::advance,
                                              E::state,
-                                             K::has_energy ? E::energy : nullptr};
+                                             K::has_energy ? E::energy : nullptr,
+                                             E::refilled_prepare,
+                                             E::fill,
+                                             E::refilled_advance};
 };
 
 // With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster, and where
-// none ends before the others or meets a wall.
-#ifdef LOBATTO_ENSEMBLES
+// none meets a wall or, without LOBATTO_REFILLED, ends before the others.
+#if defined(LOBATTO_REFILLED)
+template <class K, int lanes = (impacts_of<K>() + switches_of<K>() > 0) ? 0 : refilled_lanes<K>(LOBATTO_ENSEMBLES)>
+using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportRefilled<K, lanes>>, Export<K>>;
+#elif defined(LOBATTO_ENSEMBLES)
 template <class K, int lanes = (stops_of<K>() + impacts_of<K>() + switches_of<K>() > 0)
                                    ? 0
                                    : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>

@@ -38,7 +38,9 @@
 #include "steppers/general.hpp"
 #include "steppers/impacts.hpp"
 #include "steppers/inputs.hpp"
+#include "steppers/lent_steps.hpp"
 #include "steppers/linear.hpp"
+#include "steppers/refilled.hpp"
 #include "steppers/separable.hpp"
 #include "steppers/splitting.hpp"
 

@@ -7,11 +7,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <condition_variable>
 #include <ctime>
 #include <exception>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -20,6 +18,8 @@
 #include <thread>
 
 #include "runtime/error.hpp"
+#include "runtime/run/ended.hpp"
+#include "runtime/run/refilled.hpp"
 #include "runtime/run/side_by_side.hpp"
 #include "runtime/run/timing.hpp"
 
@@ -27,29 +27,9 @@ namespace lobatto {
 
 namespace {
 
-constexpr double chunk_seconds = 0.02;      // of steps between two looks at the interruption
 constexpr std::int64_t largest_group = 64;  // trajectories; handing one over takes about a microsecond
 constexpr std::int64_t rows_of_group = 4096;
-
-const double no_number = std::numeric_limits<double>::quiet_NaN();
-
-// The most that a trajectory keeps.
-std::int64_t rows_kept(const EnsembleRequest& request) {
-    return request.every == 0 ? 1 : request.steps / request.every + 2;
-}
-
-// A trajectory with what it has kept.
-struct Ended {
-    lobatto_status status = LOBATTO_OK;
-    std::int64_t steps_done = 0, iterations = 0;
-    std::vector<double> rows, energies;
-    std::int64_t row_step = 0;  // steps before the last row
-    int stop = -1;              // of a trajectory that a stop ended: which
-    std::vector<double> reduced;
-
-    bool goes_on() const { return status == LOBATTO_OK && stop < 0; }
-    double energy_start = 0, energy_error_largest = 0;
-};
+constexpr std::int64_t fillings = 16;  // so much more where lanes are refilled: at the end of a group some are empty
 
 // Who works on what. Trajectories are handed over in groups: whole lanes, so that the number of threads does not decide
 // who stands beside whom; several groups for every thread.
@@ -58,24 +38,14 @@ struct Plan {
     Plan(const Kernel& kernel, const EnsembleRequest& request) {
         threads = thread_count(request.threads);
         const std::int64_t lanes = std::max(kernel->lanes, 1);
-        const std::int64_t wanted =
-            std::min({largest_group, rows_of_group / rows_kept(request), request.count / (8 * threads)});
+        const std::int64_t times = kernel->refilled_advance != nullptr ? fillings : 1;
+        const std::int64_t wanted = std::min(
+            {times * largest_group, times * rows_of_group / rows_kept(request), request.count / (8 * threads)});
         group_size = std::max<std::int64_t>(wanted / lanes, 1) * lanes;
         groups = (request.count + group_size - 1) / group_size;
         threads = std::clamp<std::int64_t>(groups, 1, threads);
         window = 2 * threads + 2;
     }
-};
-
-struct Group {
-    std::vector<Ended> trajectories;  // fewer than there should be when interrupted
-    double processor_seconds = 0;
-};
-
-// What all threads see.
-struct Shared {
-    std::atomic<std::int64_t> steps_gone{0};
-    std::atomic<bool> halted{false};
 };
 
 // One thread's work: trajectories of one group after another, as many at a time as there are lanes.
@@ -101,8 +71,8 @@ public:
     }
 
     // Trajectories first, first + 1, ..., last - 1; without those that an interruption cut short.
-    Group run(std::int64_t first, std::int64_t last) {
-        Group group;
+    EndedTogether run(std::int64_t first, std::int64_t last) {
+        EndedTogether group;
         for (; first < last && !shared_.halted; first += lanes_->width()) {
             std::vector<Ended> side_by_side(
                 static_cast<std::size_t>(std::min<std::int64_t>(lanes_->width(), last - first)));
@@ -149,24 +119,12 @@ private:
     }
 
     void keep(std::size_t lane, Ended& ended) const {
-        const double energy = energy_[lane];
-        if (ended.energies.empty()) {
-            ended.rows.reserve(static_cast<std::size_t>(rows_kept(request_)) * (1 + 2 * n_));
-            ended.energies.reserve(static_cast<std::size_t>(rows_kept(request_)));
-            ended.energy_start = energy;
-        } else if (request_.every == 0) {
-            ended.rows.clear();
-            ended.energies.clear();
-        }
-        ended.rows.push_back(ended.stop >= 0 ? lanes_->stop_time() : time_after(request_, ended.steps_done));
+        std::vector<double> row{ended.stop >= 0 ? lanes_->stop_time() : time_after(request_, ended.steps_done)};
         for (const std::vector<double>* numbers : {&q_, &p_}) {
             const auto begin = numbers->begin() + static_cast<std::ptrdiff_t>(lane * n_);
-            ended.rows.insert(ended.rows.end(), begin, begin + static_cast<std::ptrdiff_t>(n_));
+            row.insert(row.end(), begin, begin + static_cast<std::ptrdiff_t>(n_));
         }
-        ended.energies.push_back(energy);
-        ended.row_step = ended.steps_done;
-        const double error = std::fabs(energy - ended.energy_start);
-        if (!(error <= ended.energy_error_largest)) ended.energy_error_largest = error;
+        ended.keep(request_, row.data(), n_, energy_[lane]);
     }
 
     // False: interrupted.
@@ -180,7 +138,7 @@ private:
         while (done < request_.steps && active()) {
             if (shared_.halted.load(std::memory_order_relaxed)) return false;
             const double start = processor_seconds();
-            const std::int64_t from = done, target = done + std::min(chunk_, request_.steps - done);
+            const std::int64_t from = done, target = done + std::min(chunk_.steps(), request_.steps - done);
             while (done < target && active()) {
                 const std::int64_t next =
                     request_.every == 0 ? target : std::min(target, done + request_.every - done % request_.every);
@@ -189,9 +147,7 @@ private:
             }
             const double passed = processor_seconds() - start;
             seconds += passed;
-            // The clock ticks coarsely against a short chunk: grow at most eightfold at a time.
-            const double pace = chunk_seconds / std::max(passed, chunk_seconds / 8);
-            chunk_ = std::max<std::int64_t>(1, std::llround(static_cast<double>(done - from) * pace));
+            chunk_.took(done - from, passed);
             shared_.steps_gone += (done - from) * side_by_side;
         }
         shared_.steps_gone += (request_.steps - done) * side_by_side;
@@ -237,7 +193,7 @@ private:
     std::vector<std::int32_t> status_;
     std::vector<std::int64_t> steps_done_, iterations_;
     bool reduces_ = false;  // the one trajectory
-    std::int64_t chunk_ = 256;
+    Chunk chunk_;
 };
 
 // Groups that are done, on their way to the caller. A group far ahead of the next one to be handed over has to wait.
@@ -252,7 +208,7 @@ public:
         room_.wait(lock, [&] { return closed_ || group < handed_over_ + std::ssize(slots_); });
         return closed_ || group >= groups_ ? std::nullopt : std::optional(group);
     }
-    void put(std::int64_t number, Group&& group) {
+    void put(std::int64_t number, EndedTogether&& group) {
         {
             const std::lock_guard lock(mutex_);
             slot(number) = std::move(group);
@@ -277,7 +233,7 @@ public:
 
     // The caller's: the next group in order; `meanwhile` is called about ten times a second. Rethrows a worker's error.
     template <class Meanwhile>
-    Group next(Meanwhile meanwhile) {
+    EndedTogether next(Meanwhile meanwhile) {
         std::unique_lock lock(mutex_);
         const auto pause = std::chrono::duration<double>(progress_seconds);
         while (!news_.wait_for(lock, pause, [&] { return error_ || slot(handed_over_); })) {
@@ -286,7 +242,7 @@ public:
             lock.lock();
         }
         if (error_) std::rethrow_exception(error_);
-        Group group = *std::move(slot(handed_over_));
+        EndedTogether group = *std::move(slot(handed_over_));
         slot(handed_over_++).reset();
         lock.unlock();
         room_.notify_all();
@@ -294,13 +250,15 @@ public:
     }
 
 private:
-    std::optional<Group>& slot(std::int64_t number) { return slots_[static_cast<std::size_t>(number) % slots_.size()]; }
+    std::optional<EndedTogether>& slot(std::int64_t number) {
+        return slots_[static_cast<std::size_t>(number) % slots_.size()];
+    }
 
     const std::int64_t groups_;
     std::atomic<std::int64_t> next_{0};
     std::mutex mutex_;
     std::condition_variable room_, news_;
-    std::vector<std::optional<Group>> slots_;
+    std::vector<std::optional<EndedTogether>> slots_;
     std::int64_t handed_over_ = 0;
     std::exception_ptr error_;
     bool closed_ = false;
@@ -344,12 +302,17 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
 
     Shared shared;
     Window window(plan);
+    const auto work_with = [&](auto worker) {
+        while (const auto group = window.take())
+            window.put(*group,
+                       worker.run(*group * plan.group_size, std::min((*group + 1) * plan.group_size, request.count)));
+    };
     const auto work = [&] {
         try {
-            Worker worker(kernel, request, shared);
-            while (const auto group = window.take())
-                window.put(*group, worker.run(*group * plan.group_size,
-                                              std::min((*group + 1) * plan.group_size, request.count)));
+            if (kernel->refilled_advance != nullptr)
+                work_with(RefilledLanes(kernel, request, shared));
+            else
+                work_with(Worker(kernel, request, shared));
         } catch (...) {
             window.fail(std::current_exception());
         }
@@ -379,7 +342,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
         request.progress(shared.steps_gone);
     };
     for (std::int64_t number = 0; number < plan.groups && !result.interrupted; ++number) {
-        const Group group = window.next(meanwhile);
+        const EndedTogether group = window.next(meanwhile);
         result.processor_seconds += group.processor_seconds;
         for (const Ended& ended : group.trajectories) {
             const EnsembleTrajectory trajectory = view(request.first + result.trajectories, ended);

@@ -45,8 +45,8 @@ void check_beside(const test::SweepFolder& place, const std::string& one, const 
 
 // Starts a sweep and kills it after so many bytes have been written; whether it came to its end.
 bool kill_after(const test::SweepFolder& place, const std::string& name, std::vector<std::string> words,
-                std::uintmax_t bytes, int signal) {
-    words.insert(words.begin(), {LOBATTO_PROGRAM, "sweep", pendulum_file, "--resume", "-o", place.file(name)});
+                std::uintmax_t bytes, int signal, const std::string& scene = pendulum_file) {
+    words.insert(words.begin(), {LOBATTO_PROGRAM, "sweep", scene, "--resume", "-o", place.file(name)});
     const pid_t pid = ::fork();
     if (pid == 0) {
         std::vector<char*> pointers;
@@ -223,6 +223,44 @@ TEST_CASE("a sweep that is killed again and again and resumed has the bytes of o
             CHECK_FALSE(std::filesystem::exists(place.file("torn" + ending + ".partial")));
             CHECK_FALSE(std::filesystem::exists(place.file("torn" + ending + ".partial.json")));
         }
+    }
+}
+
+// Its trajectories end at times of their own, so that those that stand side by side are others in each of these ways.
+TEST_CASE("a sweep with stops and with what is kept has the same bytes by threads, in parts, and resumed") {
+    const test::SweepFolder place;
+    const std::string scene = LOBATTO_SOURCE_DIR "/scenes/flips.toml";
+    for (const char* keep : {"last(a), max(H), mean(b^2), count(a' = 0), first(b = a)", ""}) {
+        CAPTURE(keep);
+        std::vector<std::string> words{"--vary",  "a=-3:3:40", "--vary",          "b=-3:3:31",
+                                       "--until", "20",        "--beyond-horizon"};
+        if (*keep != 0) words.insert(words.end(), {"--keep", keep});
+        const auto bytes = [&](const std::string& name, const std::vector<std::string>& more) {
+            std::vector<std::string> all{"sweep", scene, "-o", place.file(name)};
+            all.insert(all.end(), words.begin(), words.end());
+            all.insert(all.end(), more.begin(), more.end());
+            const test::Finished done = place.lobatto(all);
+            CHECK_MESSAGE(done.err == "", done.err);
+            CHECK(done.exit_code == 0);
+            return test::read_file(place.file(name));
+        };
+        const std::string whole = bytes("whole.csv", {"--threads", "1"});
+        const std::vector<double> stops = test::column_of(read_trajectory(place.file("whole.csv")), "stop");
+        CHECK(std::count(stops.begin(), stops.end(), 0) > 200);
+        CHECK(std::count(stops.begin(), stops.end(), 0) < 1000);
+        for (const char* threads : {"2", "5"}) CHECK(bytes("more.csv", {"--threads", threads}) == whole);
+        std::vector<std::string> merge{"merge", place.file("merged.csv")};
+        for (const char* part : {"1", "2", "3"}) {
+            bytes(std::string(part) + ".csv", {"--shard", std::string(part) + "/3"});
+            merge.push_back(place.file(std::string(part) + ".csv"));
+        }
+        CHECK(place.lobatto(merge).exit_code == 0);
+        CHECK(test::read_file(place.file("merged.csv")) == whole);
+        std::error_code none;
+        std::filesystem::remove(place.file("torn.csv"), none);
+        if (!kill_after(place, "torn.csv", words, whole.size() / 4, SIGKILL, scene))
+            kill_after(place, "torn.csv", words, whole.size() / 2, SIGKILL, scene);
+        CHECK(bytes("torn.csv", {"--resume"}) == whole);
     }
 }
 

@@ -84,10 +84,10 @@ struct EnsembleFixedPoint : StageMap<K, T> {
                 real(8) * Limits<real>::smallest / linear};
     }
 
-    // One step of the lanes that are `active`, h from `time`. The lanes that the answer names have moved; the others
-    // stay.
-    template <class Given>
-    LOBATTO_INLINE ActiveMask step(const Given& k, real time, T* q, T* u, ActiveMask active) {
+    // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
+    // have moved; the others stay.
+    template <class Given, class Time>
+    LOBATTO_INLINE ActiveMask step(const Given& k, const Time& time, T* q, T* u, ActiveMask active) {
         return workspace.with([&](Arrays& a) LOBATTO_FORMULA {
             begin_step(q, u, a);
             active = active & usable;
@@ -199,8 +199,8 @@ private:
         return values > 1 ? sum[0] + sum[1] : sum[0];
     }
 
-    template <class Given>
-    LOBATTO_INLINE void evaluate(const Given& k, real time, Arrays& a) const {
+    template <class Given, class Time>
+    LOBATTO_INLINE void evaluate(const Given& k, const Time& time, Arrays& a) const {
 #pragma GCC unroll 4
         for (int j = 0; j < m; ++j)
             if constexpr (K::uses_hessian)
@@ -213,8 +213,8 @@ private:
                                                 a.W + j * n);
     }
     // W at the nodes X.
-    template <class Given>
-    LOBATTO_INLINE void settle(const Given& k, real time, Arrays& a) const {
+    template <class Given, class Time>
+    LOBATTO_INLINE void settle(const Given& k, const Time& time, Arrays& a) const {
         for (int j = 0; j < m; ++j)
             Formulas<K>::minus_acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
     }
@@ -228,8 +228,8 @@ private:
         }
     }
     // The lanes whose stage equations are solved, with W at their nodes X, by evaluations alone.
-    template <class Given>
-    LOBATTO_INLINE ActiveMask solve(const Given& k, real time, ActiveMask active, Arrays& a) {
+    template <class Given, class Time>
+    LOBATTO_INLINE ActiveMask solve(const Given& k, const Time& time, ActiveMask active, Arrays& a) {
         const Convergence<T, 2> rule{T(settled.enough)};
         T e_before = T(real(0));
         ActiveMask solved = active & !active;
@@ -253,8 +253,8 @@ private:
 
     // The same by evaluations with S: X becomes the nodes, and W is carried to them. One iteration with S follows the
     // first evaluation; it is often the last.
-    template <class Given>
-    LOBATTO_INLINE ActiveMask solve_with_slopes(const Given& k, real time, ActiveMask active, Arrays& a) {
+    template <class Given, class Time>
+    LOBATTO_INLINE ActiveMask solve_with_slopes(const Given& k, const Time& time, ActiveMask active, Arrays& a) {
         evaluate(k, time, a);
         residual(a, a.d);
         slopes_times(a, a.d, a.bend);
@@ -270,8 +270,8 @@ private:
         return active;
     }
     // The evaluations after the first, each with two iterations; `at_first`: the lanes that need none of them.
-    template <class Given>
-    LOBATTO_INLINE ActiveMask evaluate_again(const Given& k, real time, ActiveMask active, ActiveMask at_first,
+    template <class Given, class Time>
+    LOBATTO_INLINE ActiveMask evaluate_again(const Given& k, const Time& time, ActiveMask active, ActiveMask at_first,
                                              Arrays& a) {
         const Convergence<T, 2> rule{T(settled.enough)};
         T e_before = T(real(0));
@@ -331,8 +331,8 @@ private:
     }
 
     // (D16), (D17): the end of the step, each sum of increments rounded once; then the memory of the step.
-    template <class Given>
-    LOBATTO_INLINE ActiveMask finish(const Given& k, real time, T* q, T* u, ActiveMask solved, const Arrays& a) {
+    template <class Given, class Time>
+    LOBATTO_INLINE ActiveMask finish(const Given& k, const Time& time, T* q, T* u, ActiveMask solved, const Arrays& a) {
         T q1[n], u1[n], W1[n], change[n];
         for (int c = 0; c < n; ++c) {
             const T* const W = a.W + c;
@@ -392,6 +392,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
     EnsembleFixedPoint<K, T> fixed_point;
 
     const T& position(int c) const { return q[c]; }
+    const T* rates() const { return u; }
     void prepare(const ScalarFallback<K>& single, int lane) {
         fixed_point.prepare(single.coefficients, single.step_size, lane);
     }
@@ -405,8 +406,8 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
         for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
-    template <class Given>
-    ActiveMask step(const Given& k, real time, ActiveMask active) {
+    template <class Given, class Time>
+    ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const ActiveMask moved = fixed_point.step(k, time, q, u, active);
         evaluations = fixed_point.evaluations;
         return moved;

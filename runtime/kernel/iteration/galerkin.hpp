@@ -115,10 +115,10 @@ struct GalerkinFixedPoint {
         }
     }
 
-    // One step of the lanes that are `active`, h from `time`. The lanes that the answer names have moved; the others
-    // stay.
-    template <class Given>
-    ActiveMask step(const Given& k, real time, T* q, T* p, ActiveMask active) {
+    // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
+    // have moved; the others stay.
+    template <class Given, class Time>
+    ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active) {
         return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, active, a); });
     }
 
@@ -164,8 +164,8 @@ private:
             return total;
     }
 
-    template <class Given>
-    ActiveMask step_in(const Given& k, real time, T* q, T* p, ActiveMask active, Arrays& a) {
+    template <class Given, class Time>
+    ActiveMask step_in(const Given& k, const Time& time, T* q, T* p, ActiveMask active, Arrays& a) {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
         // Each coordinate has its own measure: increments as small as its rounding are so whatever the others do.
         const real least = maximum(tolerance, Limits<real>::epsilon);
@@ -217,8 +217,8 @@ private:
 
     // The angles at the start of the step are those that all its nodes are near; those of velocities with the velocity
     // of the last step's last node. Nothing else of the stage is computed.
-    template <class Given>
-    LOBATTO_INLINE void prepare_angles(const Given& k, real time, const T* q, Arrays& a) const {
+    template <class Given, class Time>
+    LOBATTO_INLINE void prepare_angles(const Given& k, const Time& time, const T* q, Arrays& a) const {
         using Start = Pack<real, lanes_of<T>>;
         Angle<Start> angles[K::angles];
         Start position[n], velocity[n], Lv[n], F[n], M[entries];
@@ -240,8 +240,8 @@ private:
     }
 
     // One iteration; the largest change of a velocity, relative.
-    template <class Given>
-    LOBATTO_INLINE T iterate(const Given& k, real time, const T* q, const T* p, T* kappa_now, Arrays& a) {
+    template <class Given, class Time>
+    LOBATTO_INLINE T iterate(const Given& k, const Time& time, const T* q, const T* p, T* kappa_now, Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V packed[entries];
@@ -335,9 +335,9 @@ private:
         for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
     }
 
-    template <class Given>
-    ActiveMask finish(const Given& k, [[maybe_unused]] real time, T* q, T* p, const T* kappa_now, ActiveMask done,
-                      Arrays& a) {
+    template <class Given, class Time>
+    ActiveMask finish(const Given& k, [[maybe_unused]] const Time& time, T* q, T* p, const T* kappa_now,
+                      ActiveMask done, Arrays& a) {
         T q1[n], p1[n], not_finite = T(real(0));
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
@@ -377,6 +377,7 @@ struct LaneStepper<K, T, Form::general, stepping> {
     GalerkinFixedPoint<K, T> fixed_point;
 
     const T& position(int c) const { return q[c]; }
+    const T* rates() const { return p; }
     void prepare(const ScalarFallback<K>& single, int) { fixed_point.prepare(single.step_size); }
     void set_tolerance(real tolerance) { fixed_point.tolerance = tolerance; }
     void start(const ScalarFallback<K>& single, const real*, int lane) {
@@ -389,8 +390,8 @@ struct LaneStepper<K, T, Form::general, stepping> {
     void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
-    template <class Given>
-    [[gnu::noinline]] ActiveMask step(const Given& k, real time, ActiveMask active) {
+    template <class Given, class Time>
+    [[gnu::noinline]] ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const ActiveMask moved = fixed_point.step(k, time, q, p, active);
         evaluations = fixed_point.evaluations;
         return moved;

@@ -42,6 +42,15 @@ constexpr int ensemble_lanes(int trajectories) {
     return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;
 }
 
+// The same for lanes that are refilled (steppers/refilled.hpp).
+template <class K>
+constexpr int refilled_lanes(int trajectories) {
+    if constexpr (K::form == Form::separable) {
+        if (K::neighbours) return 0;
+    }
+    return ensemble_lanes<K>(trajectories);
+}
+
 template <class K, int width>
 struct Ensemble {
     using real = typename K::real;
@@ -130,7 +139,7 @@ struct Ensemble {
         }
     }
 
-private:
+protected:
     real time_of(std::int64_t step) const { return start_time + real(step) * step_size; }
 
     // The state of a lane; `single` has its coefficients from then on.
@@ -156,21 +165,21 @@ private:
     }
 
     // What becomes of the lanes that a step has not moved.
-    template <class Leave>
-    [[gnu::noinline, gnu::cold]] void retry(ActiveMask left, real time, T& evaluations, const Leave& leave) {
+    template <class Time, class Leave>
+    [[gnu::noinline, gnu::cold]] void retry(ActiveMask left, const Time& time, T& evaluations, const Leave& leave) {
         // Fixed-point iterations of any Lagrangian that begin with the velocity alone solve many steps that those with
         // a memory do not.
         if constexpr (K::form == Form::general) {
             if (steps > 0) {
                 for (int lane = 0; lane < width; ++lane)
-                    if (left[lane]) start_anew(lane, time);
+                    if (left[lane]) start_anew(lane, lane_of(time, lane));
                 left = left & !motion.step(coefficients, time, left);
                 evaluations += motion.evaluations;
             }
         }
         for (int lane = 0; lane < width; ++lane) {
             if (!left[lane]) continue;
-            const Status alone = step_alone(lane, time);
+            const Status alone = step_alone(lane, lane_of(time, lane));
             if (alone != Status::ok) leave(lane, alone);
         }
     }

@@ -4,7 +4,8 @@
 // An event of g(t, q, q') = 0 happens where the sign of g changes. Its places are isolated on the step's polynomial: g
 // is sampled at twice as many pieces as the step has nodes, and between samples where |g| is least. What decides is
 // not the polynomial, of lower order than the steps, but g at the end of a step of the same method from the same
-// start, shortened to theta h: the signs, and the root between them.
+// start, shortened to theta h: the signs, and the root between them. Most places where |g| is least are far from zero,
+// and are told by the samples alone (is_no_dip).
 //
 // Of the K::events functions the last are walls (impacts.hpp), on one side of which the motion is until it meets them;
 // values that are rounding there are zero. Of these K::impacts throw it back, and K::switches, the very last, change
@@ -16,6 +17,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 
 namespace lobatto {
 
@@ -68,6 +70,19 @@ constexpr int switches_of() {
         return 0;
 }
 
+// Of |g| at equal distances, y[0] ... y[pieces], least around place i: whether g is zero nowhere near. It is so where
+// all of y is of one size, and second differences vary by less than a factor of two, so that nothing narrow is there:
+// a parabola falls between its samples by an eighth of what these differ by. For numbers, or Packs of them.
+template <int pieces, class T>
+inline auto is_no_dip(const T* y, int i, const T& largest) {
+    using real = real_of<T>;
+    const int middle = i < 2 ? 2 : i > pieces - 2 ? pieces - 2 : i;
+    const auto bend = [&](int j) { return y[j - 1] - T(real(2)) * y[j] + y[j + 1]; };
+    const T here = bend(middle), before = bend(middle - 1), after = bend(middle + 1), half = T(real(0.5)) * here;
+    return (y[i] >= T(real(0.5)) * largest) & (half < before) & (half < after) & (before < here + here) &
+           (after < here + here);
+}
+
 // A stepper that knows its parameters, for steps of other lengths.
 template <class K>
 struct WatchedStepper : Stepper<K> {
@@ -109,16 +124,26 @@ struct Events {
 
     explicit Events(const S& stepper) : partial(new S(stepper)) {
         for (int i = 0; i < grid_size; ++i) {
-            grid[i] = i == 0               ? real(0)
-                      : i == 1             ? real(1) / real(1024 * pieces)
-                      : i == grid_size - 2 ? real(1) - grid[1]
-                                           : real(i == grid_size - 1 ? pieces : i - 1) / real(pieces);
+            grid[i] = grid_at(i);
             if constexpr (S::basis > 0) S::basis_at(grid[i], basis_value[i], basis_slope[i]);
         }
     }
     Events(const Events&) = delete;
     Events& operator=(const Events&) = delete;
     ~Events() { delete partial; }
+
+    // Where the functions are sampled first.
+    static real grid_at(int i) {
+        constexpr real beside = real(1) / real(1024 * pieces);
+        return i == 0               ? real(0)
+               : i == 1             ? beside
+               : i == grid_size - 2 ? real(1) - beside
+                                    : real(i == grid_size - 1 ? pieces : i - 1) / real(pieces);
+    }
+
+    // The sample at the end of piece j, and which piece ends at or next to sample i.
+    static constexpr int sample_at(int j) { return j == 0 ? 0 : j == pieces ? grid_size - 1 : j + 1; }
+    static constexpr int piece_at(int i) { return i < 2 ? 0 : i > grid_size - 3 ? pieces : i - 1; }
 
     // Before each step: the state that it starts from.
     void keep(const S& stepper) {
@@ -331,6 +356,7 @@ private:
         if (!has_sign(a.value) || !has_sign(middle.value) || !has_sign(b.value)) return 0;
         if (changes(a.value, middle.value) || changes(middle.value, b.value)) return 0;
         if (!(fabs(middle.value) <= fabs(a.value) && fabs(middle.value) < fabs(b.value))) return 0;
+        if (sees_no_dip(i)) return 0;
         Sample least = least_between(a, middle, b, polynomial);
         const real there = exact(least.theta), error = fabs(there - least.value);
         // So near to zero that the polynomial cannot tell.
@@ -341,6 +367,18 @@ private:
         if (!changes(least.value, a.value)) return 0;
         insert(least.theta < middle.theta ? i : i + 1, least);
         return 1;
+    }
+
+    bool sees_no_dip(int i) const {
+        if (pieces < 4 || sample_count != grid_size) return false;
+        real y[pieces + 1], largest = real(0);
+        for (int j = 0; j <= pieces; ++j) {
+            const real value = samples[sample_at(j)].value;
+            if (!has_sign(value) || changes(value, samples[i].value)) return false;
+            y[j] = fabs(value);
+            if (y[j] > largest) largest = y[j];
+        }
+        return is_no_dip<pieces>(y, piece_at(i), largest);
     }
 
     // The least |g| between a and b by golden sections, or the first place found where the sign is another.
@@ -381,10 +419,11 @@ private:
     }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number.
     bool is_rounding(const Sample& sample, int e) {
+        if (!sample.is_exact) return false;
         real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
         for (int i = 0; i < sample_count; ++i)
             if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        if (!sample.is_exact || !(fabs(sample.value) <= Limits<real>::root_epsilon * largest)) return false;
+        if (!(fabs(sample.value) <= Limits<real>::root_epsilon * largest)) return false;
         state_at(sample.theta, row);
         if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
         if (status != Status::ok) return false;

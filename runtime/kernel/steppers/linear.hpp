@@ -227,6 +227,7 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     T q[n], p[n], evaluations = T(real(0));
 
     const T& position(int c) const { return q[c]; }
+    const T* rates() const { return p; }
 
     void prepare(const ScalarFallback<K>&, int) {}
     void set_tolerance(real) {}
@@ -239,8 +240,8 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
-    template <class Given>
-    ActiveMask step(const Given& k, real, ActiveMask active) {
+    template <class Given, class Time>
+    ActiveMask step(const Given& k, const Time&, ActiveMask active) {
         T q1[n], p1[n], not_finite = T(real(0));
         K::propagate(k, +q, +p, +q1, +p1);
         for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);

@@ -35,8 +35,8 @@ struct Composition {
 };
 
 // One step of q and u; W is that at their positions, before and after, where ends are kicked. T: a number or a Pack.
-template <class K, class T, class Given>
-LOBATTO_INLINE void kick_and_drift(const Composition<K>& composition, const Given& k, typename K::real time,
+template <class K, class T, class Given, class Time>
+LOBATTO_INLINE void kick_and_drift(const Composition<K>& composition, const Given& k, const Time& time,
                                    typename K::real h, T* q, T* u, T* W) {
     constexpr int n = K::coordinates, s = K::points;
     const auto kick = [&](int i) LOBATTO_FORMULA {
@@ -79,8 +79,8 @@ LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& step, int
 
 // One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
 // coordinates for each kick.
-template <class K, class T, class Given>
-LOBATTO_INLINE void immediate_step(const Composition<K>& composition, const Given& k, typename K::real time,
+template <class K, class T, class Given, class Time>
+LOBATTO_INLINE void immediate_step(const Composition<K>& composition, const Given& k, const Time& time,
                                    typename K::real h, const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
     constexpr int n = K::coordinates, s = K::points;
     const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
@@ -249,26 +249,39 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
 
     // The polynomial of degree 5 that has the positions, velocities and accelerations at both ends of the last step, at
     // t + theta h.
-    static constexpr int basis = 0;
+    static constexpr int basis = 5;  // polynomials: of what q moves by, h u at both ends, h^2 W at both
     void polynomial(real theta, real* position, real* velocity) const {
+        real value[basis], slope[basis];
+        basis_at(theta, value, slope);
+        polynomial(value, slope, position, velocity);
+    }
+    static void basis_at(real t, real* value, real* slope) {
+        const real t2 = t * t, t3 = t2 * t;
+        value[0] = t3 * (real(10) + t * (real(6) * t - real(15)));
+        slope[0] = t2 * (real(30) + t * (real(30) * t - real(60)));
+        value[1] = t + t3 * (t * (real(8) - real(3) * t) - real(6));
+        slope[1] = real(1) + t2 * (t * (real(32) - real(15) * t) - real(18));
+        value[2] = t3 * (t * (real(7) - real(3) * t) - real(4));
+        slope[2] = t2 * (t * (real(28) - real(15) * t) - real(12));
+        value[3] = -real(0.5) * t2 * (real(1) + t * (t * (real(3) - t) - real(3)));
+        slope[3] = -real(0.5) * t * (real(2) + t * (t * (real(12) - real(5) * t) - real(9)));
+        value[4] = -real(0.5) * t3 * (real(1) + t * (t - real(2)));
+        slope[4] = -real(0.5) * t2 * (real(3) + t * (real(5) * t - real(8)));
+    }
+    void polynomial(const real* value, const real* slope, real* position, real* velocity) const {
         evaluate_ends();
-        const real t = theta, t2 = t * t, t3 = t2 * t, h = step_size;
-        const real rise = t3 * (real(10) + t * (real(6) * t - real(15))),
-                   rise_slope = t2 * (real(30) + t * (real(30) * t - real(60)));
-        const real u0 = t + t3 * (t * (real(8) - real(3) * t) - real(6)),
-                   u0_slope = real(1) + t2 * (t * (real(32) - real(15) * t) - real(18));
-        const real u1 = t3 * (t * (real(7) - real(3) * t) - real(4)),
-                   u1_slope = t2 * (t * (real(28) - real(15) * t) - real(12));
-        const real a0 = real(0.5) * t2 * (real(1) + t * (t * (real(3) - t) - real(3))),
-                   a0_slope = real(0.5) * t * (real(2) + t * (t * (real(12) - real(5) * t) - real(9)));
-        const real a1 = real(0.5) * t3 * (real(1) + t * (t - real(2))),
-                   a1_slope = real(0.5) * t2 * (real(3) + t * (real(5) * t - real(8)));
+        const real h = step_size;
         for (int k = 0; k < n; ++k) {
-            const real begin = position_before(k), moved = q[k] - begin, from = h * velocity_before(k), to = h * u[k];
-            const real start = h * (h * ends.W[0][k]), end = h * (h * ends.W[1][k]);
-            position[k] = begin + (rise * moved + u0 * from + u1 * to - a0 * start - a1 * end);
-            velocity[k] =
-                (rise_slope * moved + u0_slope * from + u1_slope * to - a0_slope * start - a1_slope * end) / h;
+            const real begin = position_before(k);
+            const real of[basis] = {q[k] - begin, h * velocity_before(k), h * u[k], h * (h * ends.W[0][k]),
+                                    h * (h * ends.W[1][k])};
+            real moved = value[0] * of[0], rate = slope[0] * of[0];
+            for (int j = 1; j < basis; ++j) {
+                moved += value[j] * of[j];
+                rate += slope[j] * of[j];
+            }
+            position[k] = begin + moved;
+            velocity[k] = rate / h;
         }
     }
 
@@ -373,6 +386,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
     real h;
 
     const T& position(int c) const { return q[now][c]; }
+    const T* rates() const { return u[now]; }
     void prepare(const ScalarFallback<K>& single, int) {
         composition = single.composition;
         h = single.step_size;
@@ -384,8 +398,8 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
-    template <class Given>
-    ActiveMask step(const Given& k, real time, ActiveMask active) {
+    template <class Given, class Time>
+    ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const int next = 1 - now;
         T not_finite = T(real(0));
         if constexpr (moves_immediately<K>()) {

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+// Trajectories side by side, each with a time of its own: a lane whose trajectory has ended, because it was stopped or
+// failed, takes the next one. Every state is recorded, and every step is looked at for events.
+//
+// The functions of events are sampled in all lanes at once, where Events samples them. A lane is quiet where each keeps
+// the sign that it has had and nowhere comes near zero: then Events would find nothing. The step of any other lane is
+// lent to a Stepper, in which Events locates what happened.
+#ifndef LOBATTO_KERNEL_REFILLED_HPP
+#define LOBATTO_KERNEL_REFILLED_HPP
+
+#include <type_traits>
+
+#include "ensemble.hpp"
+#include "events.hpp"
+#include "impacts.hpp"
+#include "lent_steps.hpp"
+
+namespace lobatto {
+
+// Looks at the steps of lanes.
+template <class K, int width>
+struct LaneWatch {
+    using real = typename K::real;
+    using T = Pack<real, width>;
+    using ActiveMask = decltype(T() < T());
+    using Alone = FallbackKernel<K>;
+    using S = WatchedStepper<Alone>;
+    using Motion = LaneStepper<K, T>;
+    using Step = LentStep<K, T>;
+    using Sampled = Events<Alone>;
+    static constexpr int n = K::coordinates, basis = Step::basis, places = Sampled::grid_size;
+    static constexpr int pieces = Sampled::pieces;
+    static constexpr int most = Watch<Alone>::most, columns = Watch<Alone>::columns;
+
+    T last[K::events];  // of each function the last value that was not zero
+    T moved[basis][n];  // the step's polynomial, in the basis of its form
+    S single;           // to which a step is lent
+    Watch<Alone>* watch = nullptr;
+    real grid[places], value[places][basis], slope[places][basis];
+
+    void prepare() {
+        for (int i = 0; i < places; ++i) {
+            grid[i] = Sampled::grid_at(i);
+            S::basis_at(grid[i], value[i], slope[i]);
+        }
+    }
+    void start(const ScalarFallback<K>& started, int lane) {
+        for (int e = 0; e < K::events; ++e) set_lane(last[e], lane, started.event_values[e]);
+    }
+
+    // The lanes in which something may have happened: in step number `gone` since `begun`, of length h, from `before`.
+    template <class Given>
+    ActiveMask restless(const Motion& motion, const Given& k, const T& begun, const T& gone, real h, const T* q_before,
+                        const T* rate_before) {
+        Step::displacements(motion, k, begun + gone * T(h), q_before, rate_before, moved);
+        T y[places][K::events];
+        for (int i = 0; i < places; ++i) {
+            T q[n], velocity[n];
+            for (int c = 0; c < n; ++c) {
+                T position = T(real(0)), rate = T(real(0));
+                for (int j = 0; j < basis; ++j) {
+                    position = fused(T(value[i][j]), moved[j][c], position);
+                    rate = fused(T(slope[i][j]), moved[j][c], rate);
+                }
+                q[c] = q_before[c] + position;
+                velocity[c] = rate / T(h);
+            }
+            Formulas<K>::event(k, begun + (gone + T(grid[i])) * T(h), static_cast<const T*>(q),
+                               static_cast<const T*>(velocity), +y[i]);
+        }
+        T q[n], velocity[n], end[K::events];
+        const T next = begun + (gone + T(real(1))) * T(h);
+        for (int c = 0; c < n; ++c) q[c] = motion.position(c);
+        ActiveMask quiet = Step::velocities(motion, k, next, velocity);
+        Formulas<K>::event(k, next, static_cast<const T*>(q), static_cast<const T*>(velocity), +end);
+        for (int e = 0; e < K::events; ++e) quiet = quiet & is_quiet(e, y, end[e]);
+        return !quiet;
+    }
+
+    // What happened in the step of `lane` that was lent: of its last step all but the state before. Adds rows as Watch.
+    template <class Lend>
+    Status look(const typename K::Parameters& parameters, real h, const Lend& lend, int lane, real* rows,
+                std::int64_t& count) {
+        const Status status = single.prepare(parameters, h);
+        if (status != Status::ok) return status;
+        single.parameters = parameters;
+        if (watch == nullptr) watch = new Watch<Alone>(single);
+        lend(single, *watch);
+        for (int e = 0; e < K::events; ++e) single.event_values[e] = lane_of(last[e], lane);
+        const Status found = watch->look(single, rows, count);
+        for (int e = 0; e < K::events; ++e) set_lane(last[e], lane, single.event_values[e]);
+        return found;
+    }
+    // After each call of the host.
+    void rest() {
+        delete watch;
+        watch = nullptr;
+    }
+
+private:
+    ActiveMask is_quiet(int e, const T (*samples)[K::events], const T& end) const {
+        const ActiveMask is_above = last[e] > T(real(0));
+        const auto with_sign = [&](const T& g) LOBATTO_FORMULA { return select(is_above, g, -g); };
+        ActiveMask quiet = is_above | (last[e] < T(real(0)));
+        T y[places], largest = T(real(0));
+        for (int i = 0; i < places; ++i) {
+            y[i] = with_sign(samples[i][e]);
+            largest = maximum(largest, y[i]);
+            quiet = quiet & (y[i] > T(real(0))) & (y[i] <= T(Limits<real>::largest));
+        }
+        T at[pieces + 1];
+        for (int j = 0; j <= pieces; ++j) at[j] = y[Sampled::sample_at(j)];
+        for (int i = 1; i + 1 < places; ++i) {
+            const ActiveMask is_least = quiet & (y[i] <= y[i - 1]) & (y[i] < y[i + 1]);
+            if (!any(is_least)) continue;
+            if constexpr (pieces >= 4)
+                quiet = quiet & (!is_least | is_no_dip<pieces>(at, Sampled::piece_at(i), largest));
+            else
+                quiet = quiet & !is_least;
+        }
+        return quiet & (with_sign(end) > T(Limits<real>::root_epsilon) * largest) &
+               (with_sign(end) <= T(Limits<real>::largest));
+    }
+};
+
+// What trajectories without events need of the same.
+template <class K, int width>
+struct NoLaneWatch {
+    static constexpr int most = 0, columns = 2 + 2 * K::coordinates;
+    void prepare() {}
+    void start(const ScalarFallback<K>&, int) {}
+    void rest() {}
+};
+
+template <class K, int width>
+struct RefilledEnsemble : Ensemble<K, width> {
+    using Base = Ensemble<K, width>;
+    using Base::n, Base::lanes, Base::coefficients, Base::motion, Base::parameters, Base::coefficients_of, Base::single,
+        Base::step_size, Base::steps;
+    using typename Base::real, typename Base::T, typename Base::ActiveMask;
+    using Step = LentStep<K, T>;
+    static constexpr int columns = 1 + 2 * n;
+    static constexpr bool has_events = K::events > 0;
+    using Looks = std::conditional_t<has_events, LaneWatch<K, width>, NoLaneWatch<K, width>>;
+
+    T begun, gone;  // the time at which each lane began, and its steps since then
+    Looks looks;
+    bool is_filled{};
+
+    void prepare(real h) {
+        step_size = h;
+        steps = 1;  // so that iterations which fail begin anew
+        begun = gone = T(real(0));
+        looks.prepare();
+    }
+
+    // A trajectory begins in `lane`; where that is impossible, the lane stays as it is.
+    Status fill(int lane, const real* values, real time, const real* q, const real* p) {
+        for (int i = 0; i < K::parameter_count; ++i) K::parameter(parameters[lane], i) = values[i];
+        const Status status = this->begin_alone(lane, time, q, p);
+        if (status != Status::ok) return status;
+        place(lane, time, p);
+        for (int other = 0; other < width && !is_filled; ++other)  // so that all have numbers to compute with
+            if (other != lane) place(other, time, p);
+        is_filled = true;
+        return status;
+    }
+
+    // At most `count` steps of the lanes whose status is ok, until one of them ends. After each step a row of t, q, p
+    // of each, `capacity` rows a lane; events as of Watch, where there is room for them.
+    void advance(std::int64_t count, real tolerance, real* records, std::int64_t capacity, real* events,
+                 std::int64_t event_capacity, Status* status, std::int64_t* done, std::int64_t* iterations,
+                 std::int64_t* events_written) {
+        motion.set_tolerance(tolerance);
+        single.tolerance = tolerance;
+        ActiveMask active = ActiveMask(false);
+        for (int lane = 0; lane < width; ++lane) {
+            active.set(lane, status[lane] == Status::ok);
+            done[lane] = events_written[lane] = 0;
+        }
+        T evaluations = T(real(0));
+        std::int64_t taken = 0;
+        bool has_left = false;
+        const auto leave = [&](int lane, Status why) {
+            status[lane] = why;
+            done[lane] = taken;
+            active.set(lane, false);
+            has_left = true;
+        };
+        while (taken < count && taken < capacity && !has_left && any(active)) {
+            T q_before[n], rate_before[n];
+            for (int c = 0; c < n; ++c) {
+                q_before[c] = motion.position(c);
+                rate_before[c] = motion.rates()[c];
+            }
+            const T time = begun + gone * T(step_size), next = begun + (gone + T(real(1))) * T(step_size);
+            const ActiveMask stands_still = active & (next == time);
+            if (any(stands_still))
+                for (int lane = 0; lane < width; ++lane)
+                    if (stands_still[lane]) leave(lane, Status::time_stands_still);
+            const ActiveMask moved = motion.step(coefficients, time, active);
+            evaluations += motion.evaluations;
+            if (any(active & !moved)) this->retry(active & !moved, time, evaluations, leave);
+            if constexpr (has_events) {
+                if (events != nullptr) {
+                    const ActiveMask stirred =
+                        active & looks.restless(motion, coefficients, begun, gone, step_size, q_before, rate_before);
+                    for (int lane = 0; any(stirred) && lane < width; ++lane) {
+                        if (!stirred[lane]) continue;
+                        const Status found =
+                            look(lane, q_before, rate_before, tolerance,
+                                 events + lane * event_capacity * Looks::columns, events_written[lane]);
+                        if (found != Status::ok) leave(lane, found);
+                    }
+                }
+            }
+            gone = select(active, gone + T(real(1)), gone);
+            record(next, records + taken * columns, capacity * columns);
+            ++taken;
+            for (int lane = 0; lane < width; ++lane)
+                has_left = has_left || (events != nullptr && events_written[lane] + Looks::most > event_capacity);
+        }
+        looks.rest();
+        for (int lane = 0; lane < width; ++lane) {
+            if (status[lane] == Status::ok) done[lane] = taken;
+            iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
+        }
+    }
+
+private:
+    void place(int lane, real time, const real* p) {
+        coefficients_of[lane] = single.coefficients;
+        set_coefficients<K>(coefficients, lane, single.coefficients);
+        motion.prepare(single, lane);
+        Step::refill(motion, single, p, lane);
+        looks.start(single, lane);
+        begun.set(lane, time);
+        gone.set(lane, real(0));
+    }
+
+    // Into the rows of all lanes, `stride` apart.
+    void record(const T& time, real* row, std::int64_t stride) const {
+        T momentum[n];
+        Step::momenta(motion, coefficients, momentum);
+        for (int lane = 0; lane < width; ++lane, row += stride) {
+            row[0] = lane_of(time, lane);
+            for (int c = 0; c < n; ++c) {
+                row[1 + c] = lane_of(motion.position(c), lane);
+                row[1 + n + c] = lane_of(momentum[c], lane);
+            }
+        }
+    }
+
+    Status look(int lane, const T* q_before, const T* rate_before, real tolerance, real* rows, std::int64_t& count) {
+        const auto lend = [&](auto& to, auto& watch) {
+            to.tolerance = tolerance;
+            to.start_time = lane_of(begun, lane);
+            to.steps = static_cast<std::int64_t>(lane_of(gone, lane));
+            Step::lend_state(q_before, rate_before, to, lane);
+            watch.keep(to);
+            Step::lend_step(motion, looks.moved, to, lane);
+            ++to.steps;
+        };
+        return looks.look(parameters[lane], step_size, lend, lane, rows, count);
+    }
+};
+
+}  // namespace lobatto
+
+#endif
