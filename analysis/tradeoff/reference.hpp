@@ -27,6 +27,7 @@ struct Reference {
     double tolerance = 0;              // of a macro step of the extrapolation
     double energy_scale = 0;           // the largest |p v|/2
     double frequency = 0;              // the largest met (largest_frequency)
+    double frequency_at_start = 0;     // likewise
     double seconds = 0;                // that it took
     bool is_late = false;              // more time would have made it better
 
