@@ -58,7 +58,7 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
                             "least {:.0e}",
                             error, Run::largest_error, Run::least_error));
         const lobatto::Scene written = scene.parts().scene;
-        refuse_impacts(written, "tune");
+        refuse_jumps(written, "tune");
         lobatto::Scene changed = written;
         apply(overrides_of(settings), changed);
         ChoiceRequest request;

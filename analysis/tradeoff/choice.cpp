@@ -123,7 +123,7 @@ Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& req
     choice.uncertainty = uncertainty;
     choice.frequency = reference.frequency;
     const StepClock clock = candidate.member.clock;
-    const bool has_limit = clock == StepClock::none && scene.constraints.empty();
+    const bool has_limit = clock == StepClock::none && scene.constraints.empty() && !scene.is_cut();
     choice.stability_limit = has_limit ? stability_limit(quadrature_of(candidate.member.method())) : std::nan("");
     if (clock != StepClock::none) choice.clock = clock == StepClock::automatic ? "auto" : scene.clock->text;
     choice.members = members;

@@ -89,6 +89,8 @@ Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentReque
     wish.until = until;
     wish.wanted = request_.wanted;
     wish.groups = amplitude_groups(scene_);
+    wish.is_cut = scene_.is_cut();
+    wish.has_walls = !scene_.impacts.empty();
     wish.interrupted = request_.interrupted;
     const auto compute = [&](Precision precision) {
         reference.precision = precision;

@@ -92,7 +92,7 @@ bool KernelBuilder::allows(const Member& member) const {
     const Derivation& scene = derivation(member.clock);
     if (!scene.scene.constraints.empty() && member.family != Family::lobatto) return false;
     const bool is_general = member.family != Family::splitting && member.arithmetic == StepArithmetic::plain;
-    return is_general || (scene.system.separable && member.clock == StepClock::none);
+    return is_general || (scene.system.separable && member.clock == StepClock::none && !scene.scene.is_cut());
 }
 
 std::vector<StepClock> KernelBuilder::clocks() const {

@@ -172,7 +172,7 @@ void compare_with_reference(const TimedRun<real>& run, const Reference& referenc
         const double* const high = reference.high.data() + sample * 2 * n;
         const double* const low = reference.low.data() + sample * 2 * n;
         double worst = 0;
-        for (std::size_t k = 0; k < 2 * n; ++k) {
+        for (std::size_t k = 0; k < reference.compared; ++k) {
             const Wide difference =
                 (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
             const double error = std::fabs(static_cast<double>(difference)) / reference.scale[k];
@@ -315,7 +315,6 @@ double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candid
     constexpr double infinity = std::numeric_limits<double>::infinity();
     TimedRun<real> run(kernel, start_, candidate, *this, reference_.until, 1);
     const bool is_clocked = candidate.member.clock != StepClock::none;
-    const std::size_t n = reference_.n;
     std::int64_t stride = 1;  // of the rows
     if (is_clocked) {
         run.go_along_chain(candidate, interrupted_);
@@ -329,13 +328,33 @@ double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candid
     if (run.status != LOBATTO_OK) return infinity;
 
     const auto until = static_cast<Exact>(reference_.until);
-    const StartIn<Exact> start = start_in<Exact>(start_, exact_, until);
+    // Where steps are cut, steps that are parts of the candidate's; else by extrapolation.
+    const std::int64_t parts = (reference_.steps + candidate.steps - 1) / candidate.steps;
+    const bool is_cut = parts > 0;
+    const Exact step = is_cut ? until / static_cast<Exact>(candidate.steps * parts) : until;
+    const StartIn<Exact> start = start_in<Exact>(start_, exact_, step);
     LoadedStepper<Exact> stepper(exact_);
-    stepper.prepare(start.parameters, until);
+    stepper.prepare(start.parameters, step);
+    if (is_cut && stepper.start(0, start.q, start.p) != LOBATTO_OK) return infinity;
     const double tolerance = std::is_same_v<Exact, __float128> ? 100 * reference_.tolerance : reference_.tolerance;
     Extrapolation<Exact> way(stepper, std::vector<Exact>(reference_.scale.begin(), reference_.scale.end()),
                              static_cast<Exact>(tolerance));
     way.start(0, start.q, start.p);
+    std::vector<Exact> there, p;
+    const auto go_on = [&](Exact time) {
+        if (!is_cut) {
+            const bool arrives = way.advance_to(time);
+            there = way.state();
+            return arrives;
+        }
+        lobatto_advance call{};
+        call.steps = parts * run.every;
+        Exact now;
+        if (stepper.advance(call) != LOBATTO_OK || call.steps_done != call.steps) return false;
+        stepper.state(now, there, p);
+        there.insert(there.end(), p.begin(), p.end());
+        return true;
+    };
     double worst = 0;
     for (std::int64_t meeting = 1 + (run.meetings - 1) % stride; meeting <= run.meetings; meeting += stride) {
         if (interrupted_ != nullptr && *interrupted_ != 0) throw Interrupted();
@@ -343,10 +362,10 @@ double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candid
         const Exact time = is_clocked
                                ? static_cast<Exact>(row[-1])
                                : until * static_cast<Exact>(meeting * run.every) / static_cast<Exact>(candidate.steps);
-        if (!way.advance_to(time)) return infinity;
-        for (std::size_t k = 0; k < 2 * n; ++k) {
+        if (!go_on(time)) return infinity;
+        for (std::size_t k = 0; k < reference_.compared; ++k) {
             const double error =
-                std::fabs(static_cast<double>(static_cast<Exact>(row[k]) - way.state()[k])) / reference_.scale[k];
+                std::fabs(static_cast<double>(static_cast<Exact>(row[k]) - there[k])) / reference_.scale[k];
             if (!(error <= worst)) worst = error;
         }
     }

@@ -50,6 +50,7 @@ public:
         start_ = start_in<real>(start, kernel, step);
         stepper_.prepare(start_.parameters, step);
         reference_.n = n_;
+        reference_.compared = 2 * n_;
         reference_.until = request.until;
         reference_.precision = kernel->real_kind == LOBATTO_FLOAT128 ? Precision::quadruple : Precision::extended;
     }
@@ -331,6 +332,7 @@ double Reference::trusted_until(double error) const {
 }
 
 Reference compute_reference(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request) {
+    if (request.is_cut) return compute_cut_reference(kernel, start, request);
     return kernel->real_kind == LOBATTO_FLOAT128 ? Computation<__float128>(kernel, start, request).compute()
                                                  : Computation<long double>(kernel, start, request).compute();
 }

@@ -39,7 +39,7 @@ void write(const std::string& path, const std::string& text) {
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
     const Scene written = read_scene(options.scene);
-    refuse_impacts(written, "lobatto tradeoff");
+    refuse_jumps(written, "lobatto tradeoff");
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);

@@ -63,7 +63,7 @@ void print(const Choice& choice, const Scene& scene, double error) {
 void tune(const TuneOptions& options) {
     const double error = error_of(options);
     const Scene written = read_scene(options.scene);
-    refuse_impacts(written, "lobatto tune");
+    refuse_jumps(written, "lobatto tune");
     Scene scene = written;
     apply(options.overrides, scene);
     const Interruption interruption;

@@ -11,6 +11,7 @@
 
 #include "analysis/tradeoff/choice.hpp"
 #include "analysis/tradeoff/method_text.hpp"
+#include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/reference.hpp"
@@ -184,6 +185,47 @@ TEST_CASE("with constraints the reference is the motion, and errors are those ag
     for (std::size_t k = 0; k < 4; ++k) error = std::fmax(error, std::fabs(q[k] - exact[k]) / reference.scale[k]);
     CHECK(m.error_end == doctest::Approx(error).epsilon(1e-6));
     CHECK(error > 1e-10);
+}
+
+TEST_CASE("with walls errors are those of positions, against |cos t| of a spring that a wall throws back") {
+    const std::string spring =
+        "lagrangian = \"(x'^2 - x^2)/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[impacts]\n"
+        "wall = { when = \"x = 0 falling\"";
+    const std::string rest = " }\n[method]\npoints = 5\n[run]\nstep = 0.1\nuntil = 10\n";
+    const Scene scene = scene_of(spring + rest);
+    ExperimentRequest wish;
+    wish.seconds = 3600;
+    wish.wanted = 1e-14;
+    Experiment experiment(scene, scene, wish);
+    const Reference& reference = experiment.reference();
+    CHECK(reference.disagreement.back() < 1e-14);
+    for (int i = 0; i <= reference.samples; ++i)
+        CHECK(std::fabs(reference.high[static_cast<std::size_t>(i) * 2] - std::fabs(std::cos(reference.time(i)))) <
+              1e-13);
+    const Candidate candidate{{Family::lobatto, 3}, 60, 0};
+    const Measurement m = experiment.measure(candidate);
+    REQUIRE(m.complete);
+    const Kernel kernel = experiment.kernel_builder().kernel(candidate.member);
+    const StartIn<double> start = start_in<double>(ExactStart(scene), kernel, m.step);
+    LoadedStepper<double> stepper(kernel);
+    REQUIRE(stepper.prepare(start.parameters, m.step) == LOBATTO_OK);
+    REQUIRE(stepper.start(0, start.q, start.p) == LOBATTO_OK);
+    double worst = 0, error = 0, time = 0;
+    std::vector<double> q, p;
+    for (int step = 0; step < 60; ++step) {
+        lobatto_advance call{};
+        call.steps = 1;
+        REQUIRE(stepper.advance(call) == LOBATTO_OK);
+        stepper.state(time, q, p);
+        error = std::fabs(q[0] - std::fabs(std::cos(time))) / reference.scale[0];
+        worst = std::fmax(worst, error);
+    }
+    CHECK(m.error_end == doctest::Approx(error).epsilon(1e-6));
+    CHECK(experiment.measurer().error_on_steps(kernel, candidate) == doctest::Approx(worst).epsilon(1e-6));
+    CHECK(error > 1e-9);
+    CHECK(test::message_of<InputError>([&] {
+              refuse_jumps(scene_of(spring + ", reset = { x = \"x + 1\" }" + rest), "tune");
+          }).find("tune compares positions along the motion, and the wall wall moves x") != std::string::npos);
 }
 
 TEST_CASE("a clock that tells no times apart is not tried") {
