@@ -114,7 +114,8 @@ void measure(const std::string& path, const std::string& file) {
     const Derivation derivation = derive(scene);
     const std::vector<Member> list = members(derivation.system.separable);
     wish.first = list;
-    Experiment experiment(derivation, scene, wish);
+    wish.tries_clocks = false;
+    Experiment experiment(scene, scene, wish);
     const Reference& reference = experiment.reference();
     const ExactStart start(scene);
     const End end = end_of(reference);

@@ -4,8 +4,6 @@
 
 #include "analysis/proof/proof.hpp"
 #include "analysis/tradeoff/choice.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
 #include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "library/parts.hpp"
@@ -40,9 +38,9 @@ Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
     return settings;
 }
 
-lobatto::Choice chosen(Derivation derivation, const lobatto::Scene& scene, const ChoiceRequest& request) {
+lobatto::Choice chosen(const lobatto::Scene& written, const lobatto::Scene& scene, const ChoiceRequest& request) {
     try {
-        return choose(std::move(derivation), scene, request);
+        return choose(written, scene, request);
     } catch (const Interrupted&) {
         throw ComputationError(scene.path + ": the search was ended; nothing was chosen");
     }
@@ -60,21 +58,20 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
                             "least {:.0e}",
                             error, Run::largest_error, Run::least_error));
         const lobatto::Scene written = scene.parts().scene;
-        refuse_clock(written, "tune");
-        refuse_constraints(written, "tune");
-        refuse_impacts(written, "tune");
+        refuse_jumps(written, "tune");
         lobatto::Scene changed = written;
         apply(overrides_of(settings), changed);
         ChoiceRequest request;
         request.error = error;
         request.seconds = budget;
+        request.tries_clocks = false;  // settings have no clock: the scene's own
         volatile int is_interrupted = 0;
         request.interrupted = &is_interrupted;
         if (progress)
             request.say = [&](const std::string& what) {
                 if (!progress(what)) is_interrupted = 1;
             };
-        const lobatto::Choice found = chosen(derive(written), changed, request);
+        const lobatto::Choice found = chosen(written, changed, request);
         Choice choice;
         choice.settings = settings_of(found, settings);
         choice.method = found.measurement.candidate.member.method().name();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
 namespace lobatto {
 
@@ -24,12 +25,25 @@ std::vector<Member> family_in(Precision precision, bool is_separable) {
     return members;
 }
 
+const char* word_of(StepClock clock) {
+    return clock == StepClock::none ? "none" : clock == StepClock::automatic ? "auto" : "scene";
+}
+
+StepClock step_clock_of(const std::string& word) {
+    for (const StepClock clock : {StepClock::none, StepClock::automatic, StepClock::of_scene})
+        if (word == word_of(clock)) return clock;
+    throw std::invalid_argument("no such clock");
+}
+
 std::string Candidate::name() const {
-    return fmt::format("{} {}{}",
+    return fmt::format("{} {}{}{}",
                        member.family == Family::lobatto ? "Lobatto"
                        : member.family == Family::gauss ? "Gauss"
                                                         : "Splitting",
-                       member.points, member.arithmetic == StepArithmetic::clean ? " clean" : "");
+                       member.points, member.arithmetic == StepArithmetic::clean ? " clean" : "",
+                       member.clock == StepClock::none        ? ""
+                       : member.clock == StepClock::automatic ? " clock auto"
+                                                              : " clock");
 }
 
 bool StepLadder::good(std::int64_t steps) const {

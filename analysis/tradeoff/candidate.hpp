@@ -13,18 +13,24 @@
 
 namespace lobatto {
 
+// The time in which steps are equally long.
+enum class StepClock { none, automatic, of_scene };
+const char* word_of(StepClock clock);              // "none", "auto", "scene"
+StepClock step_clock_of(const std::string& word);  // std::invalid_argument where it is none of these
+
 // A kernel: a member of the family in a number type.
 struct Member {
     Family family = Family::lobatto;
     int points = 4;
     Precision precision = Precision::double_;
     StepArithmetic arithmetic = StepArithmetic::plain;
+    StepClock clock = StepClock::none;
 
     Method method(double tolerance = 0) const { return {family, points, tolerance, arithmetic, precision}; }
     int order() const { return method().order(); }
     // Whether its steps are iterated to a tolerance; of linear systems nothing is, whatever the member.
     bool iterates() const { return family != Family::splitting && arithmetic == StepArithmetic::plain; }
-    auto key() const { return std::tuple(family, points, precision, arithmetic); }
+    auto key() const { return std::tuple(family, points, precision, arithmetic, clock); }
     friend bool operator==(const Member& a, const Member& b) { return a.key() == b.key(); }
     friend bool operator<(const Member& a, const Member& b) { return a.key() < b.key(); }
 };
@@ -51,16 +57,17 @@ std::vector<Member> family_in(Precision precision, bool is_separable);
 
 struct Candidate {
     Member member;
-    std::int64_t steps = 0;  // equal ones, to the end
+    std::int64_t steps = 0;  // equal ones, to the end; with a clock about so many (Experiment::span)
     double tolerance = 0;    // of the iteration; 0: to stagnation
 
     auto key() const { return std::tuple(member.key(), steps, tolerance); }
-    std::string name() const;  // "Lobatto 8", "Gauss 6 clean", "Splitting 11"
+    std::string name() const;  // "Lobatto 8", "Gauss 6 clean", "Lobatto 8 clock auto"
 };
 
 // Errors of states are relative to the amplitudes of the motion (Reference::scale), those of energies to its energy.
 struct Measurement {
     Candidate candidate;
+    double step = 0;             // in t, or the time of the clock
     bool complete = false;       // it reached the end
     double error_end = 0;        // of the state at the end
     double error = 0;            // the largest at the times that are compared

@@ -62,14 +62,15 @@ Found find_in(Experiment& experiment, const ChoiceRequest& request, Precision nu
 
 }  // namespace
 
-Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& request) {
+Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& request) {
     ExperimentRequest wish;
     wish.seconds = request.seconds;
     wish.wanted = reference_part * request.error;
     wish.first = first_guess(safety * request.error, 4, first_rung(request.error));
+    wish.tries_clocks = request.tries_clocks;
     wish.interrupted = request.interrupted;
     wish.say = request.say;
-    Experiment experiment(std::move(derivation), scene, wish);
+    Experiment experiment(written, scene, wish);
     const Reference& reference = experiment.reference();
     const double uncertainty = reference.disagreement.back();
     if (!(uncertainty <= least_part * request.error)) {
@@ -89,10 +90,12 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     Found best;
     double least = infinity;
     int members = 0;
+    bool is_rounding = false;  // in double, whatever the steps
     for (const Precision numbers : rungs) {
         if (!holds(numbers, request.error) || (members > 0 && experiment.left() < 0)) continue;
         best = find_in(experiment, request, numbers);
         members += best.search.members;
+        is_rounding = is_rounding || (numbers == Precision::double_ && best.search.is_rounding && !best.search.best);
         least = std::fmin(least, std::fmax(best.search.least_error, best.search.best ? best.error : 0));
         if (best.keeps(request.error)) break;
     }
@@ -102,8 +105,9 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
                 "nothing could be measured within {:.3g} s; give more time with --budget", request.seconds));
         throw ComputationError(fmt::format(
             "an error of {:.2g} to t = {:.6g} is not reached: {:.2g} is the least of the {} members of the family that "
-            "were tried{}. Ask for a larger error or an earlier end",
+            "were tried{}{}. Ask for a larger error or an earlier end",
             request.error, reference.until, least, members,
+            is_rounding ? "; it is rounding in double, which this motion makes so large" : "",
             experiment.left() > 0 && best.search.complete
                 ? ""
                 : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
@@ -118,7 +122,10 @@ Choice choose(Derivation derivation, const Scene& scene, const ChoiceRequest& re
     choice.reference = reference.first;
     choice.uncertainty = uncertainty;
     choice.frequency = reference.frequency;
-    choice.stability_limit = stability_limit(quadrature_of(candidate.member.method()));
+    const StepClock clock = candidate.member.clock;
+    const bool has_limit = clock == StepClock::none && scene.constraints.empty() && !scene.is_cut();
+    choice.stability_limit = has_limit ? stability_limit(quadrature_of(candidate.member.method())) : std::nan("");
+    if (clock != StepClock::none) choice.clock = clock == StepClock::automatic ? "auto" : scene.clock->text;
     choice.members = members;
     choice.complete = best.search.complete;
     choice.seconds = experiment.elapsed();

@@ -17,11 +17,17 @@ namespace lobatto {
 namespace {
 
 constexpr int few_coordinates = 10, some_coordinates = 20;
-constexpr double extended_reach = 3e-13;       // what two references in long double can be asked to agree to
-constexpr double reference_share = 0.4;        // of the seconds
-constexpr double quadruple_compilation = 2;    // in units of that in long double
-constexpr double longest_radians = 4;          // h omega of the coarsest steps tried; Lobatto's limits are near pi
-const std::string measurements_version = "3";  // of what is measured: older stores are begun anew
+constexpr double extended_reach = 3e-13;     // what two references in long double can be asked to agree to
+constexpr double reference_share = 0.4;      // of the seconds
+constexpr double quadruple_compilation = 2;  // in units of that in long double
+constexpr double longest_radians = 4;        // h omega of the coarsest steps tried; Lobatto's limits are near pi
+constexpr double clocked_radians = 6;        // likewise with a clock, omega that at the start
+constexpr double worth_a_clock = 2;          // between its largest and least rate
+constexpr int rate_looks = 60;
+constexpr double pilot_radians = 0.1;           // h omega of a pilot run
+constexpr int pilots = 6;                       // that are tried, with steps a quarter as long each
+constexpr std::int64_t longest_pilot = 200000;  // steps
+const std::string measurements_version = "4";   // of what is measured: older stores are begun anew
 
 // A run to the end of which nothing but error and time was asked.
 bool knows_errors_only(const Measurement& m) {
@@ -36,10 +42,16 @@ Member reference_member(const Scene& scene, double wanted) {
             n <= few_coordinates && wanted < extended_reach ? Precision::quadruple : Precision::extended};
 }
 
+// Of pilot runs, whose end is that of all candidates with this clock.
+Member pilot_member(StepClock clock) {
+    return {Family::lobatto, 8, Precision::double_, StepArithmetic::plain, clock};
+}
+
 // What is measured and on what machine: another text, other measurements.
 std::string subject_of(const Scene& scene, const KernelBuilder& kernel_builder, const Member& reference, double until) {
     std::string text =
         measurements_version + kernel_builder.digest(reference) + processor_identity() + exact_text(until);
+    if (scene.clock) text += " " + scene.clock->text;
     for (const auto* values : {&scene.initial_position, &scene.initial_rate})
         for (const GiNaC::ex& value : *values)
             text += " " + exact_text(scene.evaluate(value, "an initial value").to_double());
@@ -59,23 +71,26 @@ double end_of(const Scene& scene) {
     return until;
 }
 
-Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequest request)
+Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentRequest request)
     : began_(std::chrono::steady_clock::now()),
       scene_(scene),
       request_(std::move(request)),
       start_(scene),
-      kernels_(std::move(derivation)),
+      kernels_(written, request_.tries_clocks),
       conserves_(kernels_.derivation().conserves_energy()) {
     Member reference = reference_member(scene, request_.wanted);
     const double until = end_of(scene);
     kernels_.order(reference);
-    for (const Member& member : request_.first) kernels_.order(member);
+    for (const Member& member : request_.first)
+        if (kernels_.allows(member) && member.clock == StepClock::none) kernels_.order(member);
     if (!request_.store.empty())
         store_ = MeasurementStore(request_.store, subject_of(scene_, kernels_, reference, until));
     ReferenceRequest wish;
     wish.until = until;
     wish.wanted = request_.wanted;
     wish.groups = amplitude_groups(scene_);
+    wish.is_cut = scene_.is_cut();
+    wish.has_walls = !scene_.impacts.empty();
     wish.interrupted = request_.interrupted;
     const auto compute = [&](Precision precision) {
         reference.precision = precision;
@@ -97,13 +112,68 @@ Experiment::Experiment(Derivation derivation, const Scene& scene, ExperimentRequ
     // What rounding has grown to: with more digits, if there is the time.
     if (first == Precision::extended && reference_.disagreement.back() > request_.wanted && !reference_.is_late) {
         reference_.is_late = left() < quadruple_compilation * kernels_.compile_seconds(reference);
-        if (reference_.is_late) return;
         try {
-            compute(Precision::quadruple);
+            if (!reference_.is_late) compute(Precision::quadruple);
         } catch (const TooSlow&) {
             reference_.is_late = true;
         }
     }
+    for (const StepClock clock : kernels_.clocks())
+        if (clock == StepClock::automatic && !varies(clock)) kernels_.forget(clock);
+    for (const StepClock clock : kernels_.clocks()) kernels_.order(pilot_member(clock));
+    for (const StepClock clock : kernels_.clocks()) find_span(clock);
+}
+
+double Experiment::rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions) const {
+    const Scene& clocked = kernels_.derivation(clock).scene;
+    GiNaC::exmap values;
+    for (std::size_t k = 0; k < positions.size(); ++k) values[clocked.coordinates[k].position] = positions[k];
+    return scene_.evaluate(clocked.clock->rate.subs(values), "the clock").to_double();
+}
+
+// Whether it tells times apart: in a pole that the motion keeps away from, as that of a quaternion's length, it does
+// not.
+bool Experiment::varies(StepClock clock) const {
+    const std::size_t n = reference_.n;
+    double least = infinity, most = 0;
+    for (int look = 0; look <= rate_looks; ++look) {
+        const auto row = static_cast<std::size_t>(reference_.samples * look / rate_looks) * 2 * n;
+        std::vector<GiNaC::ex> positions;
+        for (std::size_t k = 0; k < n; ++k) positions.emplace_back(reference_.high[row + k]);
+        const double rate = rate_at(clock, positions);
+        least = std::fmin(least, rate);
+        most = std::fmax(most, rate);
+    }
+    return most > worth_a_clock * least;
+}
+
+// A clock in which the motion takes ever more steps is no choice.
+void Experiment::find_span(StepClock clock) {
+    request_.say("a first run with a clock");
+    const Kernel kernel = kernels_.kernel(pilot_member(clock));
+    const double rate = rate_at(clock, scene_.initial_position);
+    const double frequency = std::fmax(reference_.frequency_at_start, 1 / until());
+    double h = pilot_radians / (frequency * rate);
+    for (int pilot = 0; pilot < pilots; ++pilot, h /= 4) {
+        check_interruption();
+        const StartIn<double> in = start_in<double>(start_, kernel, h);
+        LoadedStepper<double> stepper(kernel);
+        lobatto_status status = stepper.prepare(in.parameters, h);
+        if (status == LOBATTO_OK) status = stepper.start(0, in.q, in.p);
+        lobatto_advance call{};
+        std::int64_t steps = 0;
+        while (status == LOBATTO_OK && call.steps_done == 0 && steps < longest_pilot) {
+            call.steps = 1;
+            call.interval = call.end = until();
+            status = stepper.advance(call);
+            steps += call.chain_steps;
+        }
+        if (status != LOBATTO_OK || call.steps_done == 0) continue;
+        measurer_->know_span(clock, h * static_cast<double>(steps));
+        radians_[clock] = h * static_cast<double>(steps) * frequency * rate;
+        return;
+    }
+    kernels_.forget(clock);
 }
 
 double Experiment::figure(const Measurement& measurement) const {
@@ -111,8 +181,9 @@ double Experiment::figure(const Measurement& measurement) const {
     return std::isfinite(measurement.energy_error) ? measurement.energy_error : 1 / measurement.reaches;
 }
 
-double Experiment::fewest_steps() const {
-    return std::max(1.0, until() * reference_.frequency / longest_radians);
+double Experiment::fewest_steps(StepClock clock) const {
+    return std::max(1.0, clock == StepClock::none ? until() * reference_.frequency / longest_radians
+                                                  : radians_.at(clock) / clocked_radians);
 }
 
 double Experiment::elapsed() const {
@@ -123,11 +194,12 @@ void Experiment::check_interruption() const {
     if (request_.interrupted != nullptr && *request_.interrupted != 0) throw Interrupted();
 }
 
-Measurement Experiment::measure(const Candidate& candidate, bool all) {
+Measurement Experiment::measure(const Candidate& candidate, bool all, double limit) {
     check_interruption();
     const Measurement* const known = store_.find(candidate);
     if (known != nullptr && !(all && knows_errors_only(*known))) return *known;
-    if (!knows_symmetries_ && candidate.member.precision == Precision::double_) {
+    if (!knows_symmetries_ && candidate.member.precision == Precision::double_ &&
+        candidate.member.clock == StepClock::none) {
         knows_symmetries_ = true;
         const Kernel kernel = kernels_.kernel(candidate.member);
         const double step = reference_.until / static_cast<double>(candidate.steps);
@@ -136,8 +208,9 @@ Measurement Experiment::measure(const Candidate& candidate, bool all) {
         for (const Coordinate& coordinate : scene_.coordinates) names.push_back(coordinate.name);
         measurer_->know_symmetries(find_symmetries(kernel, start.parameters, start.q, step, names));
     }
-    Measurement measurement = measurer_->measure(kernels_.kernel(candidate.member), candidate, all);
+    Measurement measurement = measurer_->measure(kernels_.kernel(candidate.member), candidate, all, limit);
     measurement.compile_seconds = kernels_.compile_seconds(candidate.member);
+    if (!measurement.complete && measurement.seconds >= limit) return measurement;
     return store_.add(measurement);
 }
 

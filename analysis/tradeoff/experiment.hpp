@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -21,16 +22,17 @@ struct ExperimentRequest {
     double seconds = 20;        // of wall time
     double wanted = 1e-18;      // the disagreement of the two references that is good enough
     std::string store;          // its file; empty: none
-    std::vector<Member> first;  // kernels that will be needed whatever is found
+    std::vector<Member> first;  // kernels that will be needed whatever is found, those that the scene allows
+    bool tries_clocks = true;   // beside the scene's own steps: equal ones, and clock = "auto"
     const volatile int* interrupted = nullptr;
     std::function<void(const std::string&)> say = [](const std::string&) {};  // what is being done
 };
 
 class Experiment {
 public:
-    // `derivation` of the scene as written, which one kernel serves; `scene` with what the command line replaces.
+    // `written`: the scene as its file has it, which one kernel serves; `scene` with what the command line replaces.
     // Computes the reference. Throws as its parts do; InputError when there is no time to integrate over.
-    Experiment(Derivation derivation, const Scene& scene, ExperimentRequest request);
+    Experiment(const Scene& written, const Scene& scene, ExperimentRequest request);
 
     const Scene& scene() const { return scene_; }
     const Reference& reference() const { return reference_; }
@@ -51,18 +53,26 @@ public:
     double until() const { return reference_.until; }
     // The numbers of steps that are tried, and the least of them.
     StepLadder ladder(double ratio) const { return {reference_.samples, ratio}; }
-    double fewest_steps() const;
+    double fewest_steps(StepClock clock) const;
+    // What the steps of a candidate divide: the end, and with a clock about the end in its time. It is a convention,
+    // the same for all members: the end of a pilot run. Candidates take their steps until they are there.
+    double span(StepClock clock) const { return measurer_->span(clock); }
     double elapsed() const;
     double left() const { return request_.seconds - elapsed(); }
     // Throws Interrupted when the flag is raised.
     void check_interruption() const;
 
-    // From the store, or measured now, everything or error and time only.
-    Measurement measure(const Candidate& candidate, bool all = true);
+    // From the store, or measured now, everything or error and time only. What takes longer than `limit` is left, and
+    // not stored.
+    Measurement measure(const Candidate& candidate, bool all = true, double limit = infinity);
     // Times it again, `repetitions` times, and keeps the least.
     Measurement time_again(const Measurement& measurement, int repetitions);
 
 private:
+    double rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions) const;
+    bool varies(StepClock clock) const;
+    void find_span(StepClock clock);
+
     std::chrono::steady_clock::time_point began_;
     Scene scene_;
     ExperimentRequest request_;
@@ -72,6 +82,7 @@ private:
     Reference reference_;
     std::optional<Measurer> measurer_;
     MeasurementStore store_;
+    std::map<StepClock, double> radians_;  // that the fastest oscillation at the start would take to the end
     bool knows_symmetries_ = false;
 };
 

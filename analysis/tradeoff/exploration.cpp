@@ -27,29 +27,36 @@ std::vector<Measurement> pareto_front(const Experiment& experiment) {
 namespace {
 
 // Members in the order in which they are looked at: first those far apart, then between them.
-std::vector<Member> tour(bool is_separable) {
+std::vector<Member> tour() {
     std::vector<Member> members;
+    const auto add_clocked = [&](Family family, int points) {
+        for (const StepClock clock : {StepClock::automatic, StepClock::of_scene})
+            members.push_back({family, points, Precision::double_, StepArithmetic::plain, clock});
+    };
     const auto add = [&](Family family, Precision precision, std::initializer_list<int> points) {
         for (const int count : points) members.push_back({family, count, precision});
     };
     add(Family::lobatto, Precision::double_, {8, 4});
+    add_clocked(Family::lobatto, 8);
     add(Family::gauss, Precision::double_, {6});
     add(Family::lobatto, Precision::double_, {12, 2});
+    add_clocked(Family::lobatto, 12);
     add(Family::gauss, Precision::double_, {10});
     add(Family::lobatto, Precision::double_, {6, 10});
+    add_clocked(Family::lobatto, 10);
+    add_clocked(Family::gauss, 8);
+    add_clocked(Family::lobatto, 5);
     add(Family::lobatto, Precision::single, {6});
     add(Family::gauss, Precision::double_, {3, 1});
     add(Family::lobatto, Precision::double_double, {12});
     add(Family::lobatto, Precision::quadruple, {12});  // the reference's own kernel
     add(Family::lobatto, Precision::extended, {12});
-    if (is_separable) {
-        add(Family::splitting, Precision::double_, {11, 17});
-        for (const int count : {8, 12})
-            members.push_back({Family::lobatto, count, Precision::double_, StepArithmetic::clean});
-    }
+    add(Family::splitting, Precision::double_, {11, 17});
+    for (const int count : {8, 12})
+        members.push_back({Family::lobatto, count, Precision::double_, StepArithmetic::clean});
     add(Family::lobatto, Precision::double_, {5, 3, 9, 7, 11});
     add(Family::gauss, Precision::double_, {8, 4, 2, 5, 7, 9});
-    if (is_separable) add(Family::splitting, Precision::double_, {6, 14, 35});
+    add(Family::splitting, Precision::double_, {6, 14, 35});
     add(Family::lobatto, Precision::single, {4, 8});
     add(Family::lobatto, Precision::extended, {9});
     add(Family::lobatto, Precision::double_double, {10});
@@ -78,11 +85,11 @@ void work_on(Experiment& experiment, const Scan& scan, double reserve) {
     const double longest_run = experiment.request().seconds / 40;
     double least = infinity;
     int no_better = 0, dominated = 0;
-    for (std::int64_t steps = ladder.at_least(experiment.fewest_steps());
+    for (std::int64_t steps = ladder.at_least(experiment.fewest_steps(scan.member.clock));
          static_cast<double>(steps) < most_steps && (experiment.left() > reserve || !std::isfinite(least));
          steps = ladder.next(steps)) {
-        const Measurement m = experiment.measure({scan.member, steps, scan.tolerance});
-        if (m.seconds > longest_run) return;
+        const Measurement m = experiment.measure({scan.member, steps, scan.tolerance}, true, longest_run);
+        if (m.seconds >= longest_run) return;
         if (!m.complete) continue;
         const double figure = experiment.figure(m);
         no_better = figure > 0.7 * least ? no_better + 1 : 0;
@@ -117,15 +124,18 @@ std::optional<Scan> refinement(const Experiment& experiment, const std::set<Scan
 }  // namespace
 
 std::vector<Member> first_of_tour() {
-    const std::vector<Member> members = tour(false);
-    return {members.begin(), members.begin() + 4};
+    const std::vector<Member> members = tour();
+    return {members.begin(), members.begin() + 6};
 }
 
 void explore(Experiment& experiment) {
     KernelBuilder& kernel_builder = experiment.kernel_builder();
     const double all = experiment.request().seconds, reserve = 0.12 * all;
     double last_order = 0.25 * all;  // what is ordered later would not be used
-    std::vector<Member> waiting = tour(experiment.derivation().system.separable);
+    std::vector<Member> waiting = tour();
+    waiting.erase(std::remove_if(waiting.begin(), waiting.end(),
+                                 [&](const Member& member) { return !kernel_builder.allows(member); }),
+                  waiting.end());
     std::set<Scan> done;
     const auto name = [](const Member& member) {
         return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));

@@ -4,11 +4,49 @@
 #include <algorithm>
 
 #include "analysis/kernel_of.hpp"
+#include "generator/mechanics/automatic_clock.hpp"
 #include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
 
 namespace lobatto {
 
-KernelBuilder::KernelBuilder(Derivation derivation) : derivation_(std::move(derivation)) {
+namespace {
+
+Scene with_equal_steps(Scene scene) {
+    scene.clock.reset();
+    scene.outputs.interval = 0;
+    return scene;
+}
+
+// Nothing where there is none, or it is not positive at the start.
+std::optional<Derivation> with_automatic_clock(Scene scene) {
+    if (!has_automatic_clock(scene)) return std::nullopt;
+    scene.clock = Clock();
+    scene.clock->text = word_of(StepClock::automatic);
+    scene.clock->is_automatic = true;
+    try {
+        return derive(scene);
+    } catch (const InputError&) {
+        return std::nullopt;
+    }
+}
+
+}  // namespace
+
+KernelBuilder::KernelBuilder(const Scene& scene, bool tries_clocks) {
+    const StepClock own = !scene.clock                ? StepClock::none
+                          : scene.clock->is_automatic ? StepClock::automatic
+                                                      : StepClock::of_scene;
+    if (own != StepClock::none) derivations_.emplace(own, derive(scene));
+    const Scene equal = with_equal_steps(scene);
+    derivations_.emplace(StepClock::none, derive(equal));
+    allowed_ = {own};
+    if (tries_clocks) {
+        allowed_.insert(StepClock::none);
+        if (std::optional<Derivation> automatic;
+            own != StepClock::automatic && (automatic = with_automatic_clock(equal)))
+            allowed_.insert(derivations_.emplace(StepClock::automatic, std::move(*automatic)).first->first);
+    }
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
         workers_.emplace_back([this] { work(); });
 }
@@ -36,7 +74,7 @@ void KernelBuilder::order(const Member& member) {
     if (is_ordered(member)) return;
     EmitOptions options;
     options.precision = member.precision;
-    const KernelSource source = emit(with_method(derivation_, member.method()), options);
+    const KernelSource source = emit(with_method(derivation(member.clock), member.method()), options);
     Item item;
     item.digest = source.digest;
     item.translation = translation_of(source, member.precision);
@@ -45,6 +83,22 @@ void KernelBuilder::order(const Member& member) {
         queue_.push_back(&items_.emplace(member, std::move(item)).first->second);
     }
     ordered_.notify_one();
+}
+
+bool KernelBuilder::allows(const Member& member) const {
+    if (allowed_.count(member.clock) == 0 || !reason_against_numbers(member.method()).empty()) return false;
+    if (member.clock != StepClock::none && member.precision != Precision::double_)
+        return false;  // nor does lobatto run
+    const Derivation& scene = derivation(member.clock);
+    if (!scene.scene.constraints.empty() && member.family != Family::lobatto) return false;
+    const bool is_general = member.family != Family::splitting && member.arithmetic == StepArithmetic::plain;
+    return is_general || (scene.system.separable && member.clock == StepClock::none && !scene.scene.is_cut());
+}
+
+std::vector<StepClock> KernelBuilder::clocks() const {
+    std::vector<StepClock> clocks(allowed_.begin(), allowed_.end());
+    clocks.erase(std::remove(clocks.begin(), clocks.end(), StepClock::none), clocks.end());
+    return clocks;
 }
 
 bool KernelBuilder::is_ready(const Member& member) const {

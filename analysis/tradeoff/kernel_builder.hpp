@@ -9,7 +9,9 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <thread>
+#include <vector>
 
 #include "analysis/tradeoff/candidate.hpp"
 #include "generator/mechanics/derivation.hpp"
@@ -21,12 +23,17 @@ namespace lobatto {
 // For one thread; the compilers have their own.
 class KernelBuilder {
 public:
-    explicit KernelBuilder(Derivation derivation);
+    // The kernels that serve a scene; `tries_clocks`: with clocks that it does not have, and without the one it has.
+    KernelBuilder(const Scene& scene, bool tries_clocks);
     ~KernelBuilder();  // ends the compilers at work
     KernelBuilder(const KernelBuilder&) = delete;
     KernelBuilder& operator=(const KernelBuilder&) = delete;
 
-    const Derivation& derivation() const { return derivation_; }
+    const Derivation& derivation(StepClock clock = StepClock::none) const { return derivations_.at(clock); }
+    // Whether steps of the scene may be by this member; equal ones by it may serve references all the same.
+    bool allows(const Member& member) const;
+    std::vector<StepClock> clocks() const;  // that it allows, but none
+    void forget(StepClock clock) { allowed_.erase(clock); }
     unsigned threads() const { return static_cast<unsigned>(workers_.size()); }
 
     // Writes the kernel and hands it to a compiler, unless that has been done.
@@ -51,7 +58,8 @@ private:
     };
     void work();
 
-    Derivation derivation_;
+    std::map<StepClock, Derivation> derivations_;
+    std::set<StepClock> allowed_;
     std::map<Member, Item> items_;
     std::deque<Item*> queue_;
     mutable std::mutex mutex_;

@@ -40,7 +40,9 @@ nlohmann::ordered_json json_of(const Measurement& measurement) {
                                    {"points", candidate.member.points},
                                    {"precision", precision_name(candidate.member.precision)},
                                    {"arithmetic", arithmetic_name(candidate.member)},
+                                   {"clock", word_of(candidate.member.clock)},
                                    {"steps", candidate.steps},
+                                   {"step", measurement.step},
                                    {"tolerance", candidate.tolerance},
                                    {"complete", measurement.complete}};
     for (const auto& [name, member] : columns) {
@@ -62,7 +64,9 @@ Measurement measurement_of(const nlohmann::json& json) {
     if (!precision) throw std::invalid_argument("numbers there are not");
     candidate.member.precision = *precision;
     if (json.at("arithmetic") == "clean") candidate.member.arithmetic = StepArithmetic::clean;
+    candidate.member.clock = step_clock_of(json.at("clock"));
     candidate.steps = json.at("steps");
+    measurement.step = json.at("step");
     candidate.tolerance = json.at("tolerance");
     measurement.complete = json.at("complete");
     for (const auto& [name, member] : columns)
@@ -71,19 +75,18 @@ Measurement measurement_of(const nlohmann::json& json) {
 }
 
 std::string csv_header() {
-    std::string text = "family,points,precision,arithmetic,steps,step,tolerance,complete";
+    std::string text = "family,points,precision,arithmetic,clock,steps,step,tolerance,complete";
     for (const auto& [name, member] : columns) text += fmt::format(",{}", name);
     return text + '\n';
 }
 
-std::string csv_row(const Measurement& measurement, double until) {
+std::string csv_row(const Measurement& measurement) {
     const Candidate& candidate = measurement.candidate;
-    std::string text = fmt::format("{},{},{},{},{},{},{},{}", word_of(candidate.member.family), candidate.member.points,
-                                   precision_name(candidate.member.precision), arithmetic_name(candidate.member),
-                                   candidate.steps, exact_text(until / static_cast<double>(candidate.steps)),
-                                   exact_text(candidate.tolerance), measurement.complete ? 1 : 0);
+    std::string text = fmt::format(
+        "{},{},{},{},{},{},{},{},{}", word_of(candidate.member.family), candidate.member.points,
+        precision_name(candidate.member.precision), arithmetic_name(candidate.member), word_of(candidate.member.clock),
+        candidate.steps, exact_text(measurement.step), exact_text(candidate.tolerance), measurement.complete ? 1 : 0);
     for (const auto& [name, member] : columns)
-
         text += "," + (std::isfinite(measurement.*member) ? exact_text(measurement.*member) : std::string());
     return text + '\n';
 }

@@ -13,6 +13,6 @@ nlohmann::ordered_json json_of(const Measurement& measurement);
 Measurement measurement_of(const nlohmann::json& json);  // throws nlohmann::json::exception
 
 std::string csv_header();
-std::string csv_row(const Measurement& measurement, double until);
+std::string csv_row(const Measurement& measurement);
 
 }  // namespace lobatto

@@ -30,57 +30,104 @@ double processor_seconds() {
     return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// A run of the kernel with records at the samples, in blocks so that it can be interrupted.
+// A run of the kernel with records at the samples, in blocks so that it can be interrupted. With a clock the samples
+// are arrivals, beside the chain of its steps.
 template <class real>
 struct TimedRun {
     LoadedStepper<real> stepper;
     StartIn<real> start;
+    double until;
     real h;
     std::vector<real> rows;  // meetings x (1 + 2n)
     std::int64_t meetings, every;
-    double seconds = 0;
+    double seconds = 0, took = 0;  // of processor time, all calls and the last
     std::int64_t steps = 0, iterations = 0;
     lobatto_status status = LOBATTO_OK;
 
-    TimedRun(const Kernel& kernel, const ExactStart& exact, const Candidate& candidate, double until, int samples)
+    TimedRun(const Kernel& kernel, const ExactStart& exact, const Candidate& candidate, const Measurer& measurer,
+             double end, int samples)
         : stepper(kernel),
-          h(static_cast<real>(until) / static_cast<real>(candidate.steps)),
+          until(end),
+          h(step_of(candidate, measurer.span(candidate.member.clock))),
           meetings(std::gcd(candidate.steps, std::int64_t(samples))),
           every(candidate.steps / meetings) {
         start = start_in<real>(exact, kernel, h);
-        rows.resize(static_cast<std::size_t>(meetings) * (1 + 2 * start.q.size()));
+        rows.resize(static_cast<std::size_t>(meetings) * columns());
     }
 
-    void go(const Candidate& candidate, const volatile int* interrupted) {
-        const std::size_t columns = 1 + 2 * start.q.size();
+    // With a clock a double, as scenes are given it.
+    static real step_of(const Candidate& candidate, double span) {
+        if (candidate.member.clock != StepClock::none)
+            return static_cast<real>(span / static_cast<double>(candidate.steps));
+        return static_cast<real>(span) / static_cast<real>(candidate.steps);
+    }
+    std::size_t columns() const { return 1 + 2 * start.q.size(); }
+
+    bool begin() {
         seconds = 0;
         steps = iterations = 0;
         status = stepper.prepare(start.parameters, h);
         if (status == LOBATTO_OK) status = stepper.start(0, start.q, start.p);
-        std::int64_t written = 0, block = std::min<std::int64_t>(candidate.steps, 4096);
-        while (status == LOBATTO_OK && steps < candidate.steps) {
-            if (interrupted != nullptr && *interrupted != 0) throw Interrupted();
+        return status == LOBATTO_OK;
+    }
+
+    // As far as the call comes; whether all is well.
+    bool advance(lobatto_advance& call, const volatile int* interrupted) {
+        if (interrupted != nullptr && *interrupted != 0) throw Interrupted();
+        const double began = processor_seconds();
+        status = stepper.advance(call);
+        took = processor_seconds() - began;
+        seconds += took;
+        steps += stepper.kernel()->clocked != 0 ? call.chain_steps : call.steps_done;
+        iterations += call.iterations;
+        return status == LOBATTO_OK;
+    }
+
+    void go(const Candidate& candidate, const volatile int* interrupted, double limit) {
+        const bool is_clocked = candidate.member.clock != StepClock::none;
+        const std::int64_t all = is_clocked ? meetings : candidate.steps;
+        std::int64_t done = 0, written = 0, block = std::min<std::int64_t>(all, 4096);
+        for (begin(); status == LOBATTO_OK && done < all && seconds < limit;) {
             lobatto_advance call{};
-            call.steps = std::min(block, candidate.steps - steps);
+            call.steps = std::min(block, all - done);
             call.tolerance = candidate.tolerance;
-            call.record_every = every;
-            call.records = rows.data() + static_cast<std::size_t>(written) * columns;
+            call.record_every = is_clocked ? 1 : every;
+            call.interval = until / static_cast<double>(meetings);
+            call.end = until;
+            call.records = rows.data() + static_cast<std::size_t>(written) * columns();
             call.capacity = meetings - written + 1;
-            const double began = processor_seconds();
-            status = stepper.advance(call);
-            const double took = processor_seconds() - began;
-            seconds += took;
-            steps += call.steps_done;
-            iterations += call.iterations;
+            advance(call, interrupted);
+            done += call.steps_done;
             written += call.records_written;
             if (took < block_seconds / 4) block *= 2;
         }
         if (written < meetings && status == LOBATTO_OK) status = LOBATTO_NOT_FINITE;
     }
 
+    // Every step of a chain, and the end.
+    void go_along_chain(const Candidate& candidate, const volatile int* interrupted) {
+        constexpr std::int64_t room = 4096;
+        rows.clear();
+        bool has_arrived = false;
+        for (begin(); status == LOBATTO_OK && !has_arrived;) {
+            const std::size_t size = rows.size();
+            rows.resize(size + room * columns());
+            lobatto_advance call{};
+            call.steps = call.record_every = call.chain_records = 1;
+            call.tolerance = candidate.tolerance;
+            call.interval = call.end = until;
+            call.records = rows.data() + size;
+            call.capacity = room;
+            advance(call, interrupted);
+            has_arrived = call.steps_done == 1;
+            rows.resize(size + static_cast<std::size_t>(call.records_written) * columns());
+        }
+        meetings = static_cast<std::int64_t>(rows.size() / columns());
+    }
+
     // Where it was at a meeting; 0: at the start.
-    double time(std::int64_t meeting, const Reference& reference) const {
-        return reference.until * static_cast<double>(meeting) / static_cast<double>(meetings);
+    double time(std::int64_t meeting) const {
+        return until * static_cast<double>(meeting) / static_cast<double>(meetings);
     }
     template <class Wide>
     std::vector<Wide> positions(std::int64_t meeting) const {
@@ -95,7 +142,7 @@ private:
     template <class Wide>
     std::vector<Wide> part(std::int64_t meeting, std::size_t number) const {
         const std::size_t n = start.q.size();
-        const real* const first = rows.data() + static_cast<std::size_t>(meeting - 1) * (1 + 2 * n) + 1 + number * n;
+        const real* const first = rows.data() + static_cast<std::size_t>(meeting - 1) * columns() + 1 + number * n;
         return std::vector<Wide>(first, first + n);
     }
 };
@@ -118,14 +165,14 @@ template <class real>
 void compare_with_reference(const TimedRun<real>& run, const Reference& reference, Measurement& result,
                             Measurer::Course* course) {
     using Wide = std::conditional_t<std::is_same_v<real, float>, double, real>;
-    const std::size_t n = reference.n, columns = 1 + 2 * n;
+    const std::size_t n = reference.n;
     const auto error_at = [&](std::int64_t meeting) {
-        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
+        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * run.columns() + 1;
         const auto sample = static_cast<std::size_t>(meeting * reference.samples / run.meetings);
         const double* const high = reference.high.data() + sample * 2 * n;
         const double* const low = reference.low.data() + sample * 2 * n;
         double worst = 0;
-        for (std::size_t k = 0; k < 2 * n; ++k) {
+        for (std::size_t k = 0; k < reference.compared; ++k) {
             const Wide difference =
                 (static_cast<Wide>(row[k]) - static_cast<Wide>(high[k])) - static_cast<Wide>(low[k]);
             const double error = std::fabs(static_cast<double>(difference)) / reference.scale[k];
@@ -141,10 +188,10 @@ void compare_with_reference(const TimedRun<real>& run, const Reference& referenc
         result.error_end = error;
         if (!is_lost && !(error < lost)) {
             is_lost = true;
-            result.reaches = run.time(meeting - 1, reference);
+            result.reaches = run.time(meeting - 1);
         }
         if (course != nullptr) {
-            course->time.push_back(run.time(meeting, reference));
+            course->time.push_back(run.time(meeting));
             course->error.push_back(error);
         }
     }
@@ -163,7 +210,7 @@ void look_at_energy(const TimedRun<real>& run, const Reference& reference, const
     Exact first = 0;
     const std::int64_t every = std::max<std::int64_t>(1, run.meetings / (course != nullptr ? run.meetings : energies));
     for (std::int64_t meeting = 0; meeting <= run.meetings; meeting += every) {
-        const double time = run.time(meeting, reference);
+        const double time = run.time(meeting);
         Exact energy = 0;
         if (stepper.energy(static_cast<Exact>(time), run.template positions<Exact>(meeting),
                            run.template momenta<Exact>(meeting), energy) != LOBATTO_OK)
@@ -215,22 +262,28 @@ Measurer::Measurer(const Reference& reference, const ExactStart& start, Kernel e
       interrupted_(interrupted) {}
 
 template <class real>
-Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidate, bool all, Course* course) const {
-    TimedRun<real> run(kernel, start_, candidate, reference_.until, reference_.samples);
-    run.go(candidate, interrupted_);
+Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidate, bool all, double limit,
+                                 Course* course) const {
+    TimedRun<real> run(kernel, start_, candidate, *this, reference_.until, reference_.samples);
+    run.go(candidate, interrupted_, limit);
     Measurement result;
     result.candidate = candidate;
+    result.step = static_cast<double>(run.h);
     result.complete = run.status == LOBATTO_OK;
     result.seconds = run.seconds;
     if (!result.complete) return result;
     compare_with_reference(run, reference_, result, course);
-    result.iterations = static_cast<double>(run.iterations) / static_cast<double>(run.steps);
-    result.gradients =
-        gradients_of(kernel.table(), static_cast<double>(run.iterations), static_cast<double>(run.steps));
+    const Timing chain = candidate.member.clock == StepClock::none  // else arrivals took steps of their own
+                             ? Timing{true, run.seconds, run.steps, run.iterations}
+                             : time_in<real>(kernel, candidate);
+    result.seconds = chain.seconds;
+    const auto iterations = static_cast<double>(chain.iterations), steps = static_cast<double>(chain.steps);
+    result.iterations = iterations / steps;
+    result.gradients = gradients_of(kernel.table(), iterations, steps);
     result.energy_error = result.drift = result.momentum_error = result.defect = std::nan("");
     if (!all || !result.complete) return result;
 
-    double spent = run.seconds;
+    double spent = chain.seconds;
     for (int repetition = 0; repetition < most_repetitions && spent < timing_seconds; ++repetition) {
         const Timing again = time_in<real>(kernel, candidate);
         result.seconds = std::min(result.seconds, again.seconds);
@@ -252,39 +305,67 @@ Measurement Measurer::measure_in(const Kernel& kernel, const Candidate& candidat
 
 template <class real>
 Timing Measurer::time_in(const Kernel& kernel, const Candidate& candidate) const {
-    TimedRun<real> run(kernel, start_, candidate, reference_.until, reference_.samples);
-    run.go(candidate, interrupted_);
-    return {run.status == LOBATTO_OK, run.seconds};
+    TimedRun<real> run(kernel, start_, candidate, *this, reference_.until, 1);
+    run.go(candidate, interrupted_, std::numeric_limits<double>::infinity());
+    return {run.status == LOBATTO_OK, run.seconds, run.steps, run.iterations};
 }
 
 template <class real, class Exact>
 double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candidate) const {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    TimedRun<real> run(kernel, start_, candidate, reference_.until, 1);
-    run.every = std::max<std::int64_t>(1, candidate.steps / looks);
-    run.meetings = candidate.steps / run.every;
-    const std::size_t n = reference_.n, columns = 1 + 2 * n;
-    run.rows.resize(static_cast<std::size_t>(run.meetings) * columns);
-    run.go(candidate, interrupted_);
+    TimedRun<real> run(kernel, start_, candidate, *this, reference_.until, 1);
+    const bool is_clocked = candidate.member.clock != StepClock::none;
+    std::int64_t stride = 1;  // of the rows
+    if (is_clocked) {
+        run.go_along_chain(candidate, interrupted_);
+        stride = std::max<std::int64_t>(1, run.meetings / looks);
+    } else {
+        run.every = std::max<std::int64_t>(1, candidate.steps / looks);
+        run.meetings = candidate.steps / run.every;
+        run.rows.resize(static_cast<std::size_t>(run.meetings) * run.columns());
+        run.go(candidate, interrupted_, infinity);
+    }
     if (run.status != LOBATTO_OK) return infinity;
 
     const auto until = static_cast<Exact>(reference_.until);
-    const StartIn<Exact> start = start_in<Exact>(start_, exact_, until);
+    // Where steps are cut, steps that are parts of the candidate's; else by extrapolation.
+    const std::int64_t parts = (reference_.steps + candidate.steps - 1) / candidate.steps;
+    const bool is_cut = parts > 0;
+    const Exact step = is_cut ? until / static_cast<Exact>(candidate.steps * parts) : until;
+    const StartIn<Exact> start = start_in<Exact>(start_, exact_, step);
     LoadedStepper<Exact> stepper(exact_);
-    stepper.prepare(start.parameters, until);
+    stepper.prepare(start.parameters, step);
+    if (is_cut && stepper.start(0, start.q, start.p) != LOBATTO_OK) return infinity;
     const double tolerance = std::is_same_v<Exact, __float128> ? 100 * reference_.tolerance : reference_.tolerance;
     Extrapolation<Exact> way(stepper, std::vector<Exact>(reference_.scale.begin(), reference_.scale.end()),
                              static_cast<Exact>(tolerance));
     way.start(0, start.q, start.p);
+    std::vector<Exact> there, p;
+    const auto go_on = [&](Exact time) {
+        if (!is_cut) {
+            const bool arrives = way.advance_to(time);
+            there = way.state();
+            return arrives;
+        }
+        lobatto_advance call{};
+        call.steps = parts * run.every;
+        Exact now;
+        if (stepper.advance(call) != LOBATTO_OK || call.steps_done != call.steps) return false;
+        stepper.state(now, there, p);
+        there.insert(there.end(), p.begin(), p.end());
+        return true;
+    };
     double worst = 0;
-    for (std::int64_t meeting = 1; meeting <= run.meetings; ++meeting) {
+    for (std::int64_t meeting = 1 + (run.meetings - 1) % stride; meeting <= run.meetings; meeting += stride) {
         if (interrupted_ != nullptr && *interrupted_ != 0) throw Interrupted();
-        if (!way.advance_to(until * static_cast<Exact>(meeting * run.every) / static_cast<Exact>(candidate.steps)))
-            return infinity;
-        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * columns + 1;
-        for (std::size_t k = 0; k < 2 * n; ++k) {
+        const real* const row = run.rows.data() + static_cast<std::size_t>(meeting - 1) * run.columns() + 1;
+        const Exact time = is_clocked
+                               ? static_cast<Exact>(row[-1])
+                               : until * static_cast<Exact>(meeting * run.every) / static_cast<Exact>(candidate.steps);
+        if (!go_on(time)) return infinity;
+        for (std::size_t k = 0; k < reference_.compared; ++k) {
             const double error =
-                std::fabs(static_cast<double>(static_cast<Exact>(row[k]) - way.state()[k])) / reference_.scale[k];
+                std::fabs(static_cast<double>(static_cast<Exact>(row[k]) - there[k])) / reference_.scale[k];
             if (!(error <= worst)) worst = error;
         }
     }
@@ -299,9 +380,9 @@ double Measurer::error_on_steps(const Kernel& kernel, const Candidate& candidate
     });
 }
 
-Measurement Measurer::measure(const Kernel& kernel, const Candidate& candidate, bool all) const {
+Measurement Measurer::measure(const Kernel& kernel, const Candidate& candidate, bool all, double limit) const {
     return with_type_of(candidate.member.precision,
-                        [&](auto type) { return measure_in<decltype(type)>(kernel, candidate, all, nullptr); });
+                        [&](auto type) { return measure_in<decltype(type)>(kernel, candidate, all, limit, nullptr); });
 }
 
 Timing Measurer::time_once(const Kernel& kernel, const Candidate& candidate) const {
@@ -311,8 +392,10 @@ Timing Measurer::time_once(const Kernel& kernel, const Candidate& candidate) con
 
 Measurer::Course Measurer::course(const Kernel& kernel, const Candidate& candidate) const {
     Course course;
-    with_type_of(candidate.member.precision,
-                 [&](auto type) { return measure_in<decltype(type)>(kernel, candidate, true, &course); });
+    with_type_of(candidate.member.precision, [&](auto type) {
+        constexpr double endless = std::numeric_limits<double>::infinity();
+        return measure_in<decltype(type)>(kernel, candidate, true, endless, &course);
+    });
     return course;
 }
 

@@ -2,6 +2,8 @@
 // A candidate, run and compared with the reference.
 #pragma once
 
+#include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -18,6 +20,7 @@ namespace lobatto {
 struct Timing {
     bool complete = false;
     double seconds = 0;  // of processor time
+    std::int64_t steps = 0, iterations = 0;
 };
 
 class Measurer {
@@ -27,8 +30,14 @@ public:
     Measurer(const Reference& reference, const ExactStart& start, Kernel exact, bool conserves,
              const volatile int* interrupted);
 
-    // Errors and time. With `all` also energy, momenta, drift and defect, which take a moment longer.
-    Measurement measure(const Kernel& kernel, const Candidate& candidate, bool all) const;
+    // What the steps of candidates with this clock divide; the end itself without one (Experiment::span).
+    void know_span(StepClock clock, double span) { spans_[clock] = span; }
+    double span(StepClock clock) const { return clock == StepClock::none ? reference_.until : spans_.at(clock); }
+
+    // Errors and time. With `all` also energy, momenta, drift and defect, which take a moment longer. A run is left,
+    // incomplete, after `limit` seconds.
+    Measurement measure(const Kernel& kernel, const Candidate& candidate, bool all,
+                        double limit = std::numeric_limits<double>::infinity()) const;
     // The largest error at the candidate's own steps, some 1500 of them, against explicit extrapolation that lands on
     // each; infinite when either fails. Between the samples of the reference the error may be larger than at them.
     double error_on_steps(const Kernel& kernel, const Candidate& candidate) const;
@@ -44,7 +53,8 @@ public:
 
 private:
     template <class real>
-    Measurement measure_in(const Kernel& kernel, const Candidate& candidate, bool all, Course* course) const;
+    Measurement measure_in(const Kernel& kernel, const Candidate& candidate, bool all, double limit,
+                           Course* course) const;
     template <class real, class Exact>
     double error_on_steps_in(const Kernel& kernel, const Candidate& candidate) const;
     template <class real>
@@ -57,6 +67,7 @@ private:
     bool conserves_;
     const volatile int* interrupted_;
     std::vector<Symmetry> symmetries_;
+    std::map<StepClock, double> spans_;
 };
 
 }  // namespace lobatto

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <regex>
 #include <vector>
@@ -22,6 +23,7 @@ std::vector<std::string> method_lines(const Choice& choice) {
     if (candidate.member.arithmetic == StepArithmetic::clean) lines.push_back("arithmetic = \"clean\"");
     if (candidate.member.precision != Precision::double_)
         lines.push_back("numbers = \"" + precision_name(candidate.member.precision) + '"');
+    if (!choice.clock.empty()) lines.push_back("clock = \"" + choice.clock + '"');
     if (candidate.tolerance > 0) lines.push_back("tolerance = " + exact_text(candidate.tolerance));
     return lines;
 }
@@ -63,6 +65,13 @@ std::vector<Line> lines_of(const std::string& text) {
     return lines;
 }
 
+bool sets_output(const std::string& text, const std::vector<std::string>& keys) {
+    const std::vector<Line> lines = lines_of(text);
+    return std::any_of(lines.begin(), lines.end(), [&](const Line& line) {
+        return line.table == "output" && std::find(keys.begin(), keys.end(), line.key) != keys.end();
+    });
+}
+
 }  // namespace
 
 std::string method_text(const Choice& choice) {
@@ -73,6 +82,9 @@ std::string method_text(const Choice& choice) {
 
 std::string stability_text(const Choice& choice) {
     const double radians = choice.step() * choice.frequency;
+    if (std::isnan(choice.stability_limit))
+        return choice.clock.empty() ? "no linear limit is known with constraints or walls"
+                                    : "no linear limit is known with a clock";
     if (!std::isfinite(choice.stability_limit)) return fmt::format("h omega = {:.3g}, stable for every step", radians);
     return fmt::format("h omega = {:.3g} of at most {:.4g}, omega the largest frequency met{}", radians,
                        choice.stability_limit, radians > choice.stability_limit ? "; it is met only for moments" : "");
@@ -117,10 +129,16 @@ std::string with_choice(const std::string& text, const Choice& choice, double er
 void write_method(const Choice& choice, const Scene& scene, double error, bool until) {
     const std::string text = with_choice(scene.source.content(), choice, error, until);
     const Candidate& candidate = choice.measurement.candidate;
+    if ((scene.clock ? scene.clock->text : "") != choice.clock && sets_output(text, {"every", "dense"}))
+        throw InputError(fmt::format(
+            "{}: the method cannot be written into this file: the choice has {}, and `every` or `dense` in [output] "
+            "mean something else there ({}). Change them, and copy the lines above",
+            scene.path, choice.clock.empty() ? "no clock" : "the clock " + choice.clock,
+            choice.clock.empty() ? "a number of steps" : "a time"));
     const Scene back = read_scene(Source(scene.path, text));
     if (back.method.family != candidate.member.family || back.method.points != candidate.member.points ||
         back.method.tolerance != candidate.tolerance || back.method.arithmetic != candidate.member.arithmetic ||
-        back.method.numbers != candidate.member.precision ||
+        back.method.numbers != candidate.member.precision || (back.clock ? back.clock->text : "") != choice.clock ||
         back.evaluate(back.run.step, "the step").to_double() != choice.step())
         throw InputError(
             fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "

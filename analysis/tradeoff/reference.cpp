@@ -30,8 +30,9 @@ constexpr double half = 0.5;              // of the seconds, for a first way; th
 constexpr double overtime = 1.25;         // of the seconds: then it is given up
 constexpr double radians_of_step = 0.75;  // h omega of the family's first run
 constexpr int most_refinements = 12;
-constexpr double near = 0.1;    // of the amplitude: steps so far off are too long to converge yet
-constexpr double looser = 100;  // tolerance of the second extrapolation, of the first's
+constexpr double near = 0.1;      // of the amplitude: steps so far off are too long to converge yet
+constexpr double far_dearer = 2;  // times the seconds of an extrapolation: steps of the family take too long
+constexpr double looser = 100;    // tolerance of the second extrapolation, of the first's
 constexpr int frequency_looks = 24;
 
 // Below what is wanted by more than the macro steps add up to; in quadruple precision down to its rounding.
@@ -49,6 +50,7 @@ public:
         start_ = start_in<real>(start, kernel, step);
         stepper_.prepare(start_.parameters, step);
         reference_.n = n_;
+        reference_.compared = 2 * n_;
         reference_.until = request.until;
         reference_.precision = kernel->real_kind == LOBATTO_FLOAT128 ? Precision::quadruple : Precision::extended;
     }
@@ -118,17 +120,19 @@ private:
             throw ComputationError(
                 "the motion cannot be followed to the end: it runs into a singularity, or away to infinity");
         const double seconds = seconds_since(began);
-        set_scale(*states, samples);
         set_frequency(*states, samples);
         // At least one macro step of some twenty slopes a sample.
         const double at_least = 40 * seconds / static_cast<double>(std::max<std::int64_t>(evaluations_, 1));
         const double step = step_seconds(), fewest = request_.until / static_cast<double>(step_of_family());
         double least = 0;
-        for (const int count : sample_counts) {
-            least = std::max(precise_factor * seconds, at_least * count) + step * std::max(fewest, double(count));
-            reference_.samples = count;
-            if (least < half * request_.seconds_limit) return;
-        }
+        // By steps of the family; or, where these resolve a close encounter and so are far too many, by extrapolation.
+        for (const bool is_by_steps : {true, false})
+            for (const int count : sample_counts) {
+                const double way = std::max(precise_factor * seconds, at_least * count);
+                least = way + (is_by_steps ? step * std::max(fewest, double(count)) : way);
+                reference_.samples = count;
+                if (least < half * request_.seconds_limit) return;
+            }
         if (least > 1.5 * request_.seconds_limit) fail_slow(request_.until * request_.seconds_limit / least);
     }
 
@@ -170,17 +174,12 @@ private:
                 fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
         }
         evaluations_ = way.evaluations();
+        if (quick) set_scale(way.least(), way.most());
         return states;
     }
 
-    void set_scale(const States& states, int samples) {
-        std::vector<real> least(2 * n_), most(2 * n_);
-        for (std::size_t k = 0; k < 2 * n_; ++k) least[k] = most[k] = states[k];
-        for (std::size_t i = 0; i < states.size(); ++i) {
-            least[i % (2 * n_)] = std::min(least[i % (2 * n_)], states[i]);
-            most[i % (2 * n_)] = std::max(most[i % (2 * n_)], states[i]);
-        }
-        (void)samples;
+    // On all of the way: samples may miss a close encounter.
+    void set_scale(const std::vector<real>& least, const std::vector<real>& most) {
         spread([&](std::size_t i) { return (most[i] - least[i]) / 2; }, scale_);
         for (real& value : scale_)
             if (!(value > 0)) value = 1;
@@ -195,8 +194,12 @@ private:
             const auto time = static_cast<real>(request_.until * i / samples);
             const double frequency = largest_frequency(stepper_, time, q, p, scale);
             if (frequency > reference_.frequency) reference_.frequency = frequency;
+            if (look == 0 && frequency > 0) reference_.frequency_at_start = frequency;
             std::vector<real> v;
             if (stepper_.velocity(time, q, p, v) != LOBATTO_OK) continue;
+            // With constraints: what moves over its amplitude so fast.
+            for (std::size_t k = 0; k < n_ && kernel_->constraints > 0; ++k)
+                reference_.frequency = std::max(reference_.frequency, std::fabs(static_cast<double>(v[k])) / scale[k]);
             real product = 0;
             for (std::size_t k = 0; k < n_; ++k) product += p[k] * v[k];
             reference_.energy_scale = std::max(reference_.energy_scale, std::fabs(static_cast<double>(product)) / 2);
@@ -260,6 +263,9 @@ private:
         const double interval = request_.until / reference_.samples;
         auto ratio = static_cast<std::int64_t>(std::ceil(interval / static_cast<double>(step_of_family())));
         double last = 0;
+        const double expected = step_seconds() * static_cast<double>(ratio * reference_.samples);
+        reference_.is_late = expected > far_dearer * std::fmax(extrapolation_seconds, request_.seconds_limit / 4);
+        if (reference_.is_late) return;
         for (int refinement = 0; refinement <= most_refinements; ++refinement, ratio *= 2) {
             const double left = request_.seconds_limit - seconds_since(began_) - extrapolation_seconds;
             reference_.is_late = refinement > 0 && 2 * last > left;
@@ -326,6 +332,7 @@ double Reference::trusted_until(double error) const {
 }
 
 Reference compute_reference(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request) {
+    if (request.is_cut) return compute_cut_reference(kernel, start, request);
     return kernel->real_kind == LOBATTO_FLOAT128 ? Computation<__float128>(kernel, start, request).compute()
                                                  : Computation<long double>(kernel, start, request).compute();
 }

@@ -20,6 +20,9 @@ struct Reference {
     double until = 0;           // the time it covers; shorter than asked for when the formulas fail on the way
     int samples = 0;            // rows at i until/samples, i = 0 ... samples
     std::size_t n = 0;
+    std::size_t compared = 0;  // of the 2n: all; where walls throw the motion back, positions only: a momentum that
+                               // jumps is another one just before and just after
+    std::int64_t steps = 0;            // of the family, where steps are cut; else 0
     std::vector<double> high, low;     // (samples + 1) x 2n, q then p: the state is the sum of both
     std::vector<double> scale;         // 2n: half the way between smallest and largest value, the largest among the
                                        // coordinates of the same unit, momenta likewise; 1 where nothing moves
@@ -27,6 +30,7 @@ struct Reference {
     double tolerance = 0;              // of a macro step of the extrapolation
     double energy_scale = 0;           // the largest |p v|/2
     double frequency = 0;              // the largest met (largest_frequency)
+    double frequency_at_start = 0;     // likewise
     double seconds = 0;                // that it took
     bool is_late = false;              // more time would have made it better
 
@@ -40,6 +44,8 @@ struct ReferenceRequest {
     double wanted = 1e-20;      // the disagreement that is good enough
     double seconds_limit = 10;  // of wall time, beyond which it stays as good as it is
     std::vector<int> groups;    // n: coordinates of the same unit have the same number
+    bool is_cut = false;        // steps are, at walls, or where formulas are not smooth
+    bool has_walls = false;     // at which momenta jump
     const volatile int* interrupted = nullptr;
 };
 
@@ -52,6 +58,9 @@ public:
 
 // With a kernel of the family in extended or quadruple precision. ComputationError when there is no reference.
 Reference compute_reference(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request);
+
+// Of a motion whose steps are cut, which extrapolation cannot follow: by shorter and shorter steps of the family.
+Reference compute_cut_reference(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request);
 
 // Thrown between two steps when the flag is raised.
 class Interrupted {};

@@ -15,9 +15,15 @@ namespace {
 
 constexpr double fine_ratio = 1.06;  // of the steps in the end
 constexpr double hopeless = 1.6;     // times the best: a crossing that polishing will not save
+constexpr double beaten = 4;         // times the best: a run that is not waited for
 constexpr std::size_t most_finalists = 4;
-constexpr double too_long = 0.3;  // of the budget: a crossing that took so much more is left, once it has an error
-constexpr double close = 1.08;    // two numbers of steps between which nothing is looked for
+constexpr double more_of_stagnating = 0.2;  // of the steps, after each time that more of them brought nothing
+constexpr double share_of_crossing =
+    0.3;                               // of the budget: a crossing that took so much more is left, once it has an error
+constexpr double far_fewer = 10;       // steps with a clock: those without can wait
+constexpr int enough_of_rounding = 4;  // members that rounding keeps from the goal
+constexpr double converging = 1e-3;    // errors below go with the order of the method, until they are rounding
+constexpr double close = 1.08;         // two numbers of steps between which nothing is looked for
 
 // Of an iteration that ends so many digits beyond the goal.
 double fitting_tolerance(double goal, double digits, Precision numbers) {
@@ -29,33 +35,45 @@ bool has_tolerance(Experiment& experiment, const Member& member) {
     return member.iterates() && experiment.kernel_builder().kernel(member)->linear == 0;
 }
 
+// Whether more steps than before bring nothing.
+bool is_rounding(const Measurement& m, const std::optional<Measurement>& before, double least_before) {
+    if (!m.complete || !before || !before->complete || !(m.error > 0.7 * std::fmin(before->error, least_before)))
+        return false;
+    const auto steps = static_cast<double>(m.candidate.steps), more = steps / double(before->candidate.steps);
+    return m.error < 1e3 * rounding_of(m.candidate.member.precision) * std::sqrt(steps) ||
+           (m.error < converging && std::pow(more, m.candidate.member.order()) > 2);
+}
+
 }  // namespace
 
-Attempt cross(Experiment& experiment, const Member& member, double goal) {
+Attempt cross(Experiment& experiment, const Member& member, double goal, double limit) {
     const StepLadder ladder = experiment.ladder(fine_ratio);
-    const double order = member.order(), fewest = experiment.fewest_steps();
-    Attempt result{{}, infinity, infinity};
+    const double order = member.order(), fewest = experiment.fewest_steps(member.clock);
+    Attempt result{{}, infinity, false, infinity};
     const auto run = [&](std::int64_t steps) {
-        const Measurement m = experiment.measure({member, steps, 0}, false);
+        const Measurement m = experiment.measure({member, steps, 0}, false, limit);
         if (m.complete) result.least_error = std::min(result.least_error, m.error);
         return m;
     };
     std::optional<Measurement> good, bad;
     std::int64_t steps = ladder.at_least(fewest * 1.5);
     int stagnating = 0;
+    const double began = experiment.elapsed();
     for (int tries = 0; tries < 40; ++tries) {
+        const double least_before = result.least_error;
         const Measurement m = run(steps);
         if (m.complete && m.error <= goal) {
             good = m;
         } else {
-            // Rounding: more steps bring nothing.
-            const bool no_better = bad && bad->complete && m.complete && m.error > 0.7 * bad->error &&
-                                   m.error < 1e3 * rounding_of(member.precision) * std::sqrt(double(m.candidate.steps));
-            stagnating = no_better ? stagnating + 1 : 0;
+            stagnating = is_rounding(m, bad, least_before) ? stagnating + 1 : 0;
             bad = m;
-            if (stagnating >= 3) break;
+            result.is_rounding = stagnating >= 3;
+            if (stagnating >= 3 || m.seconds >= limit) break;
         }
-        if (experiment.left() < -too_long * experiment.request().seconds && std::isfinite(result.least_error)) break;
+        const double too_long = share_of_crossing * experiment.request().seconds;
+        if ((experiment.elapsed() - began > too_long || experiment.left() < -too_long) &&
+            std::isfinite(result.least_error))
+            break;
         double next = 0;
         if (good && bad && good->candidate.steps > bad->candidate.steps) {
             if (static_cast<double>(good->candidate.steps) <= static_cast<double>(bad->candidate.steps) * close) break;
@@ -82,7 +100,9 @@ Attempt cross(Experiment& experiment, const Member& member, double goal) {
             steps = ladder.at_most(static_cast<double>(good->candidate.steps) * factor);
             if (steps >= good->candidate.steps) break;
         } else {
-            const double factor = m.complete ? std::clamp(1.03 * std::pow(m.error / goal, 1 / order), 1.05, 4.0) : 1.5;
+            const double factor = m.complete ? std::clamp(1.03 * std::pow(m.error / goal, 1 / order), 1.05, 4.0) +
+                                                   more_of_stagnating * stagnating
+                                             : 1.5;
             const double more = static_cast<double>(steps) * factor;
             if (more > most_steps) break;
             // A run that would take more than is left.
@@ -152,7 +172,8 @@ namespace {
 std::vector<Member> cleaner(const std::map<Member, Attempt>& tried) {
     std::vector<std::pair<double, Member>> nearest;
     for (const auto& [member, crossing] : tried)
-        if (member.arithmetic == StepArithmetic::plain && member.family != Family::splitting)
+        if (member.arithmetic == StepArithmetic::plain && member.family != Family::splitting &&
+            member.clock == StepClock::none)
             nearest.emplace_back(crossing.least_error, member);
     std::sort(nearest.begin(), nearest.end());
     std::vector<Member> members;
@@ -184,119 +205,97 @@ std::vector<int> full_registers(Family family, bool is_separable) {
     return is_separable ? std::vector{6, 10} : std::vector{4, 8, 12};  // the inner nodes, or all
 }
 
-// Members next to the best of each family that were not tried; the nearest to the best first.
-std::vector<Member> neighbours(const std::map<Member, Attempt>& tried, double best_cost, bool is_separable,
-                               Precision numbers) {
-    std::vector<std::pair<double, Member>> wishes;
-    for (const Family family : {Family::lobatto, Family::gauss, Family::splitting}) {
-        if (family == Family::splitting && !is_separable) continue;
-        const std::vector<int>& sizes = sizes_of(family);
-        const int last = static_cast<int>(sizes.size()) - 1;
-        std::optional<Member> top;
-        double top_cost = infinity;
-        int tried_here = 0;
-        for (const auto& [member, crossing] : tried) {
-            if (member.family != family) continue;
-            ++tried_here;
-            if (crossing.seconds < top_cost) top = member, top_cost = crossing.seconds;
-        }
-        const auto size_at = [&](int place) { return sizes[static_cast<std::size_t>(place)]; };
-        if (!top) {  // none reaches the goal: orders between
-            for (const int place : {last, last / 2, last - 2})
-                if (const Member next{family, size_at(place), numbers}; tried.count(next) == 0)
-                    wishes.push_back({1e3, next});
-            continue;
-        }
-        const int here = static_cast<int>(std::find(sizes.begin(), sizes.end(), top->points) - sizes.begin());
-        if (top_cost > hopeless * best_cost && tried_here >= 3) continue;
-        for (const int distance : {1, 2})
-            for (const int place : {here + distance, here - distance}) {
-                if (place < 0 || place > last) continue;
-                Member next = *top;  // in its arithmetic
-                next.points = size_at(place);
-                if (tried.count(next) != 0) continue;
-                // Beyond a neighbour that is clearly slower nothing is expected.
-                if (distance == 2) {
-                    Member middle = *top;
-                    middle.points = size_at((place + here) / 2);
-                    const auto between = tried.find(middle);
-                    if (between == tried.end() || between->second.seconds > 1.15 * top_cost) continue;
-                }
-                wishes.push_back({top_cost * distance, next});
-            }
-        for (const int points : full_registers(family, is_separable)) {
-            Member next = *top;
-            next.points = points;
-            if (std::abs(points - top->points) <= 4 && tried.count(next) == 0) wishes.push_back({top_cost * 3, next});
-        }
+using Tried = std::map<Member, Attempt>;
+
+// With one clock, members next to the best of one family that were not tried, each with the cost that speaks for it.
+void add_neighbours(const Tried& tried, Family family, StepClock clock, bool is_separable, double best_cost,
+                    Precision numbers, std::vector<std::pair<double, Member>>& wishes) {
+    const std::vector<int>& sizes = sizes_of(family);
+    const int last = static_cast<int>(sizes.size()) - 1;
+    std::optional<Member> top;
+    double top_cost = infinity;
+    int tried_here = 0;
+    for (const auto& [member, crossing] : tried) {
+        if (member.family != family || member.clock != clock) continue;
+        ++tried_here;
+        if (crossing.seconds < top_cost) top = member, top_cost = crossing.seconds;
     }
+    const auto size_at = [&](int place) { return sizes[static_cast<std::size_t>(place)]; };
+    if (top_cost > hopeless * best_cost && tried_here >= 3) return;
+    if (!top) {  // none reaches the goal: orders between
+        for (const int place : {last, last / 2, last - 2})
+            if (const Member next{family, size_at(place), numbers, StepArithmetic::plain, clock};
+                tried.count(next) == 0)
+                wishes.push_back({1e3, next});
+        return;
+    }
+    const int here = static_cast<int>(std::find(sizes.begin(), sizes.end(), top->points) - sizes.begin());
+    for (const int distance : {1, 2})
+        for (const int place : {here + distance, here - distance}) {
+            if (place < 0 || place > last) continue;
+            Member next = *top;  // in its arithmetic
+            next.points = size_at(place);
+            if (tried.count(next) != 0) continue;
+            // Beyond a neighbour that is clearly slower nothing is expected.
+            if (distance == 2) {
+                Member middle = *top;
+                middle.points = size_at((place + here) / 2);
+                const auto between = tried.find(middle);
+                if (between == tried.end() || between->second.seconds > 1.15 * top_cost) continue;
+            }
+            wishes.push_back({top_cost * distance, next});
+        }
+    for (const int points : full_registers(family, is_separable && clock == StepClock::none)) {
+        Member next = *top;
+        next.points = points;
+        if (std::abs(points - top->points) <= 4 && tried.count(next) == 0) wishes.push_back({top_cost * 3, next});
+    }
+}
+
+// Several members of different orders come to the same end: others would, too. Clean arithmetic may do a bit better.
+bool rounding_stands_in_the_way(const Tried& tried, double goal) {
+    return std::count_if(tried.begin(), tried.end(),
+                         [](const auto& of) {
+                             return of.second.is_rounding && of.first.arithmetic == StepArithmetic::plain;
+                         }) >= enough_of_rounding &&
+           std::none_of(tried.begin(), tried.end(), [&](const auto& of) {
+               return of.first.arithmetic == StepArithmetic::plain && of.second.least_error < 2 * goal;
+           });
+}
+
+// Those of all families and clocks that the scene allows; the nearest to the best first.
+std::vector<Member> neighbours(const Tried& tried, double best_cost, Experiment& experiment, Precision numbers) {
+    const KernelBuilder& kernel_builder = experiment.kernel_builder();
+    std::vector<std::pair<double, Member>> wishes;
+    for (const StepClock clock : {StepClock::none, StepClock::automatic, StepClock::of_scene})
+        for (const Family family : {Family::lobatto, Family::gauss, Family::splitting})
+            add_neighbours(tried, family, clock, experiment.derivation().system.separable, best_cost, numbers, wishes);
     std::stable_sort(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<Member> members;
     for (const auto& [wish, member] : wishes)
-        if (reason_against_numbers(member.method()).empty()) members.push_back(member);
+        if (kernel_builder.allows(member)) members.push_back(member);
     return members;
 }
 
-}  // namespace
-
-Search search(Experiment& experiment, double goal, Precision numbers) {
-    KernelBuilder& kernel_builder = experiment.kernel_builder();
-    const bool is_separable = experiment.derivation().system.separable;
-    Search result;
-    result.least_error = infinity;
-    std::map<Member, Attempt> tried;
-    std::vector<Member> queue = first_guess(goal, 4, numbers);
-    const Member splitting{Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35, numbers};
-    if (is_separable && reason_against_numbers(splitting.method()).empty()) queue.push_back(splitting);
-    const double reserve = 0.2 * experiment.request().seconds;  // for polishing
-    bool tried_clean = false;                                   // only where rounding stands in the way
-    for (const Member& member : queue) kernel_builder.order(member);
-    const auto best_cost = [&] {
-        double best = infinity;
-        for (const auto& [member, crossing] : tried) best = std::min(best, crossing.seconds);
-        return best;
+// With clocks first: where time scales vary, runs in equal steps need not be waited for then.
+std::vector<Member> first_queue(Experiment& experiment, double goal, Precision numbers) {
+    const KernelBuilder& kernel_builder = experiment.kernel_builder();
+    std::vector<Member> queue;
+    const auto add = [&](const Member& member) {
+        if (kernel_builder.allows(member)) queue.push_back(member);
     };
-    while (true) {
-        experiment.check_interruption();
-        // What is ready is measured; else the compilers are waited for.
-        const auto ready =
-            std::find_if(queue.begin(), queue.end(), [&](const Member& m) { return kernel_builder.is_ready(m); });
-        if (ready != queue.end()) {
-            const Member member = *ready;
-            queue.erase(ready);
-            const Candidate shown{member, 0, 0};
-            experiment.request().say(fmt::format("measuring {}", shown.name()));
-            tried[member] = cross(experiment, member, goal);
-            result.least_error = std::min(result.least_error, tried[member].least_error);
-        } else if (!queue.empty()) {
-            if (experiment.left() < reserve && best_cost() < infinity) break;
-            if (experiment.left() < -reserve && !tried.empty()) break;
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-            continue;
+    for (const StepClock clock : kernel_builder.clocks())
+        for (Member member : first_guess(goal, 3, numbers)) {
+            member.clock = clock;
+            add(member);
         }
-        const bool has_time = experiment.left() > reserve || best_cost() == infinity;
-        if (has_time && experiment.left() > -reserve && queue.size() < 2) {
-            for (const Member& member : neighbours(tried, best_cost(), is_separable, numbers)) {
-                if (std::find(queue.begin(), queue.end(), member) != queue.end()) continue;
-                kernel_builder.order(member);
-                queue.push_back(member);
-                if (queue.size() >= std::max(2u, kernel_builder.threads())) break;
-            }
-        }
-        if (queue.empty() && !tried_clean && is_separable && numbers == Precision::double_ && best_cost() == infinity &&
-            experiment.left() > 0) {
-            tried_clean = true;
-            queue = cleaner(tried);
-            for (const Member& member : queue) kernel_builder.order(member);
-        }
-        if (queue.empty()) {
-            result.complete = true;
-            break;
-        }
-    }
-    kernel_builder.cancel();
-    result.members = static_cast<int>(tried.size());
+    for (const Member& member : first_guess(goal, 4, numbers)) add(member);
+    add({Family::splitting, goal > 1e-4 ? 6 : goal > 1e-9 ? 11 : goal > 1e-11 ? 17 : 35, numbers});
+    return queue;
+}
 
+// The fastest of those that came near to it, each at its best.
+void choose_among(Experiment& experiment, const Tried& tried, double goal, Search& result) {
     std::vector<Attempt> crossings;
     for (const auto& [member, crossing] : tried)
         if (crossing.measurement) crossings.push_back(crossing);
@@ -315,6 +314,82 @@ Search search(Experiment& experiment, double goal, Precision numbers) {
     for (const Measurement& finalist : finalists)
         if (!result.best || finalist.seconds < result.best->seconds) result.best = finalist;
     result.by_member = finalists;
+}
+
+}  // namespace
+
+Search search(Experiment& experiment, double goal, Precision numbers) {
+    KernelBuilder& kernel_builder = experiment.kernel_builder();
+    Search result;
+    result.least_error = infinity;
+    Tried tried;
+    const auto has_clock = [](const Member& member) { return member.clock != StepClock::none; };
+    std::vector<Member> queue = first_queue(experiment, goal, numbers);
+    const double reserve = 0.2 * experiment.request().seconds;  // for polishing
+    bool tried_clean = false;                                   // only where rounding stands in the way
+    for (const Member& member : queue) kernel_builder.order(member);
+    const auto best_cost = [&] {
+        double best = infinity;
+        for (const auto& [member, crossing] : tried) best = std::min(best, crossing.seconds);
+        return best;
+    };
+    while (true) {
+        experiment.check_interruption();
+        // What is ready is measured; else the compilers are waited for.
+        const bool waits_for_clock =
+            best_cost() == infinity && experiment.left() > reserve &&
+            std::any_of(queue.begin(), queue.end(), [&](const Member& m) {
+                return experiment.fewest_steps(StepClock::none) > far_fewer * experiment.fewest_steps(m.clock);
+            });
+        const auto ready = std::find_if(queue.begin(), queue.end(), [&](const Member& m) {
+            return kernel_builder.is_ready(m) && (has_clock(m) || !waits_for_clock);
+        });
+        if (ready != queue.end()) {
+            const Member member = *ready;
+            queue.erase(ready);
+            const Candidate shown{member, 0, 0};
+            experiment.request().say(fmt::format("measuring {}", shown.name()));
+            const double longest = std::isfinite(result.least_error) ? share_of_crossing : infinity;
+            tried[member] =
+                cross(experiment, member, goal, std::min(beaten * best_cost(), longest * experiment.request().seconds));
+            if (tried[member].least_error < result.least_error) {
+                result.least_error = tried[member].least_error;
+                result.is_rounding = tried[member].is_rounding;
+            }
+        } else if (!queue.empty()) {
+            if (experiment.left() < reserve && best_cost() < infinity) break;
+            if (experiment.left() < -reserve && !tried.empty()) break;
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+            continue;
+        }
+        const bool is_hopeless = rounding_stands_in_the_way(tried, goal);
+        if (is_hopeless && !tried_clean) queue.clear();
+        const bool has_time = !is_hopeless && (experiment.left() > reserve || best_cost() == infinity);
+        if (has_time && experiment.left() > -reserve && queue.size() < 2) {
+            for (const Member& member : neighbours(tried, best_cost(), experiment, numbers)) {
+                if (std::find(queue.begin(), queue.end(), member) != queue.end()) continue;
+                kernel_builder.order(member);
+                queue.push_back(member);
+                if (queue.size() >= std::max(2u, kernel_builder.threads())) break;
+            }
+        }
+        if (queue.empty() && !tried_clean && numbers == Precision::double_ && best_cost() == infinity &&
+            experiment.left() > 0) {
+            tried_clean = true;
+            queue = cleaner(tried);
+            queue.erase(std::remove_if(queue.begin(), queue.end(),
+                                       [&](const Member& member) { return !kernel_builder.allows(member); }),
+                        queue.end());
+            for (const Member& member : queue) kernel_builder.order(member);
+        }
+        if (queue.empty()) {
+            result.complete = true;
+            break;
+        }
+    }
+    kernel_builder.cancel();
+    result.members = static_cast<int>(tried.size());
+    choose_among(experiment, tried, goal, result);
     return result;
 }
 

@@ -13,10 +13,12 @@ namespace lobatto {
 struct Attempt {
     std::optional<Measurement> measurement;  // nothing: it does not reach the goal
     double least_error = 0;                  // what it does reach
+    bool is_rounding = false;                // more steps bring nothing
     double seconds = 0;  // infinite without; else the less of its time and of the same steps' with a looser iteration
 };
-// Runs to stagnation, with a handful of steps: from the error of one the next is told by the order.
-Attempt cross(Experiment& experiment, const Member& member, double goal);
+// Runs to stagnation, with a handful of steps: from the error of one the next is told by the order. Runs that take
+// longer than `limit` seconds are left: others are faster.
+Attempt cross(Experiment& experiment, const Member& member, double goal, double limit = infinity);
 
 // The fastest way to the goal with this member: with longer steps, where the error does not grow evenly with them; with
 // iterations that stop earlier; with steps that are shorter but need fewer fixed-point iterations.
@@ -26,6 +28,7 @@ Measurement polish(Experiment& experiment, const Measurement& crossing, double g
 struct Search {
     std::optional<Measurement> best;  // nothing: no member that was tried reaches the goal
     double least_error = 0;           // of all that was tried
+    bool is_rounding = false;         // that is rounding
     int members = 0;                  // tried
     bool complete = false;            // no member that was not tried can be expected to win
     std::vector<Measurement> by_member;

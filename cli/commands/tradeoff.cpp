@@ -15,8 +15,6 @@
 #include "cli/tradeoff/page.hpp"
 #include "cli/tradeoff/pictures.hpp"
 #include "cli/tradeoff/report.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
 #include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -41,9 +39,7 @@ void write(const std::string& path, const std::string& text) {
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
     const Scene written = read_scene(options.scene);
-    refuse_clock(written, "lobatto tradeoff");
-    refuse_constraints(written, "lobatto tradeoff");
-    refuse_impacts(written, "lobatto tradeoff");
+    refuse_jumps(written, "lobatto tradeoff");
     Scene scene = written;
     apply(options.overrides, scene);
     end_of(scene);
@@ -60,7 +56,7 @@ void tradeoff(const TradeoffOptions& options) {
     bool interrupted = false;
     std::optional<Experiment> begun;
     try {
-        begun.emplace(derive(written), scene, request);
+        begun.emplace(written, scene, request);
         explore(*begun);
     } catch (const Interrupted&) {
         interrupted = true;

@@ -15,8 +15,6 @@
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
 #include "generator/mechanics/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
@@ -65,9 +63,7 @@ void print(const Choice& choice, const Scene& scene, double error) {
 void tune(const TuneOptions& options) {
     const double error = error_of(options);
     const Scene written = read_scene(options.scene);
-    refuse_clock(written, "lobatto tune");
-    refuse_constraints(written, "lobatto tune");
-    refuse_impacts(written, "lobatto tune");
+    refuse_jumps(written, "lobatto tune");
     Scene scene = written;
     apply(options.overrides, scene);
     const Interruption interruption;
@@ -78,7 +74,7 @@ void tune(const TuneOptions& options) {
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
     try {
-        const Choice choice = choose(derive(written), scene, request);
+        const Choice choice = choose(written, scene, request);
         say.clear();
         if (!options.json) print(choice, scene, error);
         if (options.write) write_method(choice, scene, error, !options.overrides.until.empty());

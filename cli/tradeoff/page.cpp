@@ -82,10 +82,10 @@ std::string front_rows(const Experiment& experiment) {
         rows += fmt::format(
             "<tr><td>{:.1e}</td><td>{:.3g}</td><td class=\"text\">{}</td><td>{:.4g}</td><td class=\"text\">{}</td>"
             "<td>{}</td><td>{:.2f}</td><td>{:.3g}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.4g}</td></tr>\n",
-            m.error, m.seconds / experiment.until() * 1e9, c.name(), experiment.until() / static_cast<double>(c.steps),
-            precision_name(c.member.precision), c.tolerance > 0 ? fmt::format("{:.0e}", c.tolerance) : "rounding",
-            m.iterations, m.gradients / experiment.until(), optional(m.energy_error), optional(m.drift),
-            optional(m.defect), m.reaches);
+            m.error, m.seconds / experiment.until() * 1e9, c.name(), m.step, precision_name(c.member.precision),
+            c.tolerance > 0 ? fmt::format("{:.0e}", c.tolerance) : "rounding", m.iterations,
+            m.gradients / experiment.until(), optional(m.energy_error), optional(m.drift), optional(m.defect),
+            m.reaches);
     }
     return rows;
 }

@@ -155,8 +155,7 @@ std::vector<std::string> draw_pictures(Experiment& experiment, const std::string
     for (const Measurement& m : representatives(experiment)) {
         const Measurer::Course course =
             experiment.measurer().course(experiment.kernel_builder().kernel(m.candidate.member), m.candidate);
-        titles.push_back(fmt::format("{}, h = {:.3g}", m.candidate.name(),
-                                     experiment.until() / static_cast<double>(m.candidate.steps)));
+        titles.push_back(fmt::format("{}, h = {:.3g}", m.candidate.name(), m.step));
         times.push_back(course.time);
         errors.push_back(course.error);
         energies.push_back(course.energy);

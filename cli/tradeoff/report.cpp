@@ -60,23 +60,25 @@ std::string front_table(const Experiment& experiment) {
     const bool chaotic = experiment.is_chaotic();
     std::string text = chaotic ? fmt::format("  {:>9}  {:>9}  {:>9}", "energy", "momenta", "followed")
                                : fmt::format("  {:>9}  {:>9}", "error", "energy");
-    text += fmt::format("  {:>9}  {:<10}  {:>10}  {:<13}  {:>8}  {:>9}\n", "ns/unit", "method", "step", "precision",
-                        "iterate", "gradients");
-    for (const Measurement& m : front_rows_of(experiment)) {
+    const std::vector<Measurement> rows = front_rows_of(experiment);
+    std::size_t width = 10;
+    for (const Measurement& m : rows) width = std::max(width, m.candidate.name().size());
+    text += fmt::format("  {:>9}  {:<{}}  {:>10}  {:<13}  {:>8}  {:>9}\n", "ns/unit", "method", width, "step",
+                        "precision", "iterate", "gradients");
+    for (const Measurement& m : rows) {
         text += chaotic ? fmt::format("  {:>9}  {:>9}  {:>9.4g}", optional(m.energy_error), optional(m.momentum_error),
                                       m.reaches)
                         : fmt::format("  {:>9.1e}  {:>9}", m.error, optional(m.energy_error));
-        text += fmt::format("  {:>9}  {:<10}  {:>10.4g}  {:<13}  {:>8}  {:>9.3g}\n", time_a_unit(m.seconds, until),
-                            m.candidate.name(), until / static_cast<double>(m.candidate.steps),
-                            precision_name(m.candidate.member.precision), tolerance_text(m.candidate.tolerance),
-                            m.gradients / until);
+        text += fmt::format("  {:>9}  {:<{}}  {:>10.4g}  {:<13}  {:>8}  {:>9.3g}\n", time_a_unit(m.seconds, until),
+                            m.candidate.name(), width, m.step, precision_name(m.candidate.member.precision),
+                            tolerance_text(m.candidate.tolerance), m.gradients / until);
     }
     return text;
 }
 
 std::string csv_of(const Experiment& experiment) {
     std::string text = csv_header();
-    for (const auto& [key, m] : experiment.store().all()) text += csv_row(m, experiment.until());
+    for (const auto& [key, m] : experiment.store().all()) text += csv_row(m);
     return text;
 }
 

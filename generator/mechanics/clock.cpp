@@ -129,8 +129,11 @@ Scene in_clock_time(const Scene& scene) {
 
 void refuse_clock(const Scene& scene, const std::string& what) {
     if (scene.clock)
-        scene.source.fail(scene.clock->at,
-                          what + " knows no clock yet; remove it, or use lobatto run, sweep, emit or verify");
+        scene.source.fail(
+            scene.clock->at,
+            what +
+                " looks at steps that are equal in time, and knows no clock; remove it, or use run, sweep, emit, "
+                "verify, tune or tradeoff");
 }
 
 }  // namespace lobatto

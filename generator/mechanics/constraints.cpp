@@ -18,8 +18,8 @@ void refuse_constraints(const Scene& scene, const std::string& what) {
     if (scene.constraints.empty()) return;
     scene.source.fail(scene.constraints.front().at,
                       what +
-                          " knows no constraints yet; run, sweep, emit, derive, check and "
-                          "verify do");
+                          " knows no constraints yet; run, sweep, emit, derive, check, verify, "
+                          "tune and tradeoff do");
 }
 
 }  // namespace lobatto

@@ -38,4 +38,14 @@ void refuse_impacts(const Scene& scene, const std::string& what) {
             what + " knows smooth formulas only; run, sweep, emit, derive, check and verify know such as this");
 }
 
+void refuse_jumps(const Scene& scene, const std::string& what) {
+    for (const Impact& impact : scene.impacts)
+        for (std::size_t k = 0; k < impact.reset_position.size(); ++k)
+            if (!impact.reset_position[k].is_equal(scene.coordinates[k].position))
+                scene.source.fail(impact.when.at,
+                                  fmt::format("{} compares positions along the motion, and the wall {} moves {}: just "
+                                              "before and just after they differ, however good the steps are",
+                                              what, impact.written, scene.coordinates[k].written));
+}
+
 }  // namespace lobatto

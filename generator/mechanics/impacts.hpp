@@ -14,4 +14,7 @@ void check_impacts(const Scene& scene, const System& system);
 // stability".
 void refuse_impacts(const Scene& scene, const std::string& what);
 
+// InputError where an impact moves positions: what compares positions along a motion has no measure of that.
+void refuse_jumps(const Scene& scene, const std::string& what);
+
 }  // namespace lobatto

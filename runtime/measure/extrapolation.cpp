@@ -33,6 +33,7 @@ void Extrapolation<real>::start(real time, const std::vector<real>& q, const std
     y_ = q;
     y_.insert(y_.end(), p.begin(), p.end());
     longest_ = 0;
+    least_ = most_ = y_;
 }
 
 template <class real>
@@ -43,6 +44,12 @@ bool Extrapolation<real>::slope(real time, const std::vector<real>& y, std::vect
     ++evaluations_;
     if (stepper_.velocity(time, q_, p_, v_) != LOBATTO_OK) return false;
     stepper_.slopes(time, q_, v_, Lv_, Lq_);
+    if (stepper_.kernel()->constraints > 0) {
+        if (stepper_.multipliers(time, q_, p_, lambda_) != LOBATTO_OK) return false;
+        stepper_.constraint(time, q_, phi_, phi_t_, G_);
+        for (std::size_t c = 0; c < lambda_.size(); ++c)
+            for (std::size_t k = 0; k < n_; ++k) Lq_[k] += lambda_[c] * G_[c * n_ + k];
+    }
     std::copy(v_.begin(), v_.end(), f.begin());
     std::copy(Lq_.begin(), Lq_.end(), f.begin() + static_cast<std::ptrdiff_t>(n_));
     return true;
@@ -110,6 +117,10 @@ bool Extrapolation<real>::advance_to(real time) {
         const real H = left / real(parts);
         if (macro_step(H)) {
             if (parts == 1) time_ = time;
+            for (std::size_t i = 0; i < y_.size(); ++i) {
+                least_[i] = std::min(least_[i], y_[i]);
+                most_[i] = std::max(most_[i], y_[i]);
+            }
             if (columns_ <= few_columns) longest_ = 2 * H;
         } else {
             longest_ = H / 2;

@@ -10,9 +10,10 @@
 
 namespace lobatto {
 
-// q' = v(t, q, p), p' = dL/dq + F at v, with the kernel's own `velocity` and `slopes`: the modified midpoint rule of
-// Gragg, extrapolated in the squared step (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations
-// I, II.9), with 2, 4, 6, ... substeps, until two columns agree.
+// q' = v(t, q, p), p' = dL/dq + F at v, with the kernel's own `velocity` and `slopes`; with constraints also the pull
+// G^T lambda of the multipliers that the motion has (D49), so that phi and dphi/dt stay 0 but for the tolerance. By the
+// modified midpoint rule of Gragg, extrapolated in the squared step (E. Hairer, S. P. Norsett, G. Wanner, Solving
+// Ordinary Differential Equations I, II.9), with 2, 4, 6, ... substeps, until two columns agree.
 template <class real>
 class Extrapolation {
 public:
@@ -28,6 +29,9 @@ public:
     real time() const { return time_; }
     const std::vector<real>& state() const { return y_; }  // 2n: q, p
     std::int64_t evaluations() const { return evaluations_; }
+    // The least and largest value of each so far, at the start and at the ends of macro steps.
+    const std::vector<real>& least() const { return least_; }
+    const std::vector<real>& most() const { return most_; }
 
 private:
     bool slope(real time, const std::vector<real>& y, std::vector<real>& f);
@@ -40,7 +44,8 @@ private:
     std::size_t n_;
     real time_ = 0, longest_ = 0;  // 0: not known yet
     int columns_ = 0;              // that the last macro step took
-    std::vector<real> y_, f0_, q_, p_, v_, Lv_, Lq_;
+    std::vector<real> least_, most_;
+    std::vector<real> y_, f0_, q_, p_, v_, Lv_, Lq_, lambda_, phi_, phi_t_, G_;
     std::vector<std::vector<real>> table_;
     std::int64_t evaluations_ = 0;
 };

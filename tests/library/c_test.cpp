@@ -45,7 +45,7 @@ TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what
              "too much: status 2, an error of 0.9 cannot be promised",
              "proof: all hold\n",
              "no scene proved: status 2, there is no scene: NULL was given\n",
-             "stability knows no constraints yet; run, sweep, emit, derive, check and verify do",
+             "stability knows no constraints yet; run, sweep, emit, derive, check, verify, tune and tradeoff do",
          })
         CHECK_MESSAGE(ran.out.find(line) != std::string::npos, line);
 }
