@@ -107,7 +107,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     request.arrivals = arrivals_of(scene, steps);
     request.every = scene.outputs.every;
     request.dense = scene.outputs.dense;
-    request.multipliers = scene.outputs.multipliers;
+    if (scene.outputs.multipliers) request.multipliers = static_cast<int>(scene.constraints.size());
 
     TrajectoryResult none;
     none.status = stepper.prepare(request.parameters, request.step);

@@ -14,11 +14,12 @@ using GiNaC::ex;
 
 std::optional<Tape> Tape::of(const ex& formula, const Variables& variables) {
     Tape tape;
-    if (!tape.append(formula, variables)) return std::nullopt;
+    Seen seen;
+    if (!tape.append(formula, variables, seen)) return std::nullopt;
     return tape;
 }
 
-bool Tape::append(const ex& formula, const Variables& variables) {
+bool Tape::append(const ex& formula, const Variables& variables, Seen& seen) {
     static const std::map<std::string, double (*)(double)> functions{
         {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"exp", std::exp},
         {"log", std::log},   {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh},
@@ -30,9 +31,14 @@ bool Tape::append(const ex& formula, const Variables& variables) {
         if (found == variables.number.end()) return false;
         instruction.operation = Operation::variable;
         instruction.variable = found->second;
+    } else if (const auto before = seen.find(formula); before != seen.end()) {
+        std::optional<std::size_t>& slot = instructions_[before->second].slot;
+        if (!slot) slot = slots_++;
+        instruction.operation = Operation::recall;
+        instruction.slot = slot;
     } else if (is_function || is_power || GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula)) {
         for (std::size_t i = is_table_value(formula) ? 2 : 0; i < formula.nops(); ++i)
-            if (!append(formula.op(i), variables)) return false;
+            if (!append(formula.op(i), variables, seen)) return false;
         instruction.operands = static_cast<int>(formula.nops());
         instruction.operation = is_function                        ? Operation::call
                                 : is_power                         ? Operation::power
@@ -51,6 +57,7 @@ bool Tape::append(const ex& formula, const Variables& variables) {
             if (found == functions.end()) return false;
             instruction.function = found->second;
         }
+        seen.emplace(formula, instructions_.size());
     } else {
         const ex number = formula.evalf();
         if (!GiNaC::is_a<GiNaC::numeric>(number) || !GiNaC::ex_to<GiNaC::numeric>(number).is_real()) return false;
@@ -61,13 +68,15 @@ bool Tape::append(const ex& formula, const Variables& variables) {
 }
 
 Tape::Value Tape::sized(const std::vector<double>& variables) const {
-    static thread_local std::vector<double> stack;
+    static thread_local std::vector<double> stack, memory;
     stack.clear();
+    memory.resize(slots_);
     double size = 0;
     for (const Instruction& instruction : instructions_) {
         if (instruction.operands == 0) {
-            const bool is_number = instruction.operation == Operation::number;
-            stack.push_back(is_number ? instruction.number : variables[instruction.variable]);
+            stack.push_back(instruction.operation == Operation::number   ? instruction.number
+                            : instruction.operation == Operation::recall ? memory[*instruction.slot]
+                                                                         : variables[instruction.variable]);
             size = std::fabs(stack.back());
             continue;
         }
@@ -87,6 +96,7 @@ Tape::Value Tape::sized(const std::vector<double>& variables) const {
         }
         stack.erase(first, stack.end());
         stack.push_back(result);
+        if (instruction.slot) memory[*instruction.slot] = result;
     }
     return {stack.back(), size};
 }

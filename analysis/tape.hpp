@@ -31,7 +31,7 @@ public:
     double operator()(const std::vector<double>& variables) const { return sized(variables).value; }
 
 private:
-    enum class Operation { number, variable, sum, product, power, call, angle, table };
+    enum class Operation { number, variable, recall, sum, product, power, call, angle, table };
     struct Instruction {
         Operation operation;
         double number = 0;
@@ -40,10 +40,13 @@ private:
         double (*function)(double) = nullptr;
         const Spline* spline = nullptr;  // table
         int order = 0;
+        std::optional<std::size_t> slot = std::nullopt;  // of the memory: where its result stays, or is found again
     };
-    bool append(const GiNaC::ex& formula, const Variables& variables);
+    using Seen = std::map<GiNaC::ex, std::size_t, GiNaC::ex_is_less>;  // parts of the formula, and their instructions
+    bool append(const GiNaC::ex& formula, const Variables& variables, Seen& seen);
 
     std::vector<Instruction> instructions_;  // operands come before what is done with them
+    std::size_t slots_ = 0;
 };
 
 }  // namespace lobatto

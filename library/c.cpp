@@ -250,6 +250,13 @@ const double* lobatto_trajectory_p(const lobatto_trajectory* trajectory) {
 const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory) {
     return trajectory->value ? api::data(trajectory->value->energy) : nullptr;
 }
+const double* lobatto_trajectory_columns(const lobatto_trajectory* trajectory, size_t* columns) {
+    *columns = trajectory->value ? trajectory->value->column_names.size() : 0;
+    return trajectory->value ? api::data(trajectory->value->columns) : nullptr;
+}
+const char* lobatto_trajectory_column(const lobatto_trajectory* trajectory, size_t index) {
+    return api::text(trajectory->value ? api::element(&trajectory->value->column_names, index) : nullptr);
+}
 double lobatto_trajectory_error(const lobatto_trajectory* trajectory) {
     return trajectory->value ? trajectory->value->error.value_or(std::nan("")) : std::nan("");
 }

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "analysis/accuracy/judged_run.hpp"
+#include "analysis/columns.hpp"
 #include "library/parts.hpp"
 
 namespace lobatto::api {
@@ -27,6 +28,7 @@ BegunRun begin_run(const Scene& scene, const RunOptions& options) {
     LoadedStepper<double> stepper(begun.prepared.plain);
     begun.request = request_of(begun.prepared.scene, begun.prepared.steps.count, stepper);
     add_digits(begun.request, begun.prepared.scene, begun.prepared.kernel);
+    begun.request.formulas = columns_of(begun.prepared.scene, begun.request, &algebra());
     stepper.velocity(begun.request.time, begun.request.q, begun.request.p, begun.velocity);
     return begun;
 }
@@ -39,6 +41,9 @@ void keep(Trajectory& trajectory, const Records& records) {
         append(trajectory.q, row + 1, n);
         append(trajectory.p, row + 1 + n, n);
         if (records.energy != nullptr) trajectory.energy.push_back(records.energy[i]);
+        const std::size_t columns = trajectory.column_names.size(), parts = static_cast<std::size_t>(records.parts);
+        for (std::size_t c = 0; c < columns; ++c)
+            trajectory.columns.push_back(records.beside[(static_cast<std::size_t>(i) * columns + c) * parts]);
     }
     trajectory.count += static_cast<std::size_t>(records.count);
 }
@@ -75,6 +80,7 @@ Trajectory run(const Scene& scene, const RunOptions& options) {
         in_algebra([&] {
             trajectory.coordinates = coordinates_of(prepared.scene);
             trajectory.event_names = events_of(prepared.scene);
+            for (const auto& [name, unit] : names_beside(prepared.scene)) trajectory.column_names.push_back(name);
             observers.emplace(prepared, LoadedStepper<double>(prepared.plain), begun.request, begun.velocity,
                               options.measure);
         });

@@ -184,6 +184,8 @@ py::dict dict_of(lob::Trajectory&& run) {
     dict["q"] = owned(std::move(run.q), n);
     dict["p"] = owned(std::move(run.p), n);
     dict["H"] = run.energy.empty() ? py::object(py::none()) : py::object(owned(std::move(run.energy)));
+    dict["columns"] = owned(std::move(run.columns), static_cast<py::ssize_t>(run.column_names.size()));
+    dict["column_names"] = run.column_names;
     dict["events"] = events_of(run.events, run.event_names);
     dict["event_names"] = run.event_names;
     dict["steps"] = run.steps;

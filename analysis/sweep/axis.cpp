@@ -171,6 +171,10 @@ VariedName varied_name(const Scene& scene, const std::string& name, const std::s
             fail(fmt::format("{} gives initial {}, not {}; vary {} instead", scene.path,
                              velocity ? "momenta" : "velocities", velocity ? "velocities" : "momenta", names.back()));
     }
+    for (const Eliminated& x : scene.eliminated)
+        for (const std::string& one : {x.coordinate.written, x.coordinate.name})
+            if (name == one || name == one + "'")
+                fail(fmt::format("{} is eliminated and follows from others ({}); vary those", one, x.constraint.text));
     static const std::pair<const char*, Role> settings[] = {{"step", Role::step},
                                                             {"points", Role::points},
                                                             {"stages", Role::stages},

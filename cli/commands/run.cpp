@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "analysis/accuracy/judged_run.hpp"
+#include "analysis/columns.hpp"
 #include "analysis/exact_start.hpp"
 #include "analysis/tradeoff/candidate.hpp"
 #include "cli/commands/commands.hpp"
@@ -64,11 +65,9 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
         header.columns.emplace_back(coordinate.name, coordinate.unit);
     if (scene.outputs.momenta)
         for (const Coordinate& coordinate : scene.coordinates) header.columns.emplace_back("p_" + coordinate.name, "");
-    if (scene.outputs.multipliers) {
-        header.multipliers = static_cast<int>(scene.constraints.size());
-        for (const Constraint& constraint : scene.constraints)
-            header.columns.emplace_back("lambda_" + constraint.name, "");
-    }
+    const auto beside = names_beside(scene);
+    header.columns.insert(header.columns.end(), beside.begin(), beside.end());
+    header.beside = static_cast<int>(beside.size());
     header.energy = scene.outputs.energy;
     if (header.energy) header.columns.emplace_back("H", "");
     return header;
@@ -76,9 +75,8 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
 
 // Of the file beside it with the events: their numbers, then the state as in the trajectory.
 TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
-    header.columns.resize(header.columns.size() - static_cast<std::size_t>(header.multipliers) -
-                          (header.energy ? 1 : 0));
-    header.multipliers = 0;
+    header.columns.resize(header.columns.size() - static_cast<std::size_t>(header.beside) - (header.energy ? 1 : 0));
+    header.beside = 0;
     header.energy = false;
     header.columns.insert(header.columns.begin(), {"event", ""});
     for (const Event& event : scene.reported()) header.events.push_back(event.text);
@@ -305,6 +303,7 @@ void run(const RunOptions& options) {
     LoadedStepper<double> stepper(run.plain);
     TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
     add_digits(request, scene, run.kernel);
+    request.formulas = columns_of(scene, request);
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
     const bool has_events = !scene.reported().empty();
     keep_scene(scene.path, path);

@@ -33,9 +33,9 @@ TrajectoryOutput::TrajectoryOutput(const std::string& path, TableFormat format, 
     if (numbers != Precision::double_ && numbers != Precision::single)
         throw InputError(fmt::format("-o: a {} holds numbers of 64 bits, but those of the run are \"{}\"; name a .csv",
                                      ending_of(format), precision_name(numbers)));
-    multipliers_ = static_cast<std::size_t>(header.multipliers);
+    beside_ = static_cast<std::size_t>(header.beside);
     energy_ = header.energy;
-    columns_ = header.columns.size() - multipliers_ - (energy_ ? 1 : 0);
+    columns_ = header.columns.size() - beside_ - (energy_ ? 1 : 0);
     table_.emplace(path, format, head_of_run(scene, header));
 }
 
@@ -45,8 +45,8 @@ void TrajectoryOutput::write(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
         const double* const row = records.rows + i * records.columns;
         for (std::size_t c = 0; c < columns_; ++c) cells_.push_back(cell_of(row[c]));
-        for (std::size_t c = 0; c < multipliers_; ++c)
-            cells_.push_back(cell_of(records.multipliers[static_cast<std::size_t>(i) * multipliers_ + c]));
+        for (std::size_t c = 0; c < beside_; ++c)
+            cells_.push_back(cell_of(records.beside[static_cast<std::size_t>(i) * beside_ + c]));
         if (energy_) cells_.push_back(cell_of(records.energy[i]));
     }
     table_->add(cells_.data(), static_cast<std::size_t>(records.count));

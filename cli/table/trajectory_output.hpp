@@ -28,7 +28,7 @@ public:
 private:
     std::optional<TrajectoryFile> text_;
     std::optional<TableFile> table_;
-    std::size_t columns_ = 0, multipliers_ = 0;  // of a row: of the state, and after it
+    std::size_t columns_ = 0, beside_ = 0;  // of a row: of the state, and after it
     bool energy_ = false;
     std::vector<TableCell> cells_;
 };

@@ -43,10 +43,13 @@ bool moves(const Scene& scene, const ex& formula) {
 
 // The coordinates of a name: one, or the elements of an array.
 std::vector<ex> named(const Scene& scene, const std::string& name) {
+    std::vector<std::pair<const Coordinate*, ex>> all;
+    for (const Coordinate& coordinate : scene.coordinates) all.emplace_back(&coordinate, coordinate.position);
+    for (const Eliminated& x : scene.eliminated)  // in the order of the file
+        all.insert(all.begin() + static_cast<std::ptrdiff_t>(x.declared), {&x.coordinate, x.position});
     std::vector<ex> found;
-    for (const Coordinate& coordinate : scene.coordinates)
-        if (coordinate.written == name || coordinate.written.starts_with(name + "["))
-            found.push_back(coordinate.position);
+    for (const auto& [coordinate, position] : all)
+        if (coordinate->written == name || coordinate->written.starts_with(name + "[")) found.push_back(position);
     return found;
 }
 
@@ -62,24 +65,34 @@ std::vector<Place> bodies_of_names(const Scene& scene) {
     return bodies;
 }
 
+// Without eliminated coordinates.
+bool is_free(const Place& body) {
+    return std::all_of(body.begin(), body.end(),
+                       [](const ex& component) { return GiNaC::is_a<GiNaC::symbol>(component); });
+}
+
 // (a - b)^2 = l^2 of two bodies, or of a body and a place that is fixed: a line between them.
 std::vector<DrawnFigure> rods_of(const Scene& scene, const std::vector<Place>& bodies) {
     std::vector<DrawnFigure> rods;
     for (const Constraint& constraint : scene.constraints) {
         std::vector<std::size_t> joined;
         for (std::size_t i = 0; i < bodies.size(); ++i)
-            if (std::any_of(bodies[i].begin(), bodies[i].end(),
-                            [&](const ex& component) { return constraint.value.has(component); }))
+            if (is_free(bodies[i]) && std::any_of(bodies[i].begin(), bodies[i].end(),
+                                                  [&](const ex& component) { return constraint.value.has(component); }))
                 joined.push_back(i);
         if (joined.empty() || joined.size() > 2) continue;
         const Place& one = bodies[joined.front()];
         Place other;
         for (const ex& component : one)
             other.push_back((component - constraint.value.diff(GiNaC::ex_to<GiNaC::symbol>(component)) / 2).expand());
-        bool is_rod = true;
-        for (std::size_t k = 0; k < other.size(); ++k)
-            is_rod =
-                is_rod && (joined.size() == 2 ? other[k].is_equal(bodies[joined.back()][k]) : !moves(scene, other[k]));
+        const auto is_other = [&](const Place& body) {
+            return std::equal(other.begin(), other.end(), body.begin(), body.end(),
+                              [](const ex& a, const ex& b) { return a.is_equal(b); });
+        };
+        const bool is_rod = joined.size() == 2 ? is_other(bodies[joined.back()])
+                                               : std::none_of(other.begin(), other.end(),
+                                                              [&](const ex& part) { return moves(scene, part); }) ||
+                                                     std::any_of(bodies.begin(), bodies.end(), is_other);
         if (is_rod) rods.push_back(line({other, one}));
         if (is_rod && joined.size() == 1) {
             rods.push_back(point(other, 0, false));

@@ -61,6 +61,8 @@ Syntax parse_formula(const Source& source, const Text& text, const Scope& scope)
 // "left = right", "left = right rising", "left = right falling".
 struct EventSyntax {
     Syntax difference;  // left - right
+    const Syntax& left() const { return difference.operands[0]; }
+    const Syntax& right() const { return difference.operands[1].operands[0]; }
     int direction = 0;  // rising 1, falling -1
 };
 EventSyntax parse_crossing(const Source& source, const Text& text, const Scope& scope);

@@ -52,6 +52,7 @@ public:
         result.lagrangian = action;
         result.outputs.energy = true;  // kernels take E from it
         for (DomainCondition& condition : result.conditions) condition.expression = in_clock_time(condition.expression);
+        for (Eliminated& x : result.eliminated) x.velocity = in_clock_time(x.velocity);
         const std::string name = clock.energy.get_name();
         result.parameters.push_back(
             {name, "", scene_.evaluate(energy_at_start(), "the energy at the start"), clock.energy, name});

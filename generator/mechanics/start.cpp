@@ -53,9 +53,19 @@ public:
         }
     }
 
+    // Coordinates that are eliminated start as their equations say.
+    void require_equations() {
+        if (scene_.run.assemble) return;
+        for (const Eliminated& x : scene_.eliminated) {
+            require_equation(x, x.position, x.initial_position, "position");
+            require_equation(x, x.velocity, x.initial_velocity, "velocity");
+        }
+    }
+
     void run() {
         require_values();
         require_domains();
+        require_equations();
         if (!system_.constraints.empty()) {
             require_mass();
             constrained_.keep_positions();
@@ -77,6 +87,20 @@ public:
     }
 
 private:
+    void require_equation(const Eliminated& x, const ex& formula, const ex& given, const std::string& what) {
+        const std::string& name = x.coordinate.written;
+        const std::vector<Id> ids = start_.convert({formula - given, formula});
+        const Sized off = start_.evaluate_sized(ids).front();
+        if (cln::abs(off.value) <= off.size * cln::expt(cln::cl_RA(10), -14)) return;
+        scene_.source.fail(
+            x.constraint.at,
+            fmt::format("the start does not keep the constraint {} ({}): the {} of {} is {}, but the other coordinates "
+                        "ask for {}: write that, leave the start of {} out, or add assemble = true to [run]",
+                        x.constraint.written, x.constraint.text, what, name,
+                        decimal(value_of(given, "the initial " + what + " of " + name), 17),
+                        decimal(start_.evaluate(ids)[1], 17), name));
+    }
+
     // The scene's numbers; velocities are 0 where it gives momenta.
     static Formulas as_given(const Scene& scene, Formulas start) {
         const auto set = [&](const GiNaC::symbol& symbol, const ex& value, const std::string& what) {

@@ -15,6 +15,7 @@
 #include "generator/graph/notation.hpp"
 #include "generator/mechanics/routhian.hpp"
 #include "generator/mechanics/sample.hpp"
+#include "generator/scene/eliminated.hpp"
 
 namespace lobatto {
 
@@ -123,6 +124,7 @@ public:
         separable_.clean = scene_.method.arithmetic == StepArithmetic::clean && !general_.full;
         result_.linear = system_.linear && !general_.full && !separable_.clean;
         result_.closed_solution = closed_solution(system_);
+        elimination();
         choose_form();
         if (form_ == Form::general)
             general();
@@ -302,6 +304,22 @@ private:
                                size * size));
         describe_groups();
         if (cyclic.empty() && !constrained) repetition();
+    }
+
+    void elimination() {
+        if (!scene_.eliminated.empty()) {
+            std::string names;
+            for (const Eliminated& x : scene_.eliminated)
+                if (names.size() < 200) names += (names.empty() ? "" : ", ") + x.coordinate.written;
+            const bool one = scene_.eliminated.size() == 1;
+            find("eliminated coordinates", true,
+                 fmt::format("{} {} eliminated: {}", names, one ? "is" : "are", equations_of_eliminated(scene_)));
+        }
+        if (scene_.not_eliminated.empty()) return;
+        std::string list;
+        for (const std::string& one : scene_.not_eliminated)
+            if (list.size() < 400) list += (list.empty() ? "" : "; ") + one;
+        find("eliminated coordinates", false, list);
     }
 
     void constraint_finding() {

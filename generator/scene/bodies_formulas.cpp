@@ -28,6 +28,7 @@ void SystemReader::Bodies::read() {
     for (const Line& line : lines_) {
         give_values(line.body);
         draw(line.body);
+        show(line);
         reader_.kinetic_energy_ += moving(line.body, kinetic_energy(line.body), true).expression;
         reader_.kinetic_text_ += fmt::format("{}T({})", reader_.kinetic_text_.empty() ? "" : " + ", line.body.name);
     }
@@ -104,6 +105,7 @@ void SystemReader::Bodies::read_orientation(Line& line) {
                                                 "nothing, [\"cos(a/2)\", 0, 0, \"sin(a/2)\"] by a about z",
                                                 body.name));
     for (std::size_t k = 0; k < 4; ++k) line.orientation[k] = length == 1 ? q[k] : q[k] / sqrt(square);
+    body.drawn_orientation = line.orientation;
     body.drawn_rotation = rotation_of(line.orientation);
 }
 
@@ -306,6 +308,21 @@ void SystemReader::Bodies::draw(const RigidBody& body) {
     }
     if (body.plane) drawn.inertia.push_back(body.inertia[2][2]);
     reader_.scene_.bodies.push_back(drawn);
+}
+
+// In columns of the trajectory, what is no coordinate: how it is turned, and how it turns, in its own frame.
+void SystemReader::Bodies::show(const Line& line) {
+    const RigidBody& body = line.body;
+    std::vector<Column>& columns = reader_.scene_.outputs.columns;
+    if (body.plane) {
+        if (line.joint) columns.push_back({body.name + "_angle", "", body.angle});
+        columns.push_back({body.name + "_omega", "", body.omega[2]});
+        return;
+    }
+    for (std::size_t k = 0; k < 4; ++k)
+        columns.push_back({element_name(body.name + "_orientation", k + 1), "", body.orientation[k]});
+    for (std::size_t k = 0; k < 3; ++k)
+        columns.push_back({element_name(body.name + "_omega", k + 1), "", body.omega[k]});
 }
 
 void SystemReader::Bodies::give_values(const RigidBody& body) {

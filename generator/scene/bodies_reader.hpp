@@ -60,6 +60,7 @@ private:
     void add_coordinates(Symbols& symbols, const std::string& owner, const std::string& part, Position at,
                          std::size_t count = 1);
     void declare_quantities(const RigidBody& body);
+    void declare_columns(const Line& line);
     void declare_quantity(const std::string& name, const std::vector<std::string>& indices,
                           const std::vector<long>& sizes);
 
@@ -83,6 +84,7 @@ private:
     void add_equations(const JointLine& line);
     void give_values(const RigidBody& body);
     void draw(const RigidBody& body);  // for pictures
+    void show(const Line& line);
     Operand moving(const RigidBody& body, const ex& expression, bool velocity) const;
 
     SystemReader& reader_;

@@ -56,7 +56,14 @@ Quaternion turning(const Quaternion& q, const Quaternion& d) {
             twice * (q[0] * d[3] - q[3] * d[0] + q[2] * d[1] - q[1] * d[2])};
 }
 
+Quaternion product(const Quaternion& a, const Quaternion& b) {
+    return {
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+}
+
 void turn(RigidBody& body, const Quaternion& q, const Quaternion& dq) {
+    for (std::size_t k = 0; k < q.size(); ++k) body.orientation[k] = q[k] / sqrt(square(q));
     const Quaternion w = turning(q, dq);
     body.R = rotation_of(q);
     body.omega = {w[1], w[2], w[3]};
@@ -103,14 +110,19 @@ Vector omega_of(const RigidBody* parent) {
 struct Relative {
     Matrix rotation;
     ex angle = 0;  // in a plane
+    Quaternion orientation = {};
 };
 Relative relative(const RigidBody& body, const RigidBody* parent, const Vector& axis, const ex& turned) {
     if (body.plane) {
         const ex angle = body.drawn_angle - (parent == nullptr ? ex(0) : parent->drawn_angle) + turned;
-        return {rotation_in_plane(angle), angle};
+        return {rotation_in_plane(angle), angle, {}};
     }
     const Matrix in_space = turned.is_zero() ? body.drawn_rotation : rotation_about(axis, turned) * body.drawn_rotation;
-    return {parent == nullptr ? in_space : transposed(parent->drawn_rotation) * in_space, 0};
+    const ex c = cos(turned / 2), s = sin(turned / 2);
+    const Quaternion orientation = product({c, axis[0] * s, axis[1] * s, axis[2] * s}, body.drawn_orientation);
+    if (parent == nullptr) return {in_space, 0, orientation};
+    const Quaternion& d = parent->drawn_orientation;
+    return {transposed(parent->drawn_rotation) * in_space, 0, product({d[0], -d[1], -d[2], -d[3]}, orientation)};
 }
 
 // R and omega of (D55), without the joint's own turn.
@@ -119,6 +131,9 @@ void turn_with(RigidBody& body, const RigidBody* parent, const Relative& relativ
     body.R = body.plane          ? rotation_in_plane(body.angle)
              : parent == nullptr ? relative.rotation
                                  : parent->R * relative.rotation;
+    if (!body.plane)
+        body.orientation =
+            parent == nullptr ? relative.orientation : product(parent->orientation, relative.orientation);
     body.omega = transposed(relative.rotation) * omega_of(parent);
 }
 

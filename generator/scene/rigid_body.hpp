@@ -37,12 +37,14 @@ struct RigidBody {
     Vector drawn_place = {};
     GiNaC::ex drawn_angle = 0;  // in a plane
     Matrix drawn_rotation = {};
+    Quaternion drawn_orientation = {1, 0, 0, 0};  // of length 1
 
     // As it moves: x and R lead from its frame to space, v is that of its centre.
     Vector x = {};
     GiNaC::ex angle = 0;  // in a plane
     Matrix R = {};
-    Vector omega = {};  // in its own frame
+    Quaternion orientation = {1, 0, 0, 0};  // of length 1, in space; not in a plane
+    Vector omega = {};                      // in its own frame
     Vector v = {};
     bool v_in_space = true;    // else in its own frame
     GiNaC::ex stretching = 0;  // rate of the logarithm of the quaternion's length, twice

@@ -15,6 +15,7 @@
 #include "generator/formula/token.hpp"
 #include "generator/method/splitting.hpp"
 #include "generator/scene/document.hpp"
+#include "generator/scene/eliminated.hpp"
 #include "generator/scene/scene_system.hpp"
 #include "generator/scene/table.hpp"
 
@@ -59,6 +60,8 @@ public:
         system_.read_kept(kept);
         system_.read_view();
         system_.add_switches();
+        eliminate_coordinates(scene_);
+        system_.require_velocities();
         refuse_beside_impacts();
         for (const auto& [file, use] : system_.tables()) scene_.tables.push_back(use);
         system_.refuse_unused();
@@ -253,6 +256,10 @@ private:
                            "at least 1 and at most 9e15: states whose step is a multiple of it are kept"));
         if (const Entry* energy = table.find("energy")) outputs.energy = boolean_of(source_, *energy);
         if (const Entry* momenta = table.find("momenta")) outputs.momenta = boolean_of(source_, *momenta);
+        if (const Entry* bodies = table.find("bodies")) {
+            if (scene_.bodies.empty()) fail(bodies->at, "the scene has no bodies; leave it out");
+            if (!boolean_of(source_, *bodies)) outputs.columns.clear();
+        }
         if (const Entry* multipliers = table.find("multipliers")) {
             outputs.multipliers = boolean_of(source_, *multipliers);
             if (outputs.multipliers && scene_.constraints.empty())

@@ -64,6 +64,13 @@ struct Reduction {
     GiNaC::ex value = 0;    // else: in positions, velocities, time, parameters, and the two below
 };
 
+// A column of the trajectory beside the motion itself.
+struct Column {
+    std::string name;
+    std::string unit = {};
+    GiNaC::ex value = 0;  // in positions, velocities, time and parameters
+};
+
 // What a kernel computes beside the motion itself; it has no code for anything else.
 struct Outputs {
     long every = 1;            // keep each state whose step index is a multiple of this
@@ -74,6 +81,7 @@ struct Outputs {
     bool tangent = true;       // the derivative of a step: its symplectic defect, monodromy
     int dense = 0;             // states between two steps, evenly spaced, from the step's own polynomial
     std::vector<Event> events;
+    std::vector<Column> columns;        // of eliminated coordinates and of bodies; in files of runs
     std::vector<Reduction> kept;        // by sweeps
     GiNaC::symbol energy_of_kept{"H"};  // in their formulas, and in plots: H, and p_x of the coordinates
     std::vector<GiNaC::symbol> momenta_of_kept;
@@ -99,6 +107,18 @@ struct Constraint {
     std::string text = {};       // of its equation as written, white space collapsed
     GiNaC::ex value = 0;         // phi: left side minus right side, in positions, time and parameters
     Position at = {};
+    // Where one side is a coordinate: its number as declared, and the other side.
+    std::optional<std::size_t> solved_for = {};
+    GiNaC::ex solution = 0;
+};
+
+// A coordinate that follows from others: a constraint is an equation for it, x = f(q, t), and f stands in all formulas.
+struct Eliminated {
+    Coordinate coordinate;
+    std::size_t declared = 0;  // its number among all coordinates of the file
+    Constraint constraint;
+    GiNaC::ex position, velocity;                  // f, and its rate of change
+    GiNaC::ex initial_position, initial_velocity;  // as the scene has them, in parameters
 };
 
 // A wall: the motion is on the one side of it where `when` has not happened, and is thrown back when it meets it
@@ -165,6 +185,9 @@ struct Scene {
     std::vector<GiNaC::ex> initial_rate;      // velocities or momenta, in parameters
     Start start = Start::velocity;
     std::vector<Constraint> constraints;
+    std::vector<Eliminated> eliminated;
+    // Coordinates that have an equation and stay, and why, as "x: its multiplier is asked for".
+    std::vector<std::string> not_eliminated;
     std::vector<Impact> impacts;
     std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
     std::vector<TableUse> tables;             // measured values in any formula

@@ -40,6 +40,7 @@ void SystemReader::Bodies::declare(const Entry& section, const Entry* joints) {
     for (Line& line : lines_) {
         declare_coordinates(line);
         declare_quantities(line.body);
+        declare_columns(line);
     }
 }
 
@@ -175,6 +176,17 @@ void SystemReader::Bodies::declare_quantities(const RigidBody& body) {
         declare_quantity(body.name + ".omega", {}, {});
     else
         declare_quantity(body.name + ".omega", {"i"}, {3});
+}
+
+void SystemReader::Bodies::declare_columns(const Line& line) {
+    const std::string &name = line.body.name, omega = name + "_omega", orientation = name + "_orientation";
+    Declarations& declarations = reader_.declarations_;
+    if (line.body.plane) {
+        if (line.joint) declarations.declare(name + "_angle", line.body.at, "angle");
+        return declarations.declare(omega, line.body.at, "angular velocity");
+    }
+    declarations.declare_elements(omega, line.body.at, 3);
+    declarations.declare_elements(orientation, line.body.at, 4);
 }
 
 void SystemReader::Bodies::declare_quantity(const std::string& name, const std::vector<std::string>& indices,

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "generator/formula/real.hpp"
 #include "generator/formula/suggest.hpp"
@@ -197,7 +198,7 @@ void SystemReader::read_count(Group& group, const Entry* count) {
         group.array = true;
     }
     for (const Entry* list : {group.position, group.rate}) {
-        if (list->value.kind != Value::Kind::list) continue;
+        if (list == nullptr || list->value.kind != Value::Kind::list) continue;
         const std::size_t length = list->value.items.size();
         if (length == 0) fail(list->value.at, fmt::format("the list of {} is empty", list->key));
         if (group.array && length != group.count)
@@ -225,16 +226,19 @@ void SystemReader::refuse_names_of_momenta() const {
 
 void SystemReader::read_initial_entries(Group& group, const Table& table) {
     const std::string& name = group.entry->key;
-    group.position = &table.get("position", "its initial position, for example position = 1");
     const Entry* velocity = table.find("velocity");
     const Entry* momentum = table.find("momentum");
+    const bool is_empty = table.find("position") == nullptr && velocity == nullptr && momentum == nullptr;
+    if (is_empty && root_.find("constraints") != nullptr) return;  // which may be an equation for it
+    group.position = &table.get("position", "its initial position, for example position = 1");
     if (velocity == nullptr && momentum == nullptr)
         fail(table.at(),
              fmt::format("coordinate {} has no initial velocity or momentum; add velocity = 0 or momentum = 0", name));
     if (velocity != nullptr && momentum != nullptr)
         fail(momentum->at, fmt::format("coordinate {} has both a velocity and a momentum; keep one", name));
     const Start start = velocity != nullptr ? Start::velocity : Start::momentum;
-    if (groups_.empty()) scene_.start = start;
+    if (std::all_of(groups_.begin(), groups_.end(), [](const Group& before) { return before.rate == nullptr; }))
+        scene_.start = start;
     if (start != scene_.start)
         fail((velocity != nullptr ? velocity : momentum)->at,
              fmt::format("coordinate {} starts with a {} and the ones before with a {}; give the same for all", name,
@@ -287,10 +291,15 @@ void SystemReader::read_lagrangian() {
     scene_.lagrangian_at = entry.value.text.at.front();
     scene_.lagrangian += parse_expression(source_, entry.value.text, {&names_, "the Lagrangian", true, {}});
     scene_.lagrangian_text += (kinetic_text_.empty() ? "" : " + ") + collapsed(entry.value.text.value);
+}
+
+void SystemReader::require_velocities() const {
+    const Entry* const entry = root_.find("lagrangian");
+    if (entry == nullptr) return;
     const GiNaC::exset symbols = symbols_of(scene_.lagrangian);
     for (const Coordinate& coordinate : scene_.coordinates)
         if (symbols.count(coordinate.velocity) == 0)
-            fail(entry.value.at,
+            fail(entry->value.at,
                  fmt::format("the Lagrangian is degenerate: the velocity {0}' of coordinate {0} does not occur in it; "
                              "add the kinetic energy of {0}, or remove the coordinate",
                              coordinate.written));
@@ -409,6 +418,7 @@ void SystemReader::read_constraint(const Entry& entry) {
                          [&](const Coordinate& c) { return held.count(c.position) > 0; }))
             fail(constraint.at,
                  fmt::format("the constraint {} holds no coordinate; mend it, or remove it", constraint.written));
+        solve_constraint(constraint, sides, scope, indices);
         scene_.constraints.push_back(constraint);
     }
     if (scene_.constraints.size() >= scene_.coordinates.size())
@@ -453,6 +463,7 @@ void SystemReader::read_places() {
 
 void SystemReader::read_initial_values() {
     const std::string rate = scene_.start == Start::velocity ? "velocity" : "momentum";
+    std::set<std::size_t> missing;
     for (const Group& group : groups_) {
         for (std::size_t k = 0; k < group.starts.size(); ++k) {
             scene_.initial_position.push_back(group.starts[k].first);
@@ -460,6 +471,12 @@ void SystemReader::read_initial_values() {
             scene_.coordinates[group.first + k].rate_at = group.entry->at;
         }
         if (!group.starts.empty()) continue;
+        if (group.rate == nullptr) {  // as its equation says, below
+            scene_.initial_position.resize(group.first + group.count);
+            scene_.initial_rate.resize(group.first + group.count);
+            for (std::size_t k = 0; k < group.count; ++k) missing.insert(group.first + k);
+            continue;
+        }
         read_values(group, *group.position, "position", scene_.initial_position);
         read_values(group, *group.rate, rate, scene_.initial_rate);
         for (std::size_t k = 0; k < group.count; ++k) {
@@ -468,6 +485,7 @@ void SystemReader::read_initial_values() {
                 given.kind == Value::Kind::list ? given.items[k].at : given.at;
         }
     }
+    follow_equations(missing);
 }
 
 // One formula for each element, or one for all with the number i of the element.

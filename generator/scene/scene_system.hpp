@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +30,8 @@ public:
     // After the last formula of the scene.
     void add_switches();
     void refuse_unused() const;
+    // After coordinates were eliminated.
+    void require_velocities() const;
 
     // How further formulas are read: those that may hold what moves, and those in parameters.
     // What the formulas read so far ask for.
@@ -49,7 +52,7 @@ private:
         const Entry* entry;
         std::size_t first, count;
         bool array;
-        const Entry* position;
+        const Entry* position;  // nullptr: not given, nor the rate: a constraint is an equation for it
         const Entry* rate;
         std::vector<std::pair<GiNaC::ex, GiNaC::ex>> starts = {};  // of a body: instead of these
     };
@@ -73,6 +76,8 @@ private:
     void read_forces();
     void read_constraints();
     void read_constraint(const Entry& entry);
+    void solve_constraint(Constraint& constraint, const EventSyntax& sides, const Scope& scope,
+                          const std::vector<long>& indices) const;
     // "link" or "link[i]"; how many links there are.
     struct ArrayName {
         std::string name;
@@ -91,6 +96,7 @@ private:
     const Group& group_of(const Subject& subject) const;
     void read_places();
     void read_initial_values();
+    void follow_equations(std::set<std::size_t>& missing);
     void read_values(const Group& group, const Entry& entry, const std::string& what, std::vector<GiNaC::ex>& values);
 
     const Source& source_;

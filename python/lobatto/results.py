@@ -42,7 +42,9 @@ class _Rows:
         found = self._index(name)
         if found is None:
             names = [variable.name for variable in self.coordinates]
-            raise KeyError(f"there is no column '{name}'; there are t, {', '.join(names)}, p_{', p_'.join(names)}")
+            beside = "".join(f", {other}" for other in getattr(self, "column_names", []))
+            raise KeyError(
+                f"there is no column '{name}'; there are t, {', '.join(names)}, p_{', p_'.join(names)}{beside}")
         return found[0][:, found[1]]
 
     @property
@@ -59,6 +61,9 @@ class _Rows:
 class Trajectory(_Rows):
     """A run: t (count), q and p (count x n), H (count, or None), and what is known of it.
 
+    ``run["x"]`` is a column by its name, also of ``columns`` (count x ``column_names``): multipliers that the scene asks
+    for, eliminated coordinates and their velocities, the orientation and angular velocity of bodies.
+
     ``error``: measured at the end, relative to the amplitude of the motion; None where it was not measured.
     ``run(t)`` gives states at any times in between, on the polynomial of the step there.
     """
@@ -68,6 +73,11 @@ class Trajectory(_Rows):
         self._settings = settings
         self._stepper = None
         self.__dict__.update(values)
+
+    def _index(self, name):
+        if name in self.column_names:
+            return self.columns, self.column_names.index(name)
+        return super()._index(name)
 
     def __len__(self):
         return len(self.t)

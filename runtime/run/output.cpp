@@ -54,8 +54,8 @@ std::string text_of(const TrajectoryHeader& header) {
 TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& header, const Written& kept)
     : file_(path, "the trajectory", kept.size),
       energy_(header.energy),
-      columns_(header.columns.size() - static_cast<std::size_t>(header.multipliers) - (header.energy ? 1 : 0)),
-      multipliers_(static_cast<std::size_t>(header.multipliers)),
+      columns_(header.columns.size() - static_cast<std::size_t>(header.beside) - (header.energy ? 1 : 0)),
+      beside_(static_cast<std::size_t>(header.beside)),
       text_(text_of(header)) {
     if (kept.size == 0) {
         flush();
@@ -86,10 +86,9 @@ void TrajectoryFile::write(const Records& records) {
         const double *const rows = records.whole != nullptr ? records.whole : records.rows,
                             *const energy = records.whole != nullptr ? records.whole_energy : records.energy;
         append(rows + i * records.columns * records.parts, columns_, records.parts);
-        if (multipliers_ > 0) {
+        if (beside_ > 0) {
             text_ += ',';
-            append(records.multipliers + static_cast<std::size_t>(i * records.parts) * multipliers_, multipliers_,
-                   records.parts);
+            append(records.beside + static_cast<std::size_t>(i * records.parts) * beside_, beside_, records.parts);
         }
         if (energy_) {
             text_ += ',';

@@ -21,10 +21,10 @@ struct TrajectoryHeader {
     std::string kernel;                                           // digest
     std::vector<std::pair<std::string, std::string>> parameters;  // names and exact values
     std::vector<std::pair<std::string, std::string>>
-        columns;         // names and units ("" when unknown): t, q.., p.. when they are kept, lambda.., and H
+        columns;         // names and units ("" when unknown): t, q.., p.. when they are kept, others, and H
     bool energy = true;  // whether the last column is H
     std::vector<std::string> events;  // of a file of events, whose first column counts them from 1: what they are
-    int multipliers = 0;              // columns of them, before H
+    int beside = 0;                   // columns before H that are not of the state: Records::beside
 };
 
 // The lines before the first row.
@@ -53,7 +53,7 @@ private:
     PartialFile file_;
     Checksum checksum_;  // of all that is in it
     bool energy_ = true;
-    std::size_t columns_ = 0, multipliers_ = 0;  // of a row: of the state, and after it
+    std::size_t columns_ = 0, beside_ = 0;  // of a row: of the state, and after it
     std::string text_;
 };
 

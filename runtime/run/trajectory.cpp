@@ -65,7 +65,7 @@ public:
             records.rows = rows_.data();
             if (has_energy()) records.energy = rounded_energies_.data();
         }
-        if (request_.multipliers) records.multipliers = multipliers_of(whole, count);
+        if (request_.columns_beside() > 0) records.beside = beside(whole, count);
         request_.sink(records);
     }
 
@@ -85,24 +85,34 @@ private:
     }
 
     // Row by row; not a number where there are none.
-    const double* multipliers_of(const Parts& whole, std::int64_t count) {
-        multipliers_.clear();
+    const double* beside(const Parts& whole, std::int64_t count) {
+        beside_.clear();
         const auto part = static_cast<std::ptrdiff_t>(n_ * parts_), one = static_cast<std::ptrdiff_t>(parts_);
         for (std::int64_t i = 0; i < count; ++i) {
-            const auto time = whole.begin() + i * (one + 2 * part), q = time + one, p = q + part;
-            Parts lambda;
-            if (stepper_.multipliers({time, q}, {q, p}, {p, p + part}, lambda) != LOBATTO_OK)
-                std::fill(lambda.begin(), lambda.end(), std::nan(""));
-            multipliers_.insert(multipliers_.end(), lambda.begin(), lambda.end());
+            const auto begin = whole.begin() + i * (one + 2 * part);
+            const Parts time(begin, begin + one), q(begin + one, begin + one + part),
+                p(begin + one + part, begin + one + 2 * part);
+            Parts values;
+            if (request_.multipliers > 0) {
+                if (stepper_.multipliers(time, q, p, values) != LOBATTO_OK)
+                    std::fill(values.begin(), values.end(), std::nan(""));
+                beside_.insert(beside_.end(), values.begin(), values.end());
+            }
+            if (request_.formulas.count == 0) continue;
+            Parts velocity;
+            if (stepper_.velocity(time, q, p, velocity) != LOBATTO_OK) velocity.assign(n_ * parts_, std::nan(""));
+            values.assign(request_.formulas.count * parts_, 0);
+            request_.formulas.evaluate(time, q, velocity, values);
+            beside_.insert(beside_.end(), values.begin(), values.end());
         }
-        return multipliers_.data();
+        return beside_.data();
     }
 
     const NumberStepper& stepper_;
     const TrajectoryRequest& request_;
     TrajectoryResult& result_;
     std::size_t n_, parts_;
-    Parts energy_start_, energies_, rows_, rounded_energies_, multipliers_;
+    Parts energy_start_, energies_, rows_, rounded_energies_, beside_;
 };
 
 // Hands out checkpoints, at the right times.

@@ -19,9 +19,9 @@ struct Records {
     const double* rows = nullptr;    // count x columns
     const double* energy = nullptr;  // count: H(t, q, p); null when the kernel has no energy
     std::int64_t count = 0;
-    int columns = 0;                      // 1 + 2n
-    const double* multipliers = nullptr;  // count x constraints x parts, where they were asked for
-    const double* whole = nullptr;        // count x columns x parts; null: `rows` has all digits
+    int columns = 0;                 // 1 + 2n
+    const double* beside = nullptr;  // count x columns_beside() of the request x parts; null where there are none
+    const double* whole = nullptr;   // count x columns x parts; null: `rows` has all digits
     const double* whole_energy = nullptr;
     int parts = 1;
     bool is_stop = false;  // the one row is where a stop ended the run, between two steps
@@ -74,12 +74,19 @@ struct TrajectoryRequest {
     std::vector<double> parameters;  // scene order
     std::vector<double> q, p;        // n each
     double time = 0;
-    double step = 0;           // h; may be negative
-    double tolerance = 0;      // of a step's iteration, relative; 0: to rounding
-    std::int64_t steps = 0;    // >= 0
-    Arrivals arrivals;         // of kernels with a clock
-    std::int64_t every = 1;    // keep every such state; the first and the last state are always kept
-    bool multipliers = false;  // of the constraints, beside each kept state
+    double step = 0;         // h; may be negative
+    double tolerance = 0;    // of a step's iteration, relative; 0: to rounding
+    std::int64_t steps = 0;  // >= 0
+    Arrivals arrivals;       // of kernels with a clock
+    std::int64_t every = 1;  // keep every such state; the first and the last state are always kept
+    int multipliers = 0;     // beside each kept state: as many as there are constraints, or none
+    // Values of formulas, beside each kept state and after the multipliers; vectors as those of NumberStepper.
+    struct Formulas {
+        using Parts = std::vector<double>;
+        std::size_t count = 0;
+        std::function<void(const Parts& time, const Parts& q, const Parts& velocity, Parts& values)> evaluate;
+    } formulas;
+    std::size_t columns_beside() const { return static_cast<std::size_t>(multipliers) + formulas.count; }
     // Parameters, step and start with all digits of the kernel's numbers, as sums of `parts` doubles (NumberStepper);
     // empty: the doubles above are exact.
     std::vector<double> whole_parameters, whole_step, whole_q, whole_p;

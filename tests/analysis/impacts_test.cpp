@@ -112,6 +112,32 @@ TEST_CASE("the energy stays at rounding over 10^5 impacts in a billiard") {
     }
 }
 
+TEST_CASE("the energy of bodies that tumble on a floor stays at rounding over 10^5 impacts" *
+          doctest::test_suite("slow")) {
+    // Several impacts in a step of 1: measured 7.4e-14 after 104623 impacts. Short steps, eight times as many, add a
+    // rounding of their own each.
+    const Ended rod =
+        run("lagrangian = \"-rod.y\"\n[bodies]\nrod = { mass = 1, inertia = \"1/12\", position = [0, 1.2], angle = "
+            "0.3, angular_velocity = 0.5 }\n[impacts]\nright = { when = \"rod.y(0.5, 0) = 0 falling\" }\n"
+            "left = { when = \"rod.y(-0.5, 0) = 0 falling\" }\n" +
+            method("points = 5", 1, 140000));
+    CHECK(rod.result.status == LOBATTO_OK);
+    CHECK(rod.events.size() > 100000);
+    CHECK(rod.result.energy_error_largest < 1e-12);
+    // A brick that falls on its corners: 1.2e-11 of 6.6 after 102461 impacts; here a tenth of them.
+    std::string corners;
+    for (int c = 0; c < 8; ++c)
+        corners += fmt::format("corner_{} = {{ when = \"brick.z({}, {}, {}) = 0 falling\" }}\n", c, c % 2 < 1 ? 1 : -1,
+                               c % 4 < 2 ? 2 : -2, c < 4 ? 3 : -3);
+    const Ended brick =
+        run("lagrangian = \"-brick.z\"\n[bodies]\nbrick = { mass = 1, inertia = [\"13/3\", \"10/3\", \"5/3\"], "
+            "position = [0, 0, 6], angular_velocity = [0.3, 0.2, 0.5] }\n[impacts]\n" +
+            corners + method("points = 7", 0.5, 22500));
+    CHECK(brick.result.status == LOBATTO_OK);
+    CHECK(brick.events.size() > 10000);
+    CHECK(brick.result.energy_error_largest < 5e-12);
+}
+
 TEST_CASE("steps with impacts have the order of the method") {
     // A pendulum that meets a wall leaning against its left side, in angles.
     const std::string pendulum =

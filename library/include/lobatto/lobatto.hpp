@@ -227,6 +227,10 @@ struct Trajectory {
     /// count rows. energy is empty where the scene keeps none.
     std::size_t count = 0;
     std::vector<double> t, q, p, energy;
+    /// count x column_names: multipliers that the scene asks for, eliminated coordinates and their velocities, the
+    /// orientation and angular velocity of bodies.
+    std::vector<std::string> column_names;
+    std::vector<double> columns;
     std::vector<EventHit> events;
     std::int64_t steps = 0;
     double seconds = 0;          ///< of processor time in the kernel

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -99,6 +100,34 @@ TEST_CASE("names of bodies stand in formulas, those of bodies on joints too") {
     }
     // Both upright: arm at 1 with speed 2, far at 3 with 2*2 + 3, turning with 2 and 3.
     CHECK(number(scene.lagrangian, start) == doctest::Approx(4 / 2. + 49 / 2. + 0.1 * (4 + 9) / 2 - 1 - 4));
+}
+
+TEST_CASE("the orientation that is shown is the rotation of the body, on all joints") {
+    const Scene scene = scene_of(
+        "[bodies]\na = { mass = 1, inertia = [1, 2, 2.5], orientation = [3, 1, 0, 1] }\n"
+        "b = { mass = 1, inertia = [1, 2, 2.5], position = [1, 0, 0], orientation = [1, 0, 2, 0] }\n"
+        "c = { mass = 1, inertia = [1, 2, 2.5], position = [1, 1, 0], orientation = [1, 1, 1, 1] }\n"
+        "d = { mass = 1, inertia = [1, 2, 2.5], position = [1, 1, 2] }\n[joints]\n"
+        "ab = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [1, 0, 0], axis = [1, 2, 2] }\n"
+        "bc = { type = \"slider\", bodies = [\"b\", \"c\"], axis = [0, 3, 4] }\n"
+        "cd = { type = \"ball\", bodies = [\"c\", \"d\"], point = [1, 1, 1] }\n");
+    std::vector<GiNaC::symbol> symbols;
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
+    const GiNaC::exmap values = arbitrary(symbols);
+    const std::vector<Column>& columns = scene.outputs.columns;
+    REQUIRE(columns.size() == 4 * 7);
+    for (std::size_t b = 0; b < 4; ++b) {
+        Quaternion q;
+        ex square = 0;
+        for (std::size_t k = 0; k < 4; ++k) {
+            q[k] = number(columns[7 * b + k].value, values);
+            square += q[k] * q[k];
+        }
+        CHECK(std::fabs(number(square, values) - 1) < 1e-14);
+        const Matrix R = rotation_of(q);
+        for (std::size_t i = 0; i < 9; ++i)
+            CHECK(std::fabs(number(R[i / 3][i % 3] - scene.bodies[b].rotation[i], values)) < 1e-14);
+    }
 }
 
 TEST_CASE("what a joint leaves free keeps its equations, which are independent") {

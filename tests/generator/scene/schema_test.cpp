@@ -87,7 +87,6 @@ TEST_CASE("what the schema refuses the reader refuses too") {
         {"points = 4", "points = \"4\""},
         {"points = 4", "points = 4\nfamily = \"radau\""},
         {"points = 4", "points = 4\nnumbers = \"half\""},
-        {"position = 1,", ""},
         {"position = 1,", "position = { x = 1 },"},
         {"velocity = 0", "velocity = 0, spin = 1"},
         {"unit = \"kg\"", "unit = 5"},
