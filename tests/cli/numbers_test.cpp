@@ -104,8 +104,8 @@ TEST_CASE("numbers stand in the scene, and --numbers takes their place") {
     const test::Finished unknown = place.run({"run", scene, "-o", csv});
     CHECK(unknown.exit_code == 2);
     CHECK(contains(unknown.err,
-                   "unknown numbers; there are \"float\", \"double\", \"long double\", \"double-double\" "
-                   "and \"quadruple\""));
+                   "unknown numbers; there are \"float\", \"double\", \"long double\", \"double-double\", "
+                   "\"quadruple\" and \"20 digits\" to \"140 digits\""));
 }
 
 TEST_CASE("what other numbers cannot do is refused") {
