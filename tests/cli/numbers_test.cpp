@@ -91,7 +91,7 @@ TEST_CASE("numbers stand in the scene, and --numbers takes their place") {
     CHECK(contains(test::read_file(csv), ", in double-double\n"));
     REQUIRE(place.run({"run", scene, "--until", "1", "--numbers", "double", "-o", csv}).exit_code == 0);
     CHECK_FALSE(contains(test::read_file(csv), ", in double"));
-    for (const std::string command : {"verify", "roundoff", "stability"}) {
+    for (const std::string command : {"roundoff", "stability"}) {
         CAPTURE(command);
         std::vector<std::string> words = {command, scene};
         const test::Finished refused = place.run(words);
@@ -192,4 +192,16 @@ TEST_CASE("sweeps in other numbers go on where they were stopped, and refuse wha
     CHECK(contains(kept.err,
                    "what sweeps keep of a trajectory is computed in double, but numbers are \"float\"; leave "
                    "out --keep, or give --numbers double"));
+}
+
+TEST_CASE("verify proves the steps of a scene in its own numbers beside those in double and quadruple") {
+    const Place place;
+    for (const std::string numbers : {"double-double", "long double", "float"}) {
+        CAPTURE(numbers);
+        const test::Finished done = place.run({"verify", oscillators, "--points", "6", "--numbers", numbers});
+        CHECK_MESSAGE(done.exit_code == 0, done.out);
+        for (const std::string claim : {"20 steps against quadruple, ", "20 steps and back, ", "symplectic defect, "})
+            CHECK(contains(done.out, claim + numbers));
+        CHECK_FALSE(contains(done.out, "FAILED"));
+    }
 }
