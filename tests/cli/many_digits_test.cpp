@@ -127,6 +127,25 @@ TEST_CASE("parameters, nodes and functions are exact to all digits that are aske
     CHECK(error < 1e-139);
 }
 
+TEST_CASE("a kernel in 30 digits knows all functions, in all forms") {
+    if (!has_mpfr()) return;
+    const Digits place;
+    for (const std::string kinetic : {"", "*(1 + x^2/9)"}) {
+        test::write_text(
+            place.folder / "all.toml",
+            "lagrangian = \"(x'^2 + y'^2)" + kinetic +
+                "/2 + atan2(y, 3 + x)*atan2(x, y + 4) + asin(x/4) + acos(y/4) + atan(x) - tanh(y) + "
+                "cosh(x/3)^0.3 + sinh(y) - log(5 + x) + exp(x) + sin(x)*cos(y) + tan(y/3) + sqrt(2 + x)\"\n"
+                "[coordinates]\nx = { position = 1, velocity = 0.1 }\n"
+                "y = { position = 0.5, velocity = 0.2 }\n"
+                "[method]\npoints = 5\n[run]\nstep = 0.05\nuntil = 0.25\n[output]\nevents = [\"x = 1.01\"]\n");
+        const auto in = [&](const std::string& numbers) {
+            return place.end_of({place.file("all.toml"), "--numbers", numbers});
+        };
+        CHECK(apart(in("30 digits"), in("quadruple")) < 1e-30);
+    }
+}
+
 TEST_CASE("mechanisms, impacts and splitting methods know many digits, where their coefficients do") {
     if (!has_mpfr()) return;
     const Digits place;
@@ -146,6 +165,18 @@ TEST_CASE("mechanisms, impacts and splitting methods know many digits, where the
         length = length + sum * sum;
     }
     CHECK(std::fabs(cln::double_approx(length)) < 1e-78);
+    test::write_text(place.folder / "table.csv", "0,0\n1,1\n2,0\n");
+    test::write_text(
+        place.folder / "table.toml",
+        "lagrangian = '''q'^2/2 - table(\"table.csv\", q)'''\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
+        "[run]\nstep = 0.1\nuntil = 0.2\n");
+    const test::Finished measured =
+        place.lobatto({"run", place.file("table.toml"), "--numbers", "50 digits", "-o", place.file("x.csv")});
+    CHECK(measured.exit_code == 2);
+    CHECK_MESSAGE(
+        measured.err.find("measured values have too few digits for numbers in 50 digits; choose \"47 digits\" "
+                          "at most") != std::string::npos,
+        measured.err);
     const test::Finished splitting =
         place.lobatto({"run", oscillators, "--splitting", "35", "--numbers", "50 digits", "-o", place.file("x.csv")});
     CHECK(splitting.exit_code == 2);

@@ -197,11 +197,15 @@ inline ManyDigits<bits> fabs(const ManyDigits<bits>& x) {
     result.negative = 0;
     return result;
 }
-template <int bits>
-inline ManyDigits<bits> pow(const ManyDigits<bits>& x, const ManyDigits<bits>& y) {
-    using real = ManyDigits<bits>;
-    return real::result_of([&](mpfr_ptr r) { mpfr_pow(r, typename real::View(x), typename real::View(y), MPFR_RNDN); });
-}
+#define LOBATTO_FUNCTION(f)                                                                                \
+    template <int bits>                                                                                    \
+    inline ManyDigits<bits> f(const ManyDigits<bits>& x, const ManyDigits<bits>& y) {                      \
+        using View = typename ManyDigits<bits>::View;                                                      \
+        return ManyDigits<bits>::result_of([&](mpfr_ptr r) { mpfr_##f(r, View(x), View(y), MPFR_RNDN); }); \
+    }
+LOBATTO_FUNCTION(atan2)
+LOBATTO_FUNCTION(pow)
+#undef LOBATTO_FUNCTION
 // x y + z, rounded twice: in MPFR faster than once.
 template <int bits>
 inline ManyDigits<bits> fused(const ManyDigits<bits>& x, const ManyDigits<bits>& y, const ManyDigits<bits>& z) {
