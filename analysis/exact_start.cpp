@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/exact_start.hpp"
 
+#include <cln/cln.h>
+
 #include "generator/mechanics/start.hpp"
 #include "runtime/error.hpp"
 #include "runtime/kernel/base/double_double.hpp"
@@ -23,6 +25,18 @@ ExactStart::ExactStart(const Scene& scene) : from_velocity(scene.start == Start:
         rate.push_back(scene.evaluate(
             scene.initial_rate[k], (from_velocity ? "the initial velocity of " : "the initial momentum of ") + name));
     }
+}
+
+std::vector<double> parts_of(const std::vector<GiNaC::numeric>& values, std::size_t parts) {
+    std::vector<double> numbers;
+    for (const GiNaC::numeric& value : values) {
+        cln::cl_RA rest = cln::rational(cln::the<cln::cl_R>(value.to_cl_N()));
+        for (std::size_t part = 0; part < parts; ++part) {
+            numbers.push_back(cln::double_approx(rest));
+            rest = rest - cln::rational(cln::cl_float(numbers.back()));
+        }
+    }
+    return numbers;
 }
 
 template <class real>

@@ -16,6 +16,9 @@ struct ExactStart {
     explicit ExactStart(const Scene& scene);
 };
 
+// Each value as the sum of `parts` doubles (NumberStepper), the first its rounded value.
+std::vector<double> parts_of(const std::vector<GiNaC::numeric>& values, std::size_t parts);
+
 // Nearly rounded: the sum of the value's leading doubles.
 template <class real>
 real number_of(GiNaC::numeric value) {

@@ -48,10 +48,15 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     Translation translation;
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
+    translation.many_digits = has_many_digits(precision) ? asked_digits(precision) : 0;
     translation.short_loops = source.form == Form::general;
     translation.text = before_support(precision);
-    if (together > 0)  // a pair of registers holds 8 or 16 doubles; every text is compiled by itself
-        translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 ? 1 : together < 16 ? 8 : 16);
+    if (together > 0) {  // a pair of registers holds 8 or 16 doubles, or twice as many floats; every text is compiled
+        const int wide = precision == Precision::single ? 2 : 1;  // by itself
+        translation.text += fmt::format("#define LOBATTO_ENSEMBLES {}\n", together < 8 * wide    ? 1
+                                                                          : together < 16 * wide ? 8 * wide
+                                                                                                 : 16 * wide);
+    }
     if (refilled) translation.text += "#define LOBATTO_REFILLED\n";
     append_part(translation.text, std::string(kernel_abi_h_text));
     append_part(translation.text, support_of(source, together > 0, refilled));

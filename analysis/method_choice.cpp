@@ -9,6 +9,7 @@ void MethodChoice::apply(Scene& scene) const {
     Method& method = scene.method;
     if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
     if (numbers) method.numbers = *precision_of(*numbers);
+    need_digits_for(method.numbers);
     if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
     if (tolerance) {
         if (method.arithmetic == StepArithmetic::clean)

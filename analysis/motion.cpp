@@ -72,15 +72,7 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
 void add_digits(TrajectoryRequest& request, const Scene& scene, const Kernel& kernel) {
     if (kernel->real_kind == LOBATTO_DOUBLE) return;
     NumberStepper stepper(kernel);
-    const auto whole = [&](const std::vector<GiNaC::numeric>& values) {
-        std::vector<double> numbers;
-        for (GiNaC::numeric value : values)
-            for (std::size_t part = 0; part < stepper.parts(); ++part) {
-                numbers.push_back(value.to_double());
-                value -= GiNaC::numeric(numbers.back());
-            }
-        return numbers;
-    };
+    const auto whole = [&](const std::vector<GiNaC::numeric>& values) { return parts_of(values, stepper.parts()); };
     const ExactStart start(scene);
     request.whole_parameters = whole(start.parameters);
     request.whole_step = whole({scene.evaluate(scene.run.step, "the step")});

@@ -58,7 +58,7 @@ std::string first_line(const std::string& text) {
 
 // As `lobatto run` compiles, but for a processor with AVX2 and without AVX-512, which valgrind 3.19 does not know.
 std::vector<std::string> portable_arguments(const Compiler& compiler, const Translation& translation) {
-    auto arguments = compile_arguments(compiler, "kernel.cpp", "kernel.so", false, translation.short_loops);
+    auto arguments = compile_arguments(compiler, "kernel.cpp", "kernel.so", translation);
     for (std::string& argument : arguments)
         if (argument == "-march=native") argument = "-march=haswell";
     return arguments;

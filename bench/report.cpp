@@ -95,7 +95,7 @@ void print_machine() {
         "Processor: {}. Kernels: {}, with the flags of `lobatto run` ({}; P3's kernels with --param "
         "max-completely-peeled-insns=60 besides).\n",
         first_line_about("/proc/cpuinfo", "model name"), compiler.words.front(),
-        fmt::join(compile_arguments(compiler, "kernel.cpp", "kernel.so", false, false), " "));
+        fmt::join(compile_arguments(compiler, "kernel.cpp", "kernel.so", Translation{}), " "));
     fmt::print("Peers: " LOBATTO_BENCH_COMPILER ", " LOBATTO_BENCH_FLAGS ".\n");
 }
 

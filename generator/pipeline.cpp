@@ -26,6 +26,11 @@ void check_method(const Scene& scene, const System& system, bool general) {
                         scene.method.family == Family::splitting ? "splitting methods have" : "clean arithmetic has",
                         scene.method.family == Family::splitting ? "" : " and --arithmetic plain"));
     require_method_of_constraints(scene);
+    constexpr int digits_of_tables = 47;  // of the 60 that generator/formula/spline.cpp computes
+    if (!scene.tables.empty() && decimals_of(scene.method.numbers) > digits_of_tables)
+        throw InputError(
+            fmt::format("{}: measured values have too few digits for numbers in {}; choose \"{} digits\" at most",
+                        scene.path, precision_name(scene.method.numbers), digits_of_tables));
     if (scene.method.family == Family::splitting) {
         if (general)
             throw InputError(scene.path +
@@ -114,7 +119,7 @@ PlainSource emit_plain(Scene scene, Precision precision) {
     refuse_constraints(scene, "the plain text");
     refuse_impacts(scene, "the plain text");
     const auto refuse = [&](const std::string& why) { throw InputError(scene.path + ": " + why); };
-    if (precision == Precision::quadruple || precision == Precision::double_double)
+    if (precision == Precision::quadruple || precision == Precision::double_double || has_many_digits(precision))
         refuse("the plain text has the functions of the standard library, which knows no numbers in " +
                precision_name(precision) + "; choose --numbers \"long double\"");
     if (scene.method.arithmetic == StepArithmetic::clean)

@@ -32,7 +32,6 @@ std::unique_ptr<SweepStudy> begin_sweep(const Scene& scene, const Starts& starts
     lobatto::Scene read =
         options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);
     method_of(options).apply(read);
-    MethodChoice::require_double(read, "sweep");
     StudyOptions study;
     study.overrides = overrides_of(options);
     study.threads = options.threads;
@@ -51,7 +50,7 @@ void keep_states(Sweep& sweep, const EnsembleTrajectory& trajectory, std::int64_
         states.t.push_back(row[0]);
         states.q.insert(states.q.end(), row + 1, row + 1 + n);
         states.p.insert(states.p.end(), row + 1 + n, row + 1 + 2 * n);
-        states.energy_error.push_back(kept.energy != nullptr ? kept.energy[i] - trajectory.energy_start : std::nan(""));
+        states.energy_error.push_back(trajectory.energy_error(i));
     }
     states.first.push_back(states.t.size());
 }
@@ -67,8 +66,7 @@ void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& t
     sweep.t.push_back(row[0]);
     sweep.q.insert(sweep.q.end(), row + 1, row + 1 + n);
     sweep.p.insert(sweep.p.end(), row + 1 + n, row + 1 + 2 * n);
-    sweep.energy_error.push_back(kept.energy != nullptr ? kept.energy[kept.count - 1] - trajectory.energy_start
-                                                        : std::nan(""));
+    sweep.energy_error.push_back(trajectory.energy_error(kept.count - 1));
     for (std::size_t k = 0; k < sweep.kept_names.size(); ++k)
         sweep.kept.push_back(trajectory.reduced != nullptr && k < trajectory.reduced->size() ? (*trajectory.reduced)[k]
                                                                                              : std::nan(""));

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -61,6 +62,11 @@ private:
                 if (one == value) return "";
             return at + " is not one of " + rule.dump();
         }
+        if (keyword == "pattern")
+            return !value.is_string() ||
+                           std::regex_search(value.get<std::string>(), std::regex(rule.get<std::string>()))
+                       ? ""
+                       : at + " does not match " + rule.dump();
         if (keyword == "const") return value == rule ? "" : at + " is not " + rule.dump();
         if (keyword == "minimum") return !value.is_number() || value >= rule ? "" : at + " is below " + rule.dump();
         if (keyword == "maximum") return !value.is_number() || value <= rule ? "" : at + " is above " + rule.dump();

@@ -8,6 +8,8 @@
 
 #include "analysis/accuracy/amplitude.hpp"
 #include "analysis/accuracy/companion.hpp"
+#include "runtime/build/number_stepper.hpp"
+#include "runtime/run/parts.hpp"
 
 namespace lobatto {
 
@@ -34,28 +36,47 @@ std::int64_t steps_taken(std::int64_t every) {
     return taken;
 }
 
+// q and p of a kept state, with all digits.
+const double* whole_row(const Records& kept, std::int64_t i) {
+    return kept.whole == nullptr ? kept.rows + i * kept.columns + 1 : kept.whole + (i * kept.columns + 1) * kept.parts;
+}
+
 }  // namespace
 
-EnsembleCompanion::EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const EnsembleRequest& request)
+EnsembleCompanion::EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const Kernel& plain,
+                                     const EnsembleRequest& request)
     : derivation_(derivation),
       kernel_(kernel),
+      parts_(static_cast<std::size_t>(kernel->parts)),
       request_(request),
       groups_(amplitude_groups(derivation.scene)),
       order_(derivation.quadrature.order()),
       narrow_(derivation.system),
-      stepper_(kernel) {}
+      stepper_(plain) {}
 
 void EnsembleCompanion::compute(std::int64_t first) {
     const auto n = static_cast<std::int64_t>(groups_.size());
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
                        rows = (request_.steps / every + 1) * looks_of(every),
-                       count = std::min(std::max<std::int64_t>(numbers_at_once / ((4 + 2 * rows) * n), 64),
-                                        request_.first + request_.count - first);
+                       count =
+                           std::min(std::max<std::int64_t>(numbers_at_once / ((4 + 2 * rows) * n * kernel_->parts), 64),
+                                    request_.first + request_.count - first);
     first_ = first;
     known_.assign(static_cast<std::size_t>(count), {});
     const std::int64_t whole = request_.steps / every * every;
     take(0, whole, every);
     if (whole < request_.steps) take(whole, request_.steps - whole, request_.steps - whole);
+}
+
+// The positions by four units in the last place.
+void EnsembleCompanion::move(EnsembleStart& start) const {
+    if (kernel_->real_kind == LOBATTO_DOUBLE) {
+        for (double& x : start.q)
+            if (x != 0) x = beside(x);
+        return;
+    }
+    std::vector<double>& q = parts_ == 1 ? start.q : start.whole_q;
+    for (std::size_t k = 0; k < q.size(); k += parts_) q[k + parts_ - 1] += 4 * kernel_->epsilon * q[k];
 }
 
 void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_t every) {
@@ -67,12 +88,11 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
         request_.start(first_ + index, start);
         const std::vector<double>& rows = known_[static_cast<std::size_t>(index)].rows;
         if (begin == 0) {
-            for (double& x : start.q)
-                if (x != 0) x = beside(x);
-        } else if (rows.size() >= 2 * n) {
-            const auto last = rows.end() - static_cast<std::ptrdiff_t>(2 * n);
-            start.q.assign(last, last + static_cast<std::ptrdiff_t>(n));
-            start.rate.assign(last + static_cast<std::ptrdiff_t>(n), rows.end());
+            move(start);
+        } else if (rows.size() >= 2 * n * parts_) {
+            const auto one = static_cast<std::ptrdiff_t>(n * parts_);
+            (parts_ == 1 ? start.q : start.whole_q).assign(rows.end() - 2 * one, rows.end() - one);
+            (parts_ == 1 ? start.rate : start.whole_rate).assign(rows.end() - one, rows.end());
         }
     };
     companion.from_velocities = request_.from_velocities && begin == 0;
@@ -81,6 +101,7 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
     const std::int64_t taken = is_clocked ? every : steps_taken(every), looks = is_clocked ? 1 : looks_of(every);
     companion.step = is_clocked ? request_.step / clocked_ratio
                                 : request_.step * static_cast<double>(every) / static_cast<double>(taken);
+    if (parts_ > 1) companion.whole_step = times_fraction(request_.whole_step, every, taken);
     companion.steps = steps / every * taken;
     companion.every = taken / looks;
     companion.stops = false;
@@ -92,7 +113,9 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
         for (std::int64_t i = 0; i < trajectory.kept.count; ++i) {
             const double* const row = trajectory.kept.rows + i * trajectory.kept.columns + 1;
             widen_to(known.least, known.most, row, 2 * n);
-            if (i > 0 && i % looks == 0) known.rows.insert(known.rows.end(), row, row + 2 * n);
+            if (i == 0 || i % looks != 0) continue;
+            const double* const whole = whole_row(trajectory.kept, i);
+            known.rows.insert(known.rows.end(), whole, whole + 2 * n * parts_);
         }
     };
     if (integrate(kernel_, companion).interrupted) known_.clear();
@@ -135,9 +158,19 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     TrajectoryRequest request;
     request.parameters = start.parameters;
     request.q = start.q;
-    LoadedStepper<double> stepper(kernel_);
+    LoadedStepper<double> stepper(stepper_.kernel());
     if (stepper.prepare(start.parameters, request_.step) != LOBATTO_OK) return {unknown, true};
     request.p = request_.from_velocities ? stepper.momentum(request_.time, start.q, start.rate) : start.rate;
+    if (parts_ > 1) {
+        request.whole_parameters = start.whole_parameters;
+        request.whole_q = start.whole_q;
+        request.whole_p = start.whole_rate;
+        request.whole_step = request_.whole_step;
+        NumberStepper numbers(kernel_);
+        if (numbers.prepare(request.whole_parameters, request.whole_step) != LOBATTO_OK) return {unknown, true};
+        if (request_.from_velocities)
+            request.whole_p = numbers.momentum(as_parts({request_.time}, parts_), start.whole_q, start.whole_rate);
+    }
     request.time = request_.time;
     request.step = request_.step;
     request.steps = request_.steps;
@@ -169,7 +202,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     Known& known = known_[static_cast<std::size_t>(place)];
     const std::size_t n = groups_.size();
     const Records& kept = trajectory.kept;
-    const std::int64_t compared = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n);
+    const std::int64_t compared = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n * parts_);
     const bool is_stopped = trajectory.stop >= 0;
     // Of a trajectory that was stopped: the start, and where it was stopped, between two steps.
     const std::int64_t comparisons = is_stopped ? std::max<std::int64_t>(kept.count - 2, 0) : compared,
@@ -186,14 +219,14 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     Error error{0, false};
     double largest = 0;
     for (std::int64_t j = 0; j < comparisons; ++j) {
-        const double* const run = kept.rows + (skipped + j) * kept.columns + 1;
-        const double* const companion = known.rows.data() + j * static_cast<std::int64_t>(2 * n);
+        const double* const run = whole_row(kept, skipped + j);
+        const double* const companion = known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
         error.relative = 0;
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;
-            const double difference = std::fabs(run[i] - companion[i]) / amplitude[i];
-            if (i < n) error.relative = std::fmax(error.relative, of_run * difference);
-            error.lost = error.lost || !(difference < out_of_step);
+            const double apart = std::fabs(difference(run + i * parts_, companion + i * parts_, parts_)) / amplitude[i];
+            if (i < n) error.relative = std::fmax(error.relative, of_run * apart);
+            error.lost = error.lost || !(apart < out_of_step);
         }
         largest = std::fmax(largest, error.relative);
     }

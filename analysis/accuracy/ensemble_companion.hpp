@@ -15,8 +15,9 @@ namespace lobatto {
 
 class EnsembleCompanion {
 public:
-    // What is handed over outlives it. `request`: that of the sweep, with its start.
-    EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const EnsembleRequest& request);
+    // What is handed over outlives it. `plain`: the kernel in double. `request`: that of the sweep, with its start.
+    EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const Kernel& plain,
+                      const EnsembleRequest& request);
 
     struct Error {
         // Of the positions at the end, each by its own amplitude; the largest. The largest of all, where the two were
@@ -32,7 +33,7 @@ private:
     struct Known {
         lobatto_status status = LOBATTO_NOT_FINITE;
         std::vector<double> least, most;  // 2n
-        std::vector<double> rows;         // 2n each: where the trajectory keeps its states, but for the start
+        std::vector<double> rows;         // 2n x parts each: where the trajectory keeps its states, but for the start
     };
     void compute(std::int64_t first);
     // `steps` of the sweep's own from `begin` on; the companions are at `begin` already.
@@ -41,10 +42,12 @@ private:
     bool goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start);
     bool meets_narrow_terms(const EnsembleTrajectory& trajectory, const EnsembleStart& start);
     bool has_pulses(const EnsembleStart& start);
+    void move(EnsembleStart& start) const;
     Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
 
     Outline derivation_;
     Kernel kernel_;
+    std::size_t parts_;
     const EnsembleRequest& request_;
     std::vector<int> groups_;
     int order_;

@@ -36,7 +36,7 @@ private:
     Outline derivation_;
     const KernelSource& source_;
     const EnsembleRequest& request_;
-    Kernel kernel_;                // of the ensemble
+    Kernel kernel_;                // in double
     std::optional<Kernel> alone_;  // for one trajectory; compiled when the first is run again
     bool watches_;
     LoadedStepper<double> stepper_;

@@ -8,6 +8,7 @@
 #include "analysis/accuracy/taken_steps.hpp"
 #include "analysis/exact_start.hpp"
 #include "analysis/kernel_of.hpp"
+#include "analysis/proof/own_numbers.hpp"
 #include "generator/check/check.hpp"
 #include "generator/mechanics/clock.hpp"
 #include "generator/method/splitting.hpp"
@@ -312,7 +313,11 @@ Proof prove(const Scene& written, const MethodChoice& method,
     Scene scene = in_clock_time(written);  // a clock is another Lagrangian, whose steps are equal
     scene.clock.reset();
     method.apply(scene);
-    MethodChoice::require_double(scene, "verify");
+    const Precision numbers = scene.method.numbers;
+    if (written.clock && numbers != Precision::double_)
+        scene.source.fail(written.clock->at,
+                          "with a clock `lobatto verify` proves steps in double, but numbers are \"" +
+                              precision_name(numbers) + "\"; remove the clock, or give --numbers double");
     const bool with_tangent = scene.coordinates.size() <= tangent_limit;
     scene.outputs.energy = true;
     scene.outputs.tangent = with_tangent;
@@ -381,6 +386,14 @@ Proof prove(const Scene& written, const MethodChoice& method,
         rows.push_back(not_promised("bounded energy error", forced ? "forces" : "time"));
     else
         energy(rows, kernel, start);
+
+    if (numbers != Precision::double_ && numbers != Precision::quadruple) {
+        say("compiling and checking numbers in " + precision_name(numbers), 0.98);
+        const Kernel own = kernel_of(emit(derivation, {numbers, {}}), numbers);
+        for (const ProofRow& row :
+             prove_numbers(numbers, own, exact_kernel, exact_start, step, !forced && scene.constraints.empty()))
+            rows.push_back(row);
+    }
 
     // What steps that are too long do to a motion tells nothing of the kernel.
     const double turned = start.step * fastest_oscillation(exact_kernel, quadruple_start, 8 * start.step);

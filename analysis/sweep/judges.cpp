@@ -5,13 +5,13 @@
 
 namespace lobatto {
 
-Judges::Judges(const Scene& scene, const Outline& derivation, const KernelSource& source, const Kernel& kernel,
-               const EnsembleRequest& request, bool measures, bool accepts_lost)
+Judges::Judges(const Scene& scene, const Outline& derivation, const KernelSource& plain, const Kernel& plain_kernel,
+               const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost)
     : request_(request),
-      watch_(derivation, source, kernel, request),
+      watch_(derivation, plain, plain_kernel, request),
       domains_(scene, derivation.system),
       accepts_lost_(accepts_lost) {
-    if (measures) companion_.emplace(derivation, kernel, request);
+    if (measures) companion_.emplace(derivation, kernel, plain_kernel, request);
 }
 
 Verdict Judges::judge(const EnsembleTrajectory& trajectory) {

@@ -41,10 +41,10 @@ struct Verdict {
 // Judges the trajectories, in their order: by their energies, by their companions, by where formulas have values.
 class Judges {
 public:
-    // What is handed over outlives it. `measures`: errors, by companions; `accepts_lost`: trajectories of which nothing
-    // is left are no failures.
-    Judges(const Scene& scene, const Outline& derivation, const KernelSource& source, const Kernel& kernel,
-           const EnsembleRequest& request, bool measures, bool accepts_lost);
+    // What is handed over outlives it. `plain`, `plain_kernel`: in double. `measures`: errors, by companions;
+    // `accepts_lost`: trajectories of which nothing is left are no failures.
+    Judges(const Scene& scene, const Outline& derivation, const KernelSource& plain, const Kernel& plain_kernel,
+           const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost);
 
     Verdict judge(const EnsembleTrajectory& trajectory);
 

@@ -47,9 +47,18 @@ double real_in(TableCell cell) {
     return same_bits<double>(cell);
 }
 
+std::string name_of_part(const std::string& name, std::size_t part) {
+    return part == 0 ? name : name + ".rest" + (part == 1 ? "" : std::to_string(part));
+}
+
 std::size_t SweepRows::add(const std::string& name, const std::string& unit) {
     columns_.push_back({name, unit});
     return columns_.size() - 1;
+}
+
+// A number that is a sum of doubles has a column for each.
+void SweepRows::add_state(const std::string& name, const std::string& unit) {
+    for (std::size_t part = 0; part < parts_; ++part) add(name_of_part(name, part), unit);
 }
 
 // A name of the scene keeps its column; ours gives way to it, as in steps_.
@@ -66,7 +75,11 @@ std::size_t SweepRows::add_own(std::string name, bool whole) {
 
 // Initial values are written q(0), as other columns hold q at the time t.
 SweepRows::SweepRows(const Scene& scene, const SweepStarts& starts, std::int64_t every, bool measures)
-    : scene_(scene), starts_(starts), every_(every), n_(scene.coordinates.size()) {
+    : scene_(scene),
+      starts_(starts),
+      every_(every),
+      n_(scene.coordinates.size()),
+      parts_(static_cast<std::size_t>(parts_of(scene.method.numbers))) {
     using Role = VariedName::Role;
     add_own("index", true);
     for (const SweepStarts::Column& varied : starts.columns()) {
@@ -90,9 +103,9 @@ SweepRows::SweepRows(const Scene& scene, const SweepStarts& starts, std::int64_t
     }
     if (scene.outputs.kept.empty()) {
         q_ = columns_.size();
-        for (const Coordinate& coordinate : scene.coordinates) add(coordinate.name, coordinate.unit);
+        for (const Coordinate& coordinate : scene.coordinates) add_state(coordinate.name, coordinate.unit);
         if (scene.outputs.momenta) p_ = columns_.size();
-        for (std::size_t k = 0; k < n_ && scene.outputs.momenta; ++k) add("p_" + scene.coordinates[k].name);
+        for (std::size_t k = 0; k < n_ && scene.outputs.momenta; ++k) add_state("p_" + scene.coordinates[k].name);
         if (scene.outputs.energy) energy_ = add_own("energy_error", false);
     }
     if (measures) error_ = add_own("error", false);
@@ -124,8 +137,9 @@ SweepFigures SweepRows::append(std::vector<TableCell>& rows, const EnsembleTraje
         for (std::size_t k = 0; k < scene_.outputs.kept.size(); ++k)
             put(k < trajectory.reduced->size() ? (*trajectory.reduced)[k] : not_said);
         if (q_ != none)
-            for (std::size_t k = 0; k < (p_ == none ? n_ : 2 * n_); ++k) put(row[1 + k]);
-        if (energy_ != none) put(kept.energy[i] - trajectory.energy_start);
+            for (std::size_t k = 0; k < (p_ == none ? n_ : 2 * n_) * parts_; ++k)
+                put(kept.whole == nullptr ? row[1 + k] : kept.whole[i * kept.columns * kept.parts + kept.parts + k]);
+        if (energy_ != none) put(trajectory.energy_error(i));
         if (error_ != none) put(last ? verdict.error : not_said);
     }
     const double* const end = kept.rows + (kept.count - 1) * kept.columns;
@@ -142,8 +156,8 @@ SweepFigures SweepRows::append(std::vector<TableCell>& rows, const EnsembleTraje
 SweepFigures SweepRows::read(const TableCell* row, double* state) const {
     const auto real = [&](std::size_t column) { return column == none ? not_said : real_in(row[column]); };
     for (std::size_t k = 0; k < n_; ++k) {
-        state[k] = real(q_ == none ? none : q_ + k);
-        state[n_ + k] = real(p_ == none ? none : p_ + k);
+        state[k] = real(q_ == none ? none : q_ + k * parts_);
+        state[n_ + k] = real(p_ == none ? none : p_ + k * parts_);
     }
     return {whole_in(row[0]), whole_in(row[status_]), whole_in(row[steps_]), real(time_), real(error_), real(energy_),
             not_said};

@@ -45,6 +45,8 @@ public:
     SweepFigures read(const TableCell* row, double* state) const;
 
 private:
+    void add_state(const std::string& name, const std::string& unit = "");
+
     static constexpr std::size_t none = static_cast<std::size_t>(-1);
     std::size_t add(const std::string& name, const std::string& unit = "");
     std::size_t add_own(std::string name, bool whole);
@@ -52,10 +54,13 @@ private:
     const Scene& scene_;
     const SweepStarts& starts_;
     std::int64_t every_;
-    std::size_t n_;
+    std::size_t n_, parts_;
     std::vector<TableColumn> columns_;
     std::size_t status_, steps_, stop_ = none, time_, q_ = none, p_ = none, energy_ = none, error_ = none;
 };
+
+// The columns of a number that is a sum of doubles: x, x.rest, x.rest2 ...
+std::string name_of_part(const std::string& name, std::size_t part);
 
 TableCell cell_of(std::int64_t value);
 TableCell cell_of(double value);

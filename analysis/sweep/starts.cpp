@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/exact_start.hpp"
 #include "analysis/method_choice.hpp"
 #include "generator/mechanics/start.hpp"
 
@@ -32,7 +33,10 @@ bool is_family(Role role) {
 }  // namespace
 
 SweepStarts::SweepStarts(const Scene& scene, const StartsRequest& request, std::recursive_mutex* algebra)
-    : scene_(scene), seed_(request.seed), algebra_(algebra == nullptr ? &own_ : algebra) {
+    : scene_(scene),
+      seed_(request.seed),
+      parts_(static_cast<std::size_t>(lobatto::parts_of(scene.method.numbers))),
+      algebra_(algebra == nullptr ? &own_ : algebra) {
     std::vector<Axis> axes;
     for (const std::string& argument : request.vary) axes.push_back(read_axis(scene, argument));
     add_axes(axes, request.zip, true);
@@ -149,22 +153,27 @@ bool SweepStarts::varies(VariedName::Role role, std::size_t index) const {
 
 // The start of the scene; what is varied, or follows from it, is replaced for each trajectory.
 void SweepStarts::find_dependents() {
-    for (const Parameter& parameter : scene_.parameters)
-        base_.parameters.push_back(scene_.evaluate(parameter.value, "the parameter " + parameter.name).to_double());
-    const auto put = [&](Role role, std::size_t k, const GiNaC::ex& value, const std::string& what) {
+    for (const Parameter& parameter : scene_.parameters) {
+        exact_base_.parameters.push_back(scene_.evaluate(parameter.value, "the parameter " + parameter.name));
+        base_.parameters.push_back(exact_base_.parameters.back().to_double());
+    }
+    const auto put = [&](Role role, std::size_t k, const GiNaC::ex& value, const std::string& what,
+                         std::vector<double>& numbers, std::vector<GiNaC::numeric>& exact_numbers) {
         bool depends = false;
         for (const Column& column : columns_)
             depends =
                 depends || (column.of.role == Role::parameter && value.has(scene_.parameters[column.of.index].symbol));
         const bool given = varies(role, k);
         if (depends && !given) dependents_.push_back({role == Role::position, k});
-        return depends || given ? std::numeric_limits<double>::quiet_NaN()  // always replaced
-                                : scene_.evaluate(value, what + scene_.coordinates[k].name).to_double();
+        const bool is_replaced = depends || given;
+        exact_numbers.push_back(is_replaced ? GiNaC::numeric(0)
+                                            : scene_.evaluate(value, what + scene_.coordinates[k].name));
+        numbers.push_back(is_replaced ? std::numeric_limits<double>::quiet_NaN() : exact_numbers.back().to_double());
     };
     const char* const rate = scene_.start == Start::velocity ? "the initial velocity of " : "the initial momentum of ";
     for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
-        base_.q.push_back(put(Role::position, k, scene_.initial_position[k], "the initial position of "));
-        base_.rate.push_back(put(Role::rate, k, scene_.initial_rate[k], rate));
+        put(Role::position, k, scene_.initial_position[k], "the initial position of ", base_.q, exact_base_.q);
+        put(Role::rate, k, scene_.initial_rate[k], rate, base_.rate, exact_base_.rate);
     }
 }
 
@@ -222,36 +231,58 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
                                                                      : start.rate;
         numbers[name.index] = value(trajectory, c);
     }
-    if (dependents_.empty() && !assembled_) return;
+    if (dependents_.empty() && !assembled_ && parts_ == 1) return;
     const std::lock_guard lock(*algebra_);
+    Exact to_all_digits = exact_base_;
     std::vector<GiNaC::ex> parameters;
     for (const Parameter& parameter : scene_.parameters) parameters.push_back(parameter.value);
-    for (std::size_t c = 0; c < columns_.size(); ++c)
-        if (columns_[c].of.role == Role::parameter) parameters[columns_[c].of.index] = exact(trajectory, c);
+    for (std::size_t c = 0; c < columns_.size(); ++c) {
+        const VariedName& name = columns_[c].of;
+        if (name.is_setting()) continue;
+        const GiNaC::numeric number = exact(trajectory, c);
+        if (name.role == Role::parameter) parameters[name.index] = number;
+        (name.role == Role::parameter  ? to_all_digits.parameters
+         : name.role == Role::position ? to_all_digits.q
+                                       : to_all_digits.rate)[name.index] = number;
+    }
     for (const auto& [position, k] : dependents_) {
         double& number = (position ? start.q : start.rate)[k];
         try {
-            number = scene_.evaluate((position ? scene_.initial_position : scene_.initial_rate)[k], "", parameters)
-                         .to_double();
+            const GiNaC::numeric found =
+                scene_.evaluate((position ? scene_.initial_position : scene_.initial_rate)[k], "", parameters);
+            (position ? to_all_digits.q : to_all_digits.rate)[k] = found;
+            number = found.to_double();
         } catch (const InputError&) {  // a root of a negative number, for example
             number = std::numeric_limits<double>::quiet_NaN();
         }
     }
-    if (assembled_) assemble(parameters, start);
+    if (assembled_) assemble(parameters, start, to_all_digits);
+    if (parts_ == 1) return;
+    const auto whole = [this](const std::vector<GiNaC::numeric>& values, const std::vector<double>& numbers) {
+        std::vector<double> parts = parts_of(values, parts_);
+        for (std::size_t i = 0; i < numbers.size(); ++i)
+            if (std::isnan(numbers[i])) parts[i * parts_] = numbers[i];
+        return parts;
+    };
+    start.whole_parameters = whole(to_all_digits.parameters, start.parameters);
+    start.whole_q = whole(to_all_digits.q, start.q);
+    start.whole_rate = whole(to_all_digits.rate, start.rate);
 }
 
 // (D47) The nearest start that keeps the constraints; not a number where there is none.
-void SweepStarts::assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start) const {
+void SweepStarts::assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start, Exact& exact) const {
     Scene scene = scene_;
     for (std::size_t i = 0; i < parameters.size(); ++i) scene.parameters[i].value = parameters[i];
     for (std::size_t k = 0; k < start.q.size(); ++k) {
         if (!std::isfinite(start.q[k]) || !std::isfinite(start.rate[k])) return;
-        scene.initial_position[k] = GiNaC::numeric(start.q[k]);
-        scene.initial_rate[k] = GiNaC::numeric(start.rate[k]);
+        scene.initial_position[k] = parts_ == 1 ? GiNaC::numeric(start.q[k]) : exact.q[k];
+        scene.initial_rate[k] = parts_ == 1 ? GiNaC::numeric(start.rate[k]) : exact.rate[k];
     }
     try {
         const StartOnConstraints found = start_on_constraints(scene, *assembled_);
         for (std::size_t k = 0; k < start.q.size(); ++k) {
+            exact.q[k] = GiNaC::numeric(found.q[k]);
+            exact.rate[k] = GiNaC::numeric(found.v[k]);
             start.q[k] = cln::double_approx(found.q[k]);
             start.rate[k] = cln::double_approx(found.v[k]);
         }

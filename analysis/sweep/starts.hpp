@@ -80,6 +80,10 @@ private:
         bool position;
         std::size_t coordinate;
     };
+    // A start to all digits; what is varied, or follows from it, is replaced.
+    struct Exact {
+        std::vector<GiNaC::numeric> parameters, q, rate;
+    };
     void add_axes(std::vector<Axis>& axes, bool zip, bool settings);
     void add_table(StartTable table);
     void add_draws(const StartsRequest& request);
@@ -88,7 +92,7 @@ private:
     void find_dependents();
     std::int64_t place(std::int64_t trajectory, std::size_t column) const;
     GiNaC::numeric exact(std::int64_t trajectory, std::size_t column) const;
-    void assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start) const;
+    void assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start, Exact& exact) const;
 
     const Scene& scene_;
     std::vector<Dimension> dimensions_;
@@ -98,6 +102,8 @@ private:
     std::uint64_t seed_ = 0;
     std::int64_t count_ = 1, of_setting_ = 1;
     EnsembleStart base_;
+    Exact exact_base_;
+    std::size_t parts_ = 1;  // doubles of which a number is the sum
     std::vector<Dependent> dependents_;
     std::optional<System> assembled_;  // of a scene whose starts are moved onto its constraints
     mutable std::recursive_mutex own_;

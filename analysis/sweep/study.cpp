@@ -9,6 +9,7 @@
 #include "analysis/accuracy/companion.hpp"
 #include "analysis/accuracy/energy_watch.hpp"
 #include "analysis/derived_kernel.hpp"
+#include "analysis/exact_start.hpp"
 #include "analysis/reductions.hpp"
 #include "generator/mechanics/start.hpp"
 #include "runtime/run/output.hpp"
@@ -51,6 +52,25 @@ std::unique_lock<std::recursive_mutex> locked(std::recursive_mutex* algebra) {
     return algebra == nullptr ? std::unique_lock<std::recursive_mutex>() : std::unique_lock(*algebra);
 }
 
+// Whether trajectories of these numbers go side by side in vector registers.
+bool has_ensembles(Precision numbers) {
+    return numbers == Precision::double_ || numbers == Precision::single;
+}
+
+// Clocks, and what is kept of a trajectory, are computed in double.
+void check_numbers(const Scene& scene) {
+    if (scene.method.numbers == Precision::double_) return;
+    const std::string numbers = ", but numbers are \"" + precision_name(scene.method.numbers) + "\"";
+    if (scene.clock)
+        scene.source.fail(scene.clock->at, "with a clock `lobatto sweep` computes in double" + numbers +
+                                               "; remove the clock, or give --numbers double");
+    if (!scene.outputs.kept.empty())
+        throw InputError(
+            fmt::format("{}: what sweeps keep of a trajectory is computed in double{}; leave out --keep, or "
+                        "give --numbers double",
+                        scene.path, numbers));
+}
+
 }  // namespace
 
 void StudyTimes::add(const StudyTimes& more) {
@@ -67,6 +87,7 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
     : as_written_(std::move(scene)), options_(options), algebra_(algebra) {
     if (!as_written_.outputs.kept.empty() && options.overrides.every)
         throw InputError("--every: what is kept of a trajectory is one row; leave out --every, or --keep");
+    check_numbers(as_written_);
     as_written_.outputs.watch_kept();
     scene_ = as_written_;  // one kernel serves all values
     scene_.outputs.dense = 0;
@@ -101,13 +122,16 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     setting->scene = starts_->with_settings(scene_, first);
     setting->steps = steps_of_setting(setting->scene);
     const Method& method = setting->scene.method;
-    auto& [derivation, source] = derived_[{static_cast<int>(method.family), method.points}];
-    if (!derivation) {
-        // Steps and values are the kernel's arguments: the scene is derived as it was written.
-        if (number == 0 && !options_.overrides.set.empty()) check_domains(scene_);
+    // Steps and values are the kernel's arguments: the scene is derived as it was written.
+    const auto derived_in = [&](Precision numbers) {
         Scene scene = starts_->with_settings(as_written_, first);
         if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;
-        DerivedKernel derived = derived_kernel(scene, {Precision::double_, false, EnergyWatch::can_watch});
+        return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch});
+    };
+    auto& [derivation, source] = derived_[{static_cast<int>(method.family), method.points}];
+    if (!derivation) {
+        if (number == 0 && !options_.overrides.set.empty()) check_domains(scene_);
+        DerivedKernel derived = derived_in(method.numbers);
         derivation = std::make_shared<const Outline>(std::move(derived.outline));
         source = std::make_shared<const KernelSource>(std::move(derived.source));
     }
@@ -120,9 +144,16 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     const std::int64_t together =
         scene_.coordinates.size() > 2 ? std::min<std::int64_t>(count, 8) : count / thread_count(options_.threads);
     Compiled compiled;
-    setting->kernel = scene_.is_cut()
-                          ? kernel_of(*source, Precision::double_, &compiled)
-                          : ensemble_kernel_of(*source, Precision::double_, together, &compiled, is_refilled);
+    const bool is_double = method.numbers == Precision::double_;
+    const bool is_alone = scene_.is_cut() || !has_ensembles(method.numbers) || (is_refilled && !is_double);
+    setting->kernel = is_alone ? kernel_of(*source, method.numbers, &compiled)
+                               : ensemble_kernel_of(*source, method.numbers, together, &compiled, is_refilled);
+    setting->plain = setting->kernel;
+    setting->plain_source = source;
+    if (!is_double) {
+        setting->plain_source = std::make_shared<const KernelSource>(derived_in(Precision::double_).source);
+        setting->plain = kernel_of(*setting->plain_source, Precision::double_);
+    }
     setting->compiled = std::filesystem::path(compiled.object).stem().string();
     setting->request = request_of(*setting);
     return setting;
@@ -135,7 +166,10 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     request.count = starts_->count_of_setting();
     request.start = [this](std::int64_t index, EnsembleStart& start) { starts_->start(index, start); };
     request.from_velocities = scene.start == Start::velocity;
-    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
+    request.step = step.to_double();
+    if ((*setting.kernel)->parts > 1)
+        request.whole_step = parts_of({step}, static_cast<std::size_t>((*setting.kernel)->parts));
     request.steps = setting.steps.count;
     request.tolerance = scene.method.tolerance;
     request.arrivals = arrivals_of(scene, setting.steps.count);
@@ -158,8 +192,8 @@ void SweepStudy::enter(std::int64_t number) {
     judges_.reset();
     current_ = prepare(number);
     const Setting& setting = *current_;
-    judges_.emplace(setting.scene, *setting.derivation, *setting.source, *setting.kernel, setting.request,
-                    options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon);
+    judges_.emplace(setting.scene, *setting.derivation, *setting.plain_source, *setting.plain, *setting.kernel,
+                    setting.request, options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon);
 }
 
 StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink& sink,
@@ -221,6 +255,8 @@ std::string SweepStudy::identity() const {
                         given.step, given.until, options_.steps.value_or(-1), given.every.value_or(0),
                         as_written_.method.name(), exact_text(as_written_.method.tolerance), options_.measures,
                         options_.beyond_horizon);
+    if (as_written_.method.numbers != Precision::double_)
+        text += "numbers " + precision_name(as_written_.method.numbers) + '\n';
     return text;
 }
 

@@ -55,6 +55,8 @@ public:
         std::shared_ptr<const Outline> derivation;
         std::shared_ptr<const KernelSource> source;
         std::optional<Kernel> kernel;
+        std::optional<Kernel> plain;  // in double
+        std::shared_ptr<const KernelSource> plain_source;
         std::string compiled;     // names the kernel with its compiler and processor: the same, the same bits
         EnsembleRequest request;  // of all its trajectories
     };

@@ -94,7 +94,10 @@ void print_use(const KernelSource& source, const EmitCommand& options, Precision
                "  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .q, "
                ".momentum(p)\n",
                source.name, quadruple ? "gnu++" : "c++", include, shell_word(options.folder),
-               quadruple ? " -lquadmath" : "", exact);
+               quadruple                  ? " -lquadmath"
+               : has_many_digits(numbers) ? " -lmpfr"
+                                          : "",
+               exact);
 }
 
 // The folder, made where it is not there, and the file in it, which must not be the scene.

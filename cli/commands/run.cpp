@@ -94,6 +94,13 @@ std::string iterations_text(const lobatto_kernel& kernel, const TrajectoryResult
 // Nothing where the first step has no derivative in this precision.
 std::optional<double> defect_of(const Kernel& kernel, Precision numbers, const Scene& scene) {
     try {
+        if (has_many_digits(numbers)) {
+            TrajectoryRequest request;
+            add_digits(request, scene, kernel);
+            NumberStepper stepper(kernel);
+            stepper.prepare(request.whole_parameters, request.whole_step);
+            return symplectic_defect(stepper, request.whole_q, request.whole_p);
+        }
         return with_type_of(numbers, [&](auto type) -> std::optional<double> {
             using real = decltype(type);
             const ExactStart exact(scene);

@@ -103,8 +103,10 @@ TableHead head_of(const SweepStudy& study) {
     const bool one_member =
         !starts.varies(Role::points, 0) && !starts.varies(Role::stages, 0) && !starts.varies(Role::splitting, 0);
     head.add("scene", scene.title.empty() ? scene.name : scene.title);
-    head.add("method", fmt::format("{}, h {}", one_member ? scene.method.name() : std::string("varied"),
-                                   starts.varies(Role::step, 0) ? "varied" : "= " + exact_text(first.request.step)));
+    const Precision numbers = scene.method.numbers;
+    head.add("method", fmt::format("{}, h {}{}", one_member ? scene.method.name() : std::string("varied"),
+                                   starts.varies(Role::step, 0) ? "varied" : "= " + exact_text(first.request.step),
+                                   numbers == Precision::double_ ? "" : ", in " + precision_name(numbers)));
     head.add("kernel", first.source->digest);
     EnsembleStart start;
     starts.start(0, start);
@@ -128,7 +130,6 @@ TableHead head_of(const SweepStudy& study) {
 std::unique_ptr<SweepStudy> study_of(const SweepOptions& options, int threads) {
     Scene scene = read_scene(options.scene, options.keep);
     options.method.apply(scene);
-    MethodOption::require_double(scene, "sweep");
     StudyOptions study;
     study.overrides = options.overrides;
     study.steps = options.steps;

@@ -39,9 +39,11 @@ void MethodOption::add_to(Command& command) {
     command.option("--arithmetic", arithmetic, "Plain, or clean: rounding errors grow like a random walk only (slower)")
         .shown_as("KIND")
         .one_of(std::vector<std::string>{"plain", "clean"});
-    std::vector<std::string> names;
-    for (const Precision precision : all_precisions) names.push_back(precision_name(precision));
-    command.option("--numbers", numbers, "What the steps are computed in").shown_as("TYPE").one_of(names);
+    command.option("--numbers", numbers, "What the steps are computed in: double, quadruple, \"50 digits\" and others")
+        .shown_as("TYPE")
+        .checked_by([](const std::string& text) {
+            return precision_of(text) ? "" : "unknown numbers; there are " + precision_list();
+        });
 }
 
 }  // namespace lobatto

@@ -17,7 +17,9 @@ TableHead head_of_run(const Scene& scene, const TrajectoryHeader& header) {
     std::vector<std::string> parameters;
     for (const auto& [name, value] : header.parameters) parameters.push_back(name + " = " + value);
     if (!parameters.empty()) head.add("parameters", fmt::format("{}", fmt::join(parameters, ", ")));
-    for (const auto& [name, unit] : header.columns) head.columns.push_back({name, unit});
+    for (const auto& [name, unit] : header.columns)
+        for (int part = 0; part < parts_of(scene.method.numbers); ++part)
+            head.columns.push_back({name_of_part(name, static_cast<std::size_t>(part)), unit});
     return head;
 }
 
@@ -29,10 +31,7 @@ TrajectoryOutput::TrajectoryOutput(const std::string& path, TableFormat format, 
         text_.emplace(path, header, kept);
         return;
     }
-    const Precision numbers = scene.method.numbers;
-    if (numbers != Precision::double_ && numbers != Precision::single)
-        throw InputError(fmt::format("-o: a {} holds numbers of 64 bits, but those of the run are \"{}\"; name a .csv",
-                                     ending_of(format), precision_name(numbers)));
+    parts_ = static_cast<std::size_t>(parts_of(scene.method.numbers));
     beside_ = static_cast<std::size_t>(header.beside);
     energy_ = header.energy;
     columns_ = header.columns.size() - beside_ - (energy_ ? 1 : 0);
@@ -42,12 +41,17 @@ TrajectoryOutput::TrajectoryOutput(const std::string& path, TableFormat format, 
 void TrajectoryOutput::write(const Records& records) {
     if (text_) return text_->write(records);
     cells_.clear();
-    for (std::int64_t i = 0; i < records.count; ++i) {
-        const double* const row = records.rows + i * records.columns;
-        for (std::size_t c = 0; c < columns_; ++c) cells_.push_back(cell_of(row[c]));
-        for (std::size_t c = 0; c < beside_; ++c)
-            cells_.push_back(cell_of(records.beside[static_cast<std::size_t>(i) * beside_ + c]));
-        if (energy_) cells_.push_back(cell_of(records.energy[i]));
+    const auto put = [&](const double* numbers, std::size_t count) {
+        for (std::size_t c = 0; c < count * parts_; ++c) cells_.push_back(cell_of(numbers[c]));
+    };
+    const double *const rows = records.whole != nullptr ? records.whole : records.rows, *const energy =
+                                                                                            records.whole != nullptr
+                                                                                                ? records.whole_energy
+                                                                                                : records.energy;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(records.count); ++i) {
+        put(rows + i * static_cast<std::size_t>(records.columns) * parts_, columns_);
+        if (beside_ > 0) put(records.beside + i * beside_ * parts_, beside_);
+        if (energy_) put(energy + i * parts_, 1);
     }
     table_->add(cells_.data(), static_cast<std::size_t>(records.count));
 }

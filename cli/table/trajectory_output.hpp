@@ -14,8 +14,7 @@ namespace lobatto {
 
 class TrajectoryOutput {
 public:
-    // `kept`: as TrajectoryFile; of CSV. InputError where the numbers of the scene do not fit into 64 bits and the
-    // format has no more.
+    // `kept`: as TrajectoryFile; of CSV. Other formats have a column for each of the doubles that a number is a sum of.
     TrajectoryOutput(const std::string& path, TableFormat format, const Scene& scene, const TrajectoryHeader& header,
                      const Written& kept);
 
@@ -29,6 +28,7 @@ private:
     std::optional<TrajectoryFile> text_;
     std::optional<TableFile> table_;
     std::size_t columns_ = 0, beside_ = 0;  // of a row: of the state, and after it
+    std::size_t parts_ = 1;                 // of a number
     bool energy_ = false;
     std::vector<TableCell> cells_;
 };

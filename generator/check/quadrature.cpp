@@ -16,8 +16,8 @@ using GiNaC::numeric;
 using Expressions = std::vector<ex>;
 using MatrixRows = std::vector<Expressions>;
 
-// Tables of floats: what is left of an identity, absolute. Measured at most 1e-90: 100 digits, of numbers below 1e10.
-constexpr double table_bound = 1e-50;
+// Tables of floats: what is left of an identity, absolute. Measured at most 2e-140: 150 digits, of numbers below 1e10.
+constexpr double table_bound = 1e-130;
 
 ex power(const ex& x, std::size_t exponent) {  // GiNaC refuses 0^0
     return exponent == 0 ? ex(1) : expand_exactly(GiNaC::pow(x, static_cast<int>(exponent)));

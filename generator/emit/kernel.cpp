@@ -296,8 +296,10 @@ private:
         text += wrapped(
             "        if (!lobatto::is_finite(" + (finite.empty() ? "h" : finite) + ")) return Status::not_finite;",
             "            ");
-        // NOTE: sums of double-double are not exact, which the choice of entries stands on.
-        if (is_map() && n_ == 1 && options_.precision != Precision::double_double)
+        // NOTE: sums of double-double are not exact, which the choice of entries stands on; and what it takes away from
+        // many digits nobody sees.
+        if (is_map() && n_ == 1 && options_.precision != Precision::double_double &&
+            !has_many_digits(options_.precision))
             text += "        lobatto::round_to_unit_determinant(k.Phi_minus_I);\n";
         if (is_map() && n_ > 1)
             text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
@@ -477,6 +479,7 @@ KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& 
     KernelSource source;
     source.form = derivation.structure.form();
     source.support = support_of(derivation, optimised.programs.graph);
+    if (has_many_digits(options.precision)) source.support.emplace_back("base/many_digits.hpp");
     if (options.precision == Precision::double_double)
         for (const char* part : {"base/double_double_functions.hpp", "iteration/refinement.hpp"})
             source.support.emplace_back(part);

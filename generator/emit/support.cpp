@@ -61,6 +61,7 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
 
 std::string before_support(Precision precision) {
     if (precision == Precision::quadruple) return "#define LOBATTO_USE_FLOAT128\n";
+    if (has_many_digits(precision)) return "#define LOBATTO_USE_MPFR\n";
     if (precision == Precision::double_double)
         return "#if defined(__GNUC__) && !defined(__clang__)\n"
                "#pragma GCC optimize(\"no-tree-slp-vectorize\")  // with which g++ 12 loses the low parts of sums\n"

@@ -180,7 +180,8 @@ std::string value_table(const std::string& name, const std::vector<cln::cl_R>& v
                    "            ");
 }
 
-const char* type_name(Precision precision) {
+std::string type_name(Precision precision) {
+    if (has_many_digits(precision)) return fmt::format("lobatto::ManyDigits<{}>", bits_of(precision));
     switch (precision) {
         case Precision::single:
             return "float";

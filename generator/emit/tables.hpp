@@ -26,7 +26,7 @@ bool has_unit_masses(const System& system);
 std::string shapes(const Derivation& derivation, Precision precision, const std::string& name,
                    const std::string& digest);
 std::string tables(const Derivation& derivation, Precision precision);
-const char* type_name(Precision precision);
+std::string type_name(Precision precision);
 // static constexpr int NAME[...] = {...}; and real NAME[...] likewise.
 std::string integer_table(const std::string& name, const std::vector<int>& values);
 std::string number_table(const std::string& name, const std::vector<GiNaC::ex>& values, Precision precision);

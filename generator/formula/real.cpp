@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Every operation runs at 60 digits and passes through `checked`.
+// Every operation runs at the working digits and passes through `checked`.
 #include "generator/formula/real.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "generator/formula/spline.hpp"
@@ -17,14 +18,14 @@ using GiNaC::ex_to;
 using GiNaC::is_a;
 using GiNaC::numeric;
 
-constexpr long digits = 60;
+std::atomic<int> digits{60};
 // |value| <= 2^4096, about 1e1233; beyond it sin() would need millions of digits of pi.
 constexpr int largest_magnitude = 4096;
 
 // GiNaC keeps the number of digits in one global.
 class Precision {
 public:
-    Precision() : before_(GiNaC::Digits) { GiNaC::Digits = digits; }
+    Precision() : before_(GiNaC::Digits) { GiNaC::Digits = working_digits(); }
     ~Precision() { GiNaC::Digits = before_; }
     Precision(const Precision&) = delete;
     Precision& operator=(const Precision&) = delete;
@@ -72,6 +73,16 @@ std::vector<numeric> each_operand(const ex& expression, const Visit& visit) {
 
 }  // namespace
 
+int working_digits() {
+    return digits;
+}
+
+void need_digits(int more) {
+    int now = digits;
+    while (now < more && !digits.compare_exchange_weak(now, more)) {
+    }
+}
+
 const std::vector<Function>& functions() {
     // clang-format off
 #define LOBATTO_FUNCTION(name) \
@@ -113,7 +124,7 @@ numeric real_value(const numeric& exact) {
 numeric real_sum(const std::vector<numeric>& terms) {
     return checked(
         [&] {
-            static const numeric rounding = GiNaC::pow(numeric(10), numeric(10 - digits));
+            const numeric rounding = GiNaC::pow(numeric(10), numeric(10 - working_digits()));
             numeric sum = 0, size = 0;
             for (const numeric& term : terms) {
                 sum += term;
@@ -160,9 +171,9 @@ numeric real_function(const Function& function, const numeric& argument) {
     }
     const std::string description = fmt::format("{} of {}", function.name, shown(argument));
     const numeric result = checked([&] { return function.value(argument); }, description);
-    // Next to a pole of tan, 60 digits of the argument give a large number instead of none.
-    static const numeric pole = GiNaC::pow(numeric(10), numeric(digits - 10));
-    if (function.name == "tan" && abs(result) > pole) throw NoValue(description + " is not finite");
+    // Next to a pole of tan, the digits of the argument give a large number instead of none.
+    if (function.name == "tan" && abs(result) > GiNaC::pow(numeric(10), numeric(working_digits() - 10)))
+        throw NoValue(description + " is not finite");
     return result;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Values of constant expressions: 60 digits, every intermediate result a finite real number of bounded size.
+// Values of constant expressions: 60 digits or more, every intermediate result a finite real number of bounded size.
 #pragma once
 
 #include <ginac/ginac.h>
@@ -9,6 +9,11 @@
 #include <vector>
 
 namespace lobatto {
+
+// Decimal digits of every computation on constants: 60, once numbers of more digits than that were asked for as many as
+// these need, from then on in the whole process.
+int working_digits();
+void need_digits(int digits);  // before anything is computed that is to have so many
 
 // Why an expression has no value, as a clause: "log of 0 is not finite".
 class NoValue : public std::domain_error {

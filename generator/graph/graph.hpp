@@ -72,7 +72,7 @@ struct Input {
     double start = 0.5;  // near this value the formulas are real, as far as is known
 };
 
-// Decimal digits of every computation on constants.
+// Decimal digits that every computation on constants has at least: working_digits() (formula/real.hpp).
 constexpr int number_digits = 60;
 
 // A value left the real numbers: square root or logarithm of a negative number, division by zero.

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The graph's two bridges: from GiNaC expressions, and to numbers of 60 digits (CLN).
+// The graph's two bridges: from GiNaC expressions, and to numbers of the working digits (CLN).
 #include <cln/cln.h>
 
 #include <algorithm>
 
 #include <optional>
 
+#include "generator/formula/real.hpp"
 #include "generator/formula/spline.hpp"
 #include "generator/graph/graph.hpp"
 
@@ -13,10 +14,12 @@ namespace lobatto {
 
 namespace {
 
-const cln::float_format_t format = cln::float_format(number_digits);
+cln::float_format_t format() {
+    return cln::float_format(static_cast<std::uintptr_t>(working_digits()));
+}
 
 cln::cl_F real(const cln::cl_R& x) {
-    return cln::cl_float(x, format);
+    return cln::cl_float(x, format());
 }
 
 cln::cl_R real_part_of(const cln::cl_N& z, const char* what) {
@@ -34,7 +37,7 @@ std::optional<Op> function_op(const std::string& name) {
 }
 
 const cln::cl_F largest_number =
-    cln::cl_float(cln::expt_pos(cln::cl_I(10), 5000), format);  // __float128 ends at 1e4932
+    cln::cl_float(cln::expt_pos(cln::cl_I(10), 5000), format());  // __float128 ends at 1e4932
 
 // Powers of exact numbers stay exact up to this size.
 constexpr double most_bits = 100000;
@@ -106,7 +109,7 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         case Op::atan2:
             if (!cln::zerop(x[0])) return cln::atan(real(x[1]), real(x[0]));
             if (cln::zerop(x[1])) throw DomainError("atan2 of 0 and 0");
-            return cln::minusp(x[1]) ? cln::cl_R(cln::pi(format)) : cln::cl_R(0);
+            return cln::minusp(x[1]) ? cln::cl_R(cln::pi(format())) : cln::cl_R(0);
         case Op::table:  // beyond its ends as at them: near a start there may be samples that no motion meets
             return spline_of(exponent / 4)(exponent % 4, real(x[0]));
         case Op::raise:
@@ -197,7 +200,7 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
                 throw std::logic_error("a symbol without input: " + GiNaC::ex_to<GiNaC::symbol>(e).get_name());
             id = static_cast<Id>(GiNaC::ex_to<GiNaC::numeric>(place->second).to_int());
         } else if (e.is_equal(GiNaC::Pi)) {
-            id = constant(cln::pi(format), "pi");
+            id = constant(cln::pi(format()), "pi");
         } else if (GiNaC::is_a<GiNaC::add>(e)) {
             std::vector<Id> terms;
             for (const auto& term : e) terms.push_back(self(self, term));

@@ -207,11 +207,38 @@ private:
                             : fmt::format("{}({}, {})", in_template_ ? "lobatto::literal<number>" : "DoubleDouble",
                                           double_literal(high), double_literal(low));
         }
+        if (has_many_digits(precision_)) return literal_of_words(value);
         const int digits = precision_ == Precision::single ? 9 : precision_ == Precision::extended ? 21 : 36;
         const char* suffix = precision_ == Precision::single ? "f" : precision_ == Precision::extended ? "L" : "Q";
         std::string text = decimal(value, digits);
         if (text.find_first_of(".e") == std::string::npos) text += ".0";
         return text + suffix;
+    }
+
+    // The exponent and the words of ManyDigits (base/many_digits.hpp), rounded once, ties to even.
+    std::string literal_of_words(const cln::cl_R& value) const {
+        if (const double near = nearest_double(value); cln::rational(cln::cl_float(near)) == cln::rational(value))
+            return double_literal(near);
+        constexpr int word = 64;
+        const int bits = bits_of(precision_), words = (bits + word - 1) / word;
+        const auto length = static_cast<std::uintptr_t>(bits);
+        const cln::cl_RA exact = cln::rational(cln::abs(value));
+        long exponent = exponent_of(value) + 1;  // what it is of, in [1/2, 1), or one more
+        cln::cl_I whole;
+        do {
+            --exponent;
+            whole = cln::round1(exact * cln::expt(cln::cl_RA(2), static_cast<int>(bits - exponent)));
+        } while (cln::integer_length(whole) < length);
+        if (cln::integer_length(whole) > length) {
+            whole = cln::ash(whole, -1);
+            ++exponent;
+        }
+        whole = cln::ash(whole, words * word - bits);
+        std::string text;
+        for (int i = words - 1; i >= 0; --i)
+            text += fmt::format(", {:#x}u", cln::cl_I_to_UQ(cln::ldb(
+                                                whole, cln::cl_byte(word, static_cast<std::uintptr_t>(i * word)))));
+        return fmt::format("{}real::of({}{})", cln::minusp(value) ? "-" : "", exponent, text);
     }
 
     Printed constant(Id id) const {

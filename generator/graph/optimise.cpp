@@ -11,9 +11,15 @@
 #include <set>
 #include <stdexcept>
 
+#include "generator/formula/real.hpp"
+
 namespace lobatto {
 
 namespace {
+
+cln::float_format_t format_of_samples() {
+    return cln::float_format(static_cast<std::uintptr_t>(working_digits()));
+}
 
 // Seeded sample values: the same on every machine.
 class Samples {
@@ -22,8 +28,7 @@ public:
     cln::cl_R next() {
         state_ = state_ * 6364136223846793005u + 1442695040888963407u;
         const auto bits = static_cast<unsigned long>(state_ >> 34);  // 30 bits
-        return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 7 + 1) / cln::cl_I(1ul << 33),
-                             cln::float_format(number_digits)) +
+        return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 7 + 1) / cln::cl_I(1ul << 33), format_of_samples()) +
                cln::cl_RA("1/16");
     }
 
@@ -45,9 +50,9 @@ std::optional<std::vector<Sampled>> outputs_at(const Programs& programs, std::ui
     // Anywhere in (0, 1) first; where that leaves the real numbers, ever nearer to the scene's own values.
     for (const Input& input : programs.graph.inputs()) {
         const cln::cl_R sample = samples.next();
-        const cln::cl_R start = cln::cl_float(input.start, cln::float_format(number_digits));
-        const cln::cl_R nearness = cln::scale_float(cln::cl_float(1, cln::float_format(number_digits)),
-                                                    -(static_cast<int>(seed) - any_seeds) / 4);
+        const cln::cl_R start = cln::cl_float(input.start, format_of_samples());
+        const cln::cl_R nearness =
+            cln::scale_float(cln::cl_float(1, format_of_samples()), -(static_cast<int>(seed) - any_seeds) / 4);
         inputs.push_back(static_cast<int>(seed) <= any_seeds ? sample
                                                              : start + nearness * (sample - cln::cl_RA("1/2")));
     }

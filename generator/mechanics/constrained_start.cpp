@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "generator/formula/real.hpp"
 #include "generator/graph/notation.hpp"
 
 namespace lobatto {
@@ -45,7 +46,7 @@ void ConstrainedStart::keep_positions() {
 
 // Newton's iteration M (q - q0) + G^T mu = 0, phi(q) = 0, its steps halved while phi would grow.
 void ConstrainedStart::move_positions(const Numbers& given) {
-    const cln::cl_R small = power_of_ten(-30);
+    const cln::cl_R small = power_of_ten(-working_digits() / 2);
     Numbers q = given;
     for (int iteration = 0; iteration < 100; ++iteration) {
         Numbers away;

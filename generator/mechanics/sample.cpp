@@ -5,11 +5,15 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "generator/formula/real.hpp"
+
 namespace lobatto {
 
 namespace {
 
-const cln::float_format_t format = cln::float_format(number_digits);
+cln::float_format_t format() {
+    return cln::float_format(static_cast<std::uintptr_t>(working_digits()));
+}
 
 std::size_t index_of(const GiNaC::exmap& inputs, const GiNaC::ex& symbol) {
     return static_cast<std::size_t>(GiNaC::ex_to<GiNaC::numeric>(inputs.at(symbol)).to_int());
@@ -73,7 +77,7 @@ cln::cl_R size_of(const Node& node, const Sized& result, const std::vector<Sized
         case Op::raise: {  // x^y = exp(y log x)
             const auto& [base, exponent] = std::tie(operands[0], operands[1]);
             if (!cln::plusp(base.value)) return cln::max(size, base.size);
-            const cln::cl_R logarithm = cln::abs(cln::ln(cln::cl_float(base.value, format)));
+            const cln::cl_R logarithm = cln::abs(cln::ln(cln::cl_float(base.value, format())));
             return cln::max(
                 size, size * cln::max(cln::abs(exponent.value) * base.size / base.value, logarithm * exponent.size));
         }
@@ -94,7 +98,7 @@ cln::cl_R size_of(const Node& node, const Sized& result, const std::vector<Sized
 }  // namespace
 
 cln::cl_R float_of(const GiNaC::numeric& value) {
-    return cln::cl_float(cln::the<cln::cl_R>(value.to_cl_N()), format);
+    return cln::cl_float(cln::the<cln::cl_R>(value.to_cl_N()), format());
 }
 
 std::vector<Sized> all_sized(const Graph& graph, const std::vector<cln::cl_R>& inputs, const std::vector<Id>& roots) {
@@ -197,14 +201,14 @@ std::vector<cln::cl_R> Formulas::evaluate(const std::vector<Id>& roots) const {
 cln::cl_R Noise::next() {
     state_ = state_ * 6364136223846793005u + 1442695040888963407u;
     const auto bits = static_cast<unsigned long>(state_ >> 34);  // 30 bits
-    return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 2 + 1) / cln::cl_I(1ul << 30) - 1, format);
+    return cln::cl_float(cln::cl_RA(cln::cl_I(bits) * 2 + 1) / cln::cl_I(1ul << 30) - 1, format());
 }
 
 NearStart::NearStart(const Scene& scene, int attempt)
     : scene_(scene),
       attempt_(attempt),
       noise_(static_cast<std::uint64_t>(attempt) + 1),
-      spread_(cln::expt(cln::cl_float(cln::cl_RA("1/2"), format), attempt / 2)) {}
+      spread_(cln::expt(cln::cl_float(cln::cl_RA("1/2"), format()), attempt / 2)) {}
 
 cln::cl_R NearStart::near(const cln::cl_R& value) {
     const cln::cl_R size = cln::zerop(value) ? cln::cl_R(1) : cln::abs(value);
@@ -234,7 +238,7 @@ void NearStart::set_all(Formulas& formulas) {
         formulas.set(scene_.coordinates[k].position, position(k));
         formulas.set(scene_.coordinates[k].velocity, velocity(k));
     }
-    formulas.set(scene_.time, near(cln::cl_float(0, format)));
+    formulas.set(scene_.time, near(cln::cl_float(0, format())));
 }
 
 cln::cl_R Elsewhere::parameter(std::size_t index) {

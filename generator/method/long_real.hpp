@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Real numbers of 150 digits, with the face of Surd: for rules whose nodes lie in no quadratic field.
+// Real numbers of 220 digits, with the face of Surd: for rules whose nodes lie in no quadratic field.
 #pragma once
 
 #include <cln/cln.h>
@@ -10,9 +10,9 @@
 namespace lobatto {
 
 struct LongReal {
-    static constexpr int digits = 150;  // of every operation
-    static constexpr int kept = 100;    // of a result: what rounding spoils is cut off, equal numbers become equal
-    static constexpr int noise_digits = 120;  // a difference below 10^-120 is rounding
+    static constexpr int digits = 220;  // of every operation
+    static constexpr int kept = 150;    // of a result: what rounding spoils is cut off, equal numbers become equal
+    static constexpr int noise_digits = 170;  // a difference below 10^-170 is rounding
 
     cln::cl_F value = to_float(0);
 

@@ -49,9 +49,10 @@ std::string Method::name() const {
 }
 
 std::string reason_against_numbers(const Method& method) {
-    if (method.numbers == Precision::double_double && method.arithmetic == StepArithmetic::clean)
-        return "clean arithmetic is for numbers of one machine word; leave it out, since double-double has digits to "
-               "spare";
+    const bool is_one_word = method.numbers != Precision::double_double && !has_many_digits(method.numbers);
+    if (!is_one_word && method.arithmetic == StepArithmetic::clean)
+        return "clean arithmetic is for numbers of one machine word; leave it out, since numbers in " +
+               precision_name(method.numbers) + " have digits to spare";
     const bool is_wider = method.numbers != Precision::single && method.numbers != Precision::double_;
     if (method.family != Family::splitting || !is_wider) return "";
     const int known = splitting_of(method.points).digits;

@@ -15,7 +15,7 @@ namespace lobatto {
 // stand in any order, and serve systems of constant mass only: their stage map is explicit (D40).
 //
 // All numbers are exact where the nodes lie in one quadratic field Q(sqrt d): Lobatto with up to 5 points, Gauss with
-// up to 3, and splitting methods, all rational; beyond, floats of 100 digits, rounded from 150 so that equal numbers
+// up to 3, and splitting methods, all rational; beyond, floats of 150 digits, rounded from 220 so that equal numbers
 // are equal; 0, 1/2 and 1 remain exact. The residue of an identity between floats is about 1e-105, not 0: never ask it
 // is_zero(). Indices are 0-based here: node i of the code is node i + 1 of docs/derivation.md. (The paper's nodes 0,
 // xi, 1 - xi, 1 are nodes 0, 1, 2, 3 of Lobatto with 4 points.)

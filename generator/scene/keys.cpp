@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "generator/method/method.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -35,6 +37,14 @@ Key lines(const std::string& name, const std::string& help, std::vector<Key> key
     Key one = section(name, help, std::move(keys));
     one.lines = true;
     one.is_short = is_short;
+    return one;
+}
+
+// Types of numbers by name, and "50 digits".
+Key numbers_key() {
+    Key one = word("numbers", {}, "What the steps are computed in");
+    for (const Precision precision : all_precisions) one.words.push_back(precision_name(precision));
+    one.pattern = "^(2[0-9]|[3-9][0-9]|1[0-3][0-9]|140) digits$";
     return one;
 }
 
@@ -90,15 +100,14 @@ std::vector<Key> make_keys() {
               {required(key("when", Holds::quoted, "The wall and its side, such as \"y = 0 falling\"")), count_key,
                key("restitution", Holds::formula, "The part of the normal velocity that is given back, 0 to 1"),
                key("reset", Holds::names, "Positions and velocities after the impact, such as { \"x'\" = \"-x'\" }")}),
-        section("method", "How it is integrated",
-                {word("family", {"lobatto", "gauss", "splitting"}, "The family of methods"),
-                 whole("points", 2, 12, "Lobatto's quadrature points; the order is 2 points - 2"),
-                 whole("stages", 1, 35, "Stages of Gauss (1 to 10) or of splitting methods (6, 11, 14, 17, 35)"),
-                 key("tolerance", Holds::formula, "Where the iteration of a step stops; without it at rounding"),
-                 word("arithmetic", {"plain", "clean"}, "Clean: rounding errors grow like a random walk"),
-                 word("numbers", {"float", "double", "long double", "double-double", "quadruple"},
-                      "What the steps are computed in"),
-                 key("clock", Holds::formula, "The time step's factor, a formula of positions, or \"auto\"")}),
+        section(
+            "method", "How it is integrated",
+            {word("family", {"lobatto", "gauss", "splitting"}, "The family of methods"),
+             whole("points", 2, 12, "Lobatto's quadrature points; the order is 2 points - 2"),
+             whole("stages", 1, 35, "Stages of Gauss (1 to 10) or of splitting methods (6, 11, 14, 17, 35)"),
+             key("tolerance", Holds::formula, "Where the iteration of a step stops; without it at rounding"),
+             word("arithmetic", {"plain", "clean"}, "Clean: rounding errors grow like a random walk"), numbers_key(),
+             key("clock", Holds::formula, "The time step's factor, a formula of positions, or \"auto\"")}),
         required(section("run", "From the start to the end",
                          {key("step", Holds::formula, "The step"),
                           whole("steps_per_period", 1, most_steps, "Instead of the step, with the period"),

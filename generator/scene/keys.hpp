@@ -32,6 +32,7 @@ struct Key {
     std::string help;  // one sentence without a full stop
     bool required = false;
     std::vector<std::string> words = {};
+    std::string pattern = {};       // of other words that will do, a regular expression
     long long least = 0, most = 0;  // of whole numbers
     std::vector<Key> keys = {};     // of a table
     bool lines = false;             // a table of lines with names of one's own, each with these keys

@@ -95,6 +95,7 @@ private:
             value.kind == Value::Kind::text ? precision_of(value.text.value) : std::optional<Precision>();
         if (!numbers) fail(value.at, "unknown numbers; there are " + precision_list());
         scene_.method.numbers = *numbers;
+        need_digits_for(*numbers);
         if (const std::string why = reason_against_numbers(scene_.method); !why.empty()) fail(value.at, why);
     }
 

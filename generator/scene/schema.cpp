@@ -61,7 +61,8 @@ Schema schema_of_value(const Key& key) {
         case Holds::truth:
             return {{"type", "boolean"}};
         case Holds::word:
-            return {{"type", "string"}, {"enum", key.words}};
+            if (key.pattern.empty()) return {{"type", "string"}, {"enum", key.words}};
+            return {{"type", "string"}, {"anyOf", {{{"enum", key.words}}, {{"pattern", key.pattern}}}}};
         case Holds::names:
             return reference("names");
         case Holds::table:

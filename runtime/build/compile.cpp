@@ -35,6 +35,13 @@ std::string first_lines(const std::string& output) {
     return lines + (end < output.size() ? "[...]\n" : "");
 }
 
+// By the words of g++, then of clang++.
+bool lacks_mpfr(const std::string& output) {
+    for (const char* text : {"mpfr.h: No such file", "'mpfr.h' file not found"})
+        if (output.find(text) != std::string::npos) return true;
+    return false;
+}
+
 std::string how_it_ended(const ProcessResult& result, double seconds_limit) {
     if (result.timed_out) return fmt::format("did not finish within {} s", seconds_limit);
     if (result.signal != 0) {
@@ -50,7 +57,7 @@ Compiled compile(const Translation& translation, const std::atomic<bool>* abando
     const Compiler compiler = find_compiler(translation.quadruple);
     const std::string source = translation.name + ".cpp", object = translation.name + ".so";
     ProcessRequest request;
-    request.arguments = compile_arguments(compiler, source, object, translation.quadruple, translation.short_loops);
+    request.arguments = compile_arguments(compiler, source, object, translation);
     const std::string command = shell_text(request.arguments);
 
     const CacheEntry entry(
@@ -77,6 +84,11 @@ Compiled compile(const Translation& translation, const std::atomic<bool>* abando
     }
     const bool has_object = std::filesystem::exists(request.folder + "/" + object);
     if (!result.succeeded() || !has_object) {
+        if (translation.many_digits > 0 && lacks_mpfr(result.output))
+            throw MachineError(fmt::format(
+                "numbers = \"{} digits\" needs MPFR, and {} does not find its header mpfr.h; install Debian's package "
+                "libmpfr-dev (apt-get install libmpfr-dev), or choose \"double-double\" or \"quadruple\"",
+                translation.many_digits, compiler.words[0]));
         std::string kept = "Source, command and whole output are kept in " + entry.failed_path();
         try {
             write_file(request.folder + "/command", command + "\n");

@@ -14,6 +14,7 @@ struct Translation {
     std::string text;          // the whole C++ source: abi.h, kernel.hpp, the emitted header, export.hpp,
                                // LOBATTO_EXPORT_KERNEL
     bool quadruple = false;    // links libquadmath (g++ only)
+    int many_digits = 0;       // links MPFR, for numbers of so many digits; 0: does not
     bool short_loops = false;  // only loops of few instructions are written out: large texts compile in less time
 };
 

@@ -104,7 +104,7 @@ Compiler find_compiler(bool quadruple) {
 }
 
 std::vector<std::string> compile_arguments(const Compiler& compiler, const std::string& source,
-                                           const std::string& object, bool quadruple, bool short_loops) {
+                                           const std::string& object, const Translation& translation) {
     std::vector<std::string> arguments = compiler.words;
     // -ffp-contract=off: products and sums are fused where the text says so (`fused`), nowhere else; so g++ and clang++
     // give the same bits on one kind of processor, and the error-free sums of a kernel keep their proof (adr/0002).
@@ -116,19 +116,20 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     arguments.push_back("-O2");
     if (!is_clang(*find_program(compiler.words.front()))) {
         arguments.push_back("-fpeel-loops");
-        if (short_loops) arguments.insert(arguments.end(), {"--param", "max-completely-peeled-insns=60"});
+        if (translation.short_loops) arguments.insert(arguments.end(), {"--param", "max-completely-peeled-insns=60"});
     }
     for (const char* flag :
          {"-march=native", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden"})
         arguments.push_back(flag);
-    if (quadruple) {
+    if (translation.quadruple) {
         for (const char* flag : {"-std=gnu++17", "-fext-numeric-literals", "-DLOBATTO_USE_FLOAT128="})
             arguments.push_back(flag);
     } else {
         arguments.push_back("-std=c++17");
     }
     for (const std::string& word : {source, std::string("-o"), object}) arguments.push_back(word);
-    if (quadruple) arguments.push_back("-lquadmath");
+    if (translation.quadruple) arguments.push_back("-lquadmath");
+    if (translation.many_digits > 0) arguments.push_back("-lmpfr");
     return arguments;
 }
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/build/compile.hpp"
+
 namespace lobatto {
 
 struct Compiler {
@@ -18,7 +20,7 @@ Compiler find_compiler(bool quadruple);
 
 // The whole argument list that makes `object` from `source`, both relative to the folder of the compilation.
 std::vector<std::string> compile_arguments(const Compiler& compiler, const std::string& source,
-                                           const std::string& object, bool quadruple, bool short_loops);
+                                           const std::string& object, const Translation& translation);
 
 // A word of a command as one would type it: quoted when anything in it is unusual.
 std::string shell_word(const std::string& word);

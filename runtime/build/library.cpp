@@ -42,6 +42,8 @@ const char* name_of(lobatto_real kind) {
             return "__float128";
         case LOBATTO_DOUBLE_DOUBLE:
             return "double-double";
+        case LOBATTO_MANY_DIGITS:
+            return "many digits";
     }
     return "an unknown number type";
 }

@@ -45,7 +45,8 @@ typedef enum lobatto_real {
     LOBATTO_DOUBLE = 1,
     LOBATTO_LONG_DOUBLE = 2,
     LOBATTO_FLOAT128 = 3,
-    LOBATTO_DOUBLE_DOUBLE = 4 /* high, low: two doubles */
+    LOBATTO_DOUBLE_DOUBLE = 4, /* high, low: two doubles */
+    LOBATTO_MANY_DIGITS = 5    /* as many as are asked for (base/many_digits.hpp) */
 } lobatto_real;
 
 typedef enum lobatto_form {

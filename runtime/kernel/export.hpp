@@ -384,9 +384,12 @@ struct Export {
         return LOBATTO_UNSUPPORTED;
     }
 
-    static constexpr std::int32_t parts = static_cast<double>(Limits<real>::epsilon) > 0x1p-53    ? 1
-                                          : static_cast<double>(Limits<real>::epsilon) > 0x1p-106 ? 2
-                                                                                                  : 3;
+    static constexpr std::int32_t parts_of(double epsilon) {
+        std::int32_t count = 1;
+        for (double bound = 0x1p-53; epsilon <= bound; bound *= 0x1p-53) ++count;
+        return count;
+    }
+    static constexpr std::int32_t parts = parts_of(static_cast<double>(Limits<real>::epsilon));
     static void to_parts(const void* numbers, std::int64_t count, double* to) {
         for (std::int64_t i = 0; i < count; ++i) {
             real rest = in(numbers)[i];
@@ -458,7 +461,8 @@ struct Export {
     }
 
     static constexpr lobatto_real kind() {
-        return std::is_class_v<real>                  ? LOBATTO_DOUBLE_DOUBLE
+        return is_many_digits<real>                   ? LOBATTO_MANY_DIGITS
+               : std::is_class_v<real>                ? LOBATTO_DOUBLE_DOUBLE
                : sizeof(real) == 4                    ? LOBATTO_FLOAT
                : sizeof(real) == 8                    ? LOBATTO_DOUBLE
                : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE

@@ -3,6 +3,8 @@
 #ifndef LOBATTO_KERNEL_HPP
 #define LOBATTO_KERNEL_HPP
 
+#include "base/many_digits.hpp"  // whose functions packs look for
+
 #include "base/angles.hpp"
 #include "base/arc.hpp"
 #include "base/contract.hpp"

@@ -2,12 +2,15 @@
 // The symplectic defect and the discrete energy, from the kernel's tangent map.
 #include "runtime/measure/diagnostics.hpp"
 
+#include <gmpxx.h>
+
 #include <Eigen/Core>
 #include <cmath>
 
 #include "runtime/error.hpp"
 #include "runtime/kernel/base/double_double.hpp"
 #include "runtime/measure/linear_algebra.hpp"
+#include "runtime/run/parts.hpp"
 
 namespace lobatto {
 
@@ -61,6 +64,44 @@ template DoubleDouble symplectic_defect(const LoadedStepper<DoubleDouble>&, cons
                                         const std::vector<DoubleDouble>&);
 template __float128 symplectic_defect(const LoadedStepper<__float128>&, const std::vector<__float128>&,
                                       const std::vector<__float128>&);
+
+double symplectic_defect(const NumberStepper& stepper, const NumberStepper::Parts& q, const NumberStepper::Parts& p) {
+    const std::size_t n = stepper.coordinates(), rows = 2 * n, parts = stepper.parts();
+    NumberStepper::Parts whole;
+    if (stepper.tangent(as_parts({0}, parts), q, p, whole) != LOBATTO_OK)
+        throw ComputationError("the symplectic defect cannot be measured: the step from this state fails");
+    const mpf_class zero(0, 2 * 53 * parts + 64);  // its precision is that of all others
+    std::vector<mpf_class> T(rows * rows, zero);
+    for (std::size_t i = 0; i < whole.size(); ++i) T[i / parts] += whole[i];
+    double to_q = 0, to_p = 0;
+    for (std::size_t a = 0; a < n; ++a)
+        for (std::size_t b = n; b < rows; ++b) {
+            to_q = std::fmax(to_q, std::fabs(T[a * rows + b].get_d()));
+            to_p = std::fmax(to_p, std::fabs(T[b * rows + a].get_d()));
+        }
+    const double exponent = std::round(std::log2(to_q) / 2 - std::log2(to_p) / 2),
+                 unit = std::fabs(exponent) < 1000 ? std::ldexp(1.0, static_cast<int>(exponent)) : 1;
+    for (std::size_t a = 0; a < n; ++a)
+        for (std::size_t b = n; b < rows; ++b) {
+            T[a * rows + b] /= unit;
+            T[b * rows + a] *= unit;
+        }
+    double squares = 0, defect = 0;
+    for (const mpf_class& entry : T) squares += entry.get_d() * entry.get_d();
+    for (std::size_t a = 0; a < rows; ++a)
+        for (std::size_t b = 0; b < a; ++b) {
+            mpf_class sum = zero, product = zero;
+            if (a == b + n) sum = 1;  // -J_ab
+            for (std::size_t i = 0; i < n; ++i) {
+                product = T[i * rows + a] * T[(n + i) * rows + b];
+                sum += product;
+                product = T[(n + i) * rows + a] * T[i * rows + b];
+                sum -= product;
+            }
+            defect = std::fmax(defect, std::fabs(sum.get_d()));
+        }
+    return squares > 1 ? defect / squares : defect;
+}
 
 double DiscreteEnergy::operator()(const double* q, const double* p) const {
     Eigen::VectorXd z(2 * n);

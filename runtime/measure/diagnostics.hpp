@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/build/library.hpp"
+#include "runtime/build/number_stepper.hpp"
 
 namespace lobatto {
 
@@ -13,6 +14,8 @@ namespace lobatto {
 // max(1, |T|^2), in units of q and p (powers of two) in which dq1/dp and dp1/dq are of one size.
 template <class real>
 real symplectic_defect(const LoadedStepper<real>& stepper, const std::vector<real>& q, const std::vector<real>& p);
+// The same of a kernel in any numbers, computed exactly from its tangent map.
+double symplectic_defect(const NumberStepper& stepper, const NumberStepper::Parts& q, const NumberStepper::Parts& p);
 
 // The discrete energy that the map z -> Phi z + w of an autonomous linear system conserves (D21): about a fixed point
 // z* it is H_d(z) = -1/2 (z - z*)^T J Phi (z - z*), for one coordinate the paper's eq:discreteEnergy. Where a constant

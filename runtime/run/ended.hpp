@@ -22,11 +22,14 @@ struct Ended {
     std::int64_t row_step = 0;  // steps before the last row
     int stop = -1;              // of a trajectory that a stop ended: which
     std::vector<double> reduced;
-    double energy_start = 0, energy_error_largest = 0;
+    double energy_error_largest = 0;
+    // Where numbers have several parts: rows and energies with all of them. The energy at the start always.
+    std::vector<double> whole_rows, whole_energies, energy_start;
 
     bool goes_on() const { return status == LOBATTO_OK && stop < 0; }
-    // A state, t, q[n], p[n], with its energy.
-    void keep(const EnsembleRequest& request, const double* row, std::size_t n, double energy);
+    // A state with its energy; q and p have n numbers of so many parts.
+    void keep(const EnsembleRequest& request, double time, const double* q, const double* p, std::size_t n,
+              const double* energy, std::size_t parts = 1);
 };
 
 // The most rows that a trajectory keeps.

@@ -19,6 +19,7 @@
 
 #include "runtime/error.hpp"
 #include "runtime/run/ended.hpp"
+#include "runtime/run/parts.hpp"
 #include "runtime/run/refilled.hpp"
 #include "runtime/run/side_by_side.hpp"
 #include "runtime/run/timing.hpp"
@@ -52,19 +53,26 @@ struct Plan {
 class Worker {
 public:
     Worker(const Kernel& kernel, const EnsembleRequest& request, Shared& shared)
-        : request_(request), shared_(shared), n_(static_cast<std::size_t>(kernel->coordinates)), single_(kernel) {
+        : request_(request),
+          shared_(shared),
+          n_(static_cast<std::size_t>(kernel->coordinates)),
+          parts_(static_cast<std::size_t>(kernel->parts)),
+          step_(request.whole_step.empty() ? as_parts({request.step}, parts_) : request.whole_step),
+          single_(kernel) {
         if (kernel->lanes > 0)
             lanes_ = std::make_unique<LaneTrajectories>(kernel);
+        else if (kernel->real_kind != LOBATTO_DOUBLE)
+            lanes_ = std::make_unique<NumberTrajectory>(kernel, request);
         else
             lanes_ = std::make_unique<SingleTrajectory>(kernel, request);
         const auto width = static_cast<std::size_t>(lanes_->width());
         start_.parameters.resize(static_cast<std::size_t>(kernel->parameters));
         start_.q.resize(n_);
         start_.rate.resize(n_);
-        parameters_.resize(width * start_.parameters.size());
-        q_.resize(width * n_);
-        p_.resize(width * n_);
-        energy_.resize(width);
+        parameters_.resize(width * start_.parameters.size() * parts_);
+        q_.resize(width * n_ * parts_);
+        p_.resize(width * n_ * parts_);
+        energy_.resize(width * parts_);
         status_.resize(width);
         steps_done_.resize(width);
         iterations_.resize(width);
@@ -87,9 +95,26 @@ private:
         const auto put = [&](const std::vector<double>& from, std::vector<double>& to) {
             std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(lane * from.size()));
         };
-        put(start_.parameters, parameters_);
-        put(start_.q, q_);
-        put(start_.rate, p_);
+        put(whole(start_.whole_parameters, start_.parameters), parameters_);
+        put(whole(start_.whole_q, start_.q), q_);
+        put(whole(start_.whole_rate, start_.rate), p_);
+    }
+    // As the kernel takes them.
+    const std::vector<double>& whole(std::vector<double>& parts, const std::vector<double>& x) const {
+        if (parts_ == 1) return x;
+        if (parts.empty()) parts = as_parts(x, parts_);
+        return parts;
+    }
+    void turn_velocities_into_momenta() {
+        if (single_.prepare(whole(start_.whole_parameters, start_.parameters), step_) != LOBATTO_OK) {
+            std::fill(start_.rate.begin(), start_.rate.end(), no_number);
+            start_.whole_rate.clear();
+            return;
+        }
+        const std::vector<double> p = single_.momentum(
+            as_parts({request_.time}, parts_), whole(start_.whole_q, start_.q), whole(start_.whole_rate, start_.rate));
+        start_.rate = rounded(p, parts_);
+        if (parts_ > 1) start_.whole_rate = p;
     }
 
     void begin(std::int64_t first, std::vector<Ended>& ended) {
@@ -97,21 +122,16 @@ private:
         for (std::size_t lane = 0; lane < width; ++lane) {  // those that are left over repeat the last
             if (lane < ended.size()) {
                 request_.start(request_.first + first + static_cast<std::int64_t>(lane), start_);
-                if (request_.from_velocities) {
-                    if (single_.prepare(start_.parameters, request_.step) == LOBATTO_OK)
-                        start_.rate = single_.momentum(request_.time, start_.q, start_.rate);
-                    else
-                        std::fill(start_.rate.begin(), start_.rate.end(), no_number);
-                }
+                if (request_.from_velocities) turn_velocities_into_momenta();
             }
             place(lane);
         }
-        lanes_->prepare(parameters_, request_.step, status_.data());
+        lanes_->prepare(parameters_, step_, status_.data());
         lanes_->start(request_.time, q_, p_, status_.data());
         lanes_->energy(q_, p_, energy_);
         for (std::size_t lane = 0; lane < ended.size(); ++lane) {
             ended[lane].status = static_cast<lobatto_status>(status_[lane]);
-            if (ended[lane].status != LOBATTO_OK) energy_[lane] = no_number;
+            if (ended[lane].status != LOBATTO_OK) energy_[lane * parts_] = no_number;
             keep(lane, ended[lane]);
         }
         reduces_ = request_.reducer && ended[0].status == LOBATTO_OK;
@@ -119,12 +139,9 @@ private:
     }
 
     void keep(std::size_t lane, Ended& ended) const {
-        std::vector<double> row{ended.stop >= 0 ? lanes_->stop_time() : time_after(request_, ended.steps_done)};
-        for (const std::vector<double>* numbers : {&q_, &p_}) {
-            const auto begin = numbers->begin() + static_cast<std::ptrdiff_t>(lane * n_);
-            row.insert(row.end(), begin, begin + static_cast<std::ptrdiff_t>(n_));
-        }
-        ended.keep(request_, row.data(), n_, energy_[lane]);
+        ended.keep(request_, ended.stop >= 0 ? lanes_->stop_time() : time_after(request_, ended.steps_done),
+                   q_.data() + lane * n_ * parts_, p_.data() + lane * n_ * parts_, n_, energy_.data() + lane * parts_,
+                   parts_);
     }
 
     // False: interrupted.
@@ -185,8 +202,9 @@ private:
 
     const EnsembleRequest& request_;
     Shared& shared_;
-    std::size_t n_;
-    LoadedStepper<double> single_;  // for momenta
+    std::size_t n_, parts_;
+    std::vector<double> step_;
+    NumberStepper single_;  // for momenta
     std::unique_ptr<Trajectories> lanes_;
     EnsembleStart start_;
     std::vector<double> parameters_, q_, p_, energy_;
@@ -275,13 +293,25 @@ EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
     const std::int64_t count = std::ssize(ended.energies);
     trajectory.kept = {ended.rows.data(), ended.energies.data(), count,
                        static_cast<int>(std::ssize(ended.rows) / count)};
-    trajectory.energy_start = ended.energy_start;
-    trajectory.energy_error_final = ended.energies.back() - ended.energy_start;
+    if (!ended.whole_rows.empty()) {
+        trajectory.kept.whole = ended.whole_rows.data();
+        trajectory.kept.whole_energy = ended.whole_energies.data();
+        trajectory.kept.parts = static_cast<int>(ended.energy_start.size());
+        trajectory.whole_energy_start = ended.energy_start.data();
+    }
+    trajectory.energy_start = ended.energy_start[0];
+    trajectory.energy_error_final = trajectory.energy_error(count - 1);
     trajectory.energy_error_largest = ended.energy_error_largest;
     return trajectory;
 }
 
 }  // namespace
+
+double EnsembleTrajectory::energy_error(std::int64_t row) const {
+    if (kept.energy == nullptr) return no_number;
+    if (kept.whole_energy == nullptr) return kept.energy[row] - energy_start;
+    return difference(kept.whole_energy + row * kept.parts, whole_energy_start, static_cast<std::size_t>(kept.parts));
+}
 
 int thread_count(int threads) {
     return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -290,7 +320,8 @@ int thread_count(int threads) {
 double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
     const Plan plan(kernel, request);
     const double rows = static_cast<double>(rows_kept(request)) * static_cast<double>(plan.group_size);
-    return sizeof(double) * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 1);
+    const int parts = kernel->parts > 1 ? 1 + kernel->parts : 1;
+    return sizeof(double) * parts * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 1);
 }
 
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {

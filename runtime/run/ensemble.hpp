@@ -23,6 +23,9 @@ struct EnsembleStart {
     std::vector<double> parameters;  // scene order
     std::vector<double> q;           // n
     std::vector<double> rate;        // n: momenta, or velocities when the request says so
+    // With all digits of the kernel's numbers, as sums of `parts` doubles (NumberStepper); empty: those above are
+    // exact.
+    std::vector<double> whole_parameters = {}, whole_q = {}, whole_rate = {};
 };
 
 // A trajectory that has ended: at the end of the time, or where it failed, which stops it alone.
@@ -34,12 +37,15 @@ struct EnsembleTrajectory {
     // Kept states, at least one. The last is the last good one; its status is that of the trajectory. Those before it
     // are the start and each `every`-th state. A start that is impossible is kept too.
     Records kept;
-    double energy_start = 0;          // not a number when there is none, and the errors with it
-    double energy_error_final = 0;    // H - H(0)
-    double energy_error_largest = 0;  // max over the kept states |H - H(0)|
-    int stop = -1;                    // of a trajectory that a stop ended: the number of the event; its last state is
-                                      // that of the stop
+    double energy_start = 0;                     // not a number when there is none, and the errors with it
+    double energy_error_final = 0;               // H - H(0)
+    double energy_error_largest = 0;             // max over the kept states |H - H(0)|
+    const double* whole_energy_start = nullptr;  // where numbers have parts
+    int stop = -1;  // of a trajectory that a stop ended: the number of the event; its last state is
+                    // that of the stop
     const std::vector<double>* reduced = nullptr;  // what its reducer made of it
+
+    double energy_error(std::int64_t row) const;  // H - H(0) of a kept state; not a number when there is none
 };
 
 // Makes a few numbers of one trajectory after another, each from its first state to its last.
@@ -60,6 +66,7 @@ struct EnsembleRequest {
     bool from_velocities = false;  // momenta are computed with the parameters of each trajectory
     double time = 0;
     double step = 0;                                        // h; may be negative
+    std::vector<double> whole_step;                         // as of EnsembleStart
     double tolerance = 0;                                   // of a step's iteration; 0: to rounding
     std::int64_t steps = 0;                                 // >= 0, of each trajectory; count * steps < 2^63
     Arrivals arrivals;                                      // of kernels with a clock

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "runtime/run/parts.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace lobatto {
@@ -8,9 +9,9 @@ namespace lobatto {
 namespace {
 
 // The terms become others with the same sum, of which the last is the rounded sum (T. Ogita, S. Rump and S. Oishi
-// 2005: error-free vector transformations, repeated).
-double rounded_sum(std::vector<double>& terms) {
-    for (std::size_t pass = 0; pass < 4; ++pass)
+// 2005: error-free vector transformations, repeated). `parts`: of the numbers they are made of.
+double rounded_sum(std::vector<double>& terms, std::size_t parts) {
+    for (std::size_t pass = 0; pass < std::max<std::size_t>(4, parts + 1); ++pass)
         for (std::size_t i = 1; i < terms.size(); ++i) {
             const double a = terms[i - 1], b = terms[i], sum = a + b, part = sum - a;
             terms[i - 1] = (a - (sum - part)) + (b - part);
@@ -34,9 +35,13 @@ std::vector<double> rounded(const std::vector<double>& whole, std::size_t parts)
 }
 
 double difference(const double* x, const double* y, std::size_t parts) {
-    double sum = 0;
-    for (std::size_t j = 0; j < parts; ++j) sum += x[j] - y[j];
-    return sum;
+    if (parts == 1 || !std::isfinite(x[0] - y[0])) return x[0] - y[0];
+    std::vector<double> terms;
+    for (std::size_t j = parts; j-- > 0;) {
+        terms.push_back(-y[j]);
+        terms.push_back(x[j]);
+    }
+    return rounded_sum(terms, parts);
 }
 
 std::vector<double> times_fraction(const std::vector<double>& x, std::int64_t numerator, std::int64_t denominator) {
@@ -49,7 +54,7 @@ std::vector<double> times_fraction(const std::vector<double>& x, std::int64_t nu
     for (auto part = x.rbegin(); part != x.rend(); ++part) add_product(*part, up);
     // The remainder, divided: part by part.
     for (std::size_t j = 0; j < x.size(); ++j) {
-        result.push_back(rounded_sum(terms) / down);
+        result.push_back(rounded_sum(terms, x.size()) / down);
         add_product(-result.back(), down);
     }
     return result;

@@ -90,7 +90,7 @@ bool RefilledLanes::fill(std::size_t lane, std::int64_t number, Ended& ended) {
     to.last.assign(1, request_.time);
     to.last.insert(to.last.end(), start_.q.begin(), start_.q.end());
     to.last.insert(to.last.end(), p.begin(), p.end());
-    ended.keep(request_, to.last.data(), n_, status == LOBATTO_OK ? energy(to, to.last.data()) : no_number);
+    keep(to, ended, to.last.data(), status == LOBATTO_OK);
     if (to.reducer && status == LOBATTO_OK) {
         to.reducer->begin(to.stepper, start_);
         to.reducer->observe(to.last.data(), 1);
@@ -159,13 +159,13 @@ void RefilledLanes::look(std::size_t number, Ended& ended) {
         ended.steps_done = before + i;
         const double* const row = rows + (i - 1) * columns_;
         if (ended.steps_done == request_.steps || (request_.every != 0 && ended.steps_done % request_.every == 0))
-            ended.keep(request_, row, n_, energy(lane, row));
+            keep(lane, ended, row);
     }
     if (done > 0) lane.last.assign(rows + (done - 1) * columns_, rows + done * columns_);
     if (ended.status == LOBATTO_STOPPED)
         stop(lane, events + (events_written_[number] - 1) * (1 + columns_), ended);
     else if (ended.status != LOBATTO_OK && ended.steps_done > ended.row_step)
-        ended.keep(request_, lane.last.data(), n_, energy(lane, lane.last.data()));
+        keep(lane, ended, lane.last.data());
 }
 
 // `row`: event number, t, q, p.
@@ -173,7 +173,13 @@ void RefilledLanes::stop(Lane& lane, const double* row, Ended& ended) const {
     ended.status = LOBATTO_OK;
     ended.stop = static_cast<int>(row[0]);
     if (lane.reducer) lane.reducer->observe(row + 1, 1);
-    ended.keep(request_, row + 1, n_, energy(lane, row + 1));
+    keep(lane, ended, row + 1);
+}
+
+// A row t, q, p.
+void RefilledLanes::keep(const Lane& lane, Ended& ended, const double* row, bool is_possible) const {
+    const double its_energy = is_possible ? energy(lane, row) : no_number;
+    ended.keep(request_, row[0], row + 1, row + 1 + n_, n_, &its_energy);
 }
 
 // Of a row t, q, p; not a number without one.

@@ -36,6 +36,7 @@ private:
     void advance(std::vector<Ended>& group);
     void look(std::size_t lane, Ended& ended);
     void stop(Lane& lane, const double* row, Ended& ended) const;
+    void keep(const Lane& lane, Ended& ended, const double* row, bool is_possible = true) const;
     double energy(const Lane& lane, const double* row) const;
 
     Kernel kernel_;

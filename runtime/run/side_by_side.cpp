@@ -6,6 +6,8 @@
 #include <limits>
 #include <new>
 
+#include "runtime/run/parts.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -26,8 +28,9 @@ SingleTrajectory::SingleTrajectory(const Kernel& kernel, const EnsembleRequest& 
     if (is_watched) events_.resize(static_cast<std::size_t>(2 * kernel->events_of_step) * (1 + columns));
 }
 
-void SingleTrajectory::prepare(const std::vector<double>& parameters, double step, std::int32_t* status) {
-    *status = stepper_.prepare(parameters, step);
+void SingleTrajectory::prepare(const std::vector<double>& parameters, const std::vector<double>& step,
+                               std::int32_t* status) {
+    *status = stepper_.prepare(parameters, step[0]);
 }
 
 void SingleTrajectory::start(double time, const std::vector<double>& q, const std::vector<double>& p,
@@ -103,6 +106,59 @@ void SingleTrajectory::energy(const std::vector<double>& q, const std::vector<do
     if (!has_one) energy[0] = no_energy;
 }
 
+NumberTrajectory::NumberTrajectory(const Kernel& kernel, const EnsembleRequest& request)
+    : stepper_(kernel), event_rows_(request.stops && kernel->events > 0 ? 2 * kernel->events_of_step : 0) {}
+
+void NumberTrajectory::prepare(const std::vector<double>& parameters, const std::vector<double>& step,
+                               std::int32_t* status) {
+    *status = stepper_.prepare(parameters, step);
+}
+
+void NumberTrajectory::start(double time, const std::vector<double>& q, const std::vector<double>& p,
+                             std::int32_t* status) {
+    time_ = as_parts({time}, stepper_.parts());
+    stop_ = -1;
+    if (*status == LOBATTO_OK) *status = stepper_.start(time_, q, p);
+}
+
+void NumberTrajectory::advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status,
+                               std::int64_t* steps_done, std::int64_t* iterations) {
+    lobatto_advance call{};
+    call.tolerance = request.tolerance;
+    call.event_capacity = event_rows_;
+    std::vector<double> records, events;
+    *steps_done = *iterations = 0;
+    do {  // full rows of events may need several calls
+        call.steps = steps - *steps_done;
+        *status = stepper_.advance(call, records, events);
+        *steps_done += call.steps_done;
+        *iterations += call.iterations;
+    } while (*status == LOBATTO_OK && *steps_done < steps);
+    if (*status != LOBATTO_STOPPED) return;
+    const auto one = static_cast<std::ptrdiff_t>(stepper_.parts()),
+               n = static_cast<std::ptrdiff_t>(stepper_.coordinates()) * one;  // row: event number, t, q, p
+    stop_ = static_cast<int>(*(events.end() - 2 * n - 2 * one));
+    time_.assign(events.end() - 2 * n - one, events.end() - 2 * n);
+    stop_q_.assign(events.end() - 2 * n, events.end() - n);
+    stop_p_.assign(events.end() - n, events.end());
+}
+
+void NumberTrajectory::state(std::vector<double>& q, std::vector<double>& p) {
+    if (stop_ >= 0) {
+        q = stop_q_;
+        p = stop_p_;
+    } else {
+        stepper_.state(time_, q, p);
+    }
+}
+
+void NumberTrajectory::energy(const std::vector<double>& q, const std::vector<double>& p,
+                              std::vector<double>& energy) const {
+    const bool has_one = stepper_.kernel()->has_energy != 0 &&
+                         stepper_.energy(time_.data(), q.data(), p.data(), energy.data()) == LOBATTO_OK;
+    if (!has_one) std::fill(energy.begin(), energy.end(), no_energy);
+}
+
 LaneTrajectories::LaneTrajectories(const Kernel& kernel)
     : kernel_(kernel),
       memory_(::operator new (static_cast<std::size_t>(kernel->ensemble_bytes),
@@ -113,13 +169,31 @@ void LaneTrajectories::Deleter::operator()(void* memory) const {
     ::operator delete (memory, std::align_val_t{alignment});
 }
 
-void LaneTrajectories::prepare(const std::vector<double>& parameters, double step, std::int32_t* status) {
-    kernel_->ensemble_prepare(memory_.get(), parameters.data(), &step, status);
+const void* LaneTrajectories::numbers(const std::vector<double>& values, std::vector<std::byte>& room) const {
+    if (kernel_->real_kind == LOBATTO_DOUBLE) return values.data();
+    room.resize(values.size() * static_cast<std::size_t>(kernel_->real_bytes));
+    kernel_->from_parts(values.data(), std::ssize(values), room.data());
+    return room.data();
+}
+
+template <class Read>
+void LaneTrajectories::read(std::vector<double>& values, std::vector<std::byte>& room, const Read& read) const {
+    if (kernel_->real_kind == LOBATTO_DOUBLE) return read(static_cast<void*>(values.data()));
+    room.resize(values.size() * static_cast<std::size_t>(kernel_->real_bytes));
+    read(static_cast<void*>(room.data()));
+    kernel_->to_parts(room.data(), std::ssize(values), values.data());
+}
+
+void LaneTrajectories::prepare(const std::vector<double>& parameters, const std::vector<double>& step,
+                               std::int32_t* status) {
+    kernel_->ensemble_prepare(memory_.get(), numbers(parameters, room_), numbers(step, more_room_), status);
 }
 
 void LaneTrajectories::start(double time, const std::vector<double>& q, const std::vector<double>& p,
                              std::int32_t* status) {
-    kernel_->ensemble_start(memory_.get(), &time, q.data(), p.data(), status);
+    std::vector<std::byte> room_of_time;
+    kernel_->ensemble_start(memory_.get(), numbers({time}, room_of_time), numbers(q, room_), numbers(p, more_room_),
+                            status);
 }
 
 void LaneTrajectories::advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status,
@@ -128,7 +202,9 @@ void LaneTrajectories::advance(const EnsembleRequest& request, std::int64_t step
 }
 
 void LaneTrajectories::state(std::vector<double>& q, std::vector<double>& p) {
-    kernel_->ensemble_state(memory_.get(), q.data(), p.data());
+    read(q, room_, [&](void* positions) {
+        read(p, more_room_, [&](void* momenta) { kernel_->ensemble_state(memory_.get(), positions, momenta); });
+    });
 }
 
 void LaneTrajectories::energy(const std::vector<double>&, const std::vector<double>&,
@@ -136,7 +212,7 @@ void LaneTrajectories::energy(const std::vector<double>&, const std::vector<doub
     if (kernel_->ensemble_energy == nullptr)
         std::fill(energy.begin(), energy.end(), no_energy);
     else
-        kernel_->ensemble_energy(memory_.get(), energy.data());
+        read(energy, room_, [&](void* values) { kernel_->ensemble_energy(memory_.get(), values); });
 }
 
 }  // namespace lobatto

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 
 #include "runtime/run/decimal.hpp"
+#include "runtime/run/output.hpp"
 #include "runtime/run/parts.hpp"
 #include "tests/support.hpp"
 
@@ -89,10 +91,9 @@ TEST_CASE("numbers stand in the scene, and --numbers takes their place") {
     CHECK(contains(test::read_file(csv), ", in double-double\n"));
     REQUIRE(place.run({"run", scene, "--until", "1", "--numbers", "double", "-o", csv}).exit_code == 0);
     CHECK_FALSE(contains(test::read_file(csv), ", in double"));
-    for (const std::string command : {"sweep", "verify", "roundoff", "stability"}) {
+    for (const std::string command : {"roundoff", "stability"}) {
         CAPTURE(command);
         std::vector<std::string> words = {command, scene};
-        if (command == "sweep") words.insert(words.end(), {"--vary", "q=0:1:3", "-o", csv});
         const test::Finished refused = place.run(words);
         CHECK(refused.exit_code == 2);
         CHECK(contains(refused.err, fmt::format("{}: `lobatto {}` computes in double, but numbers are "
@@ -104,8 +105,8 @@ TEST_CASE("numbers stand in the scene, and --numbers takes their place") {
     const test::Finished unknown = place.run({"run", scene, "-o", csv});
     CHECK(unknown.exit_code == 2);
     CHECK(contains(unknown.err,
-                   "unknown numbers; there are \"float\", \"double\", \"long double\", \"double-double\" "
-                   "and \"quadruple\""));
+                   "unknown numbers; there are \"float\", \"double\", \"long double\", \"double-double\", "
+                   "\"quadruple\" and \"20 digits\" to \"140 digits\""));
 }
 
 TEST_CASE("what other numbers cannot do is refused") {
@@ -123,4 +124,84 @@ TEST_CASE("what other numbers cannot do is refused") {
     CHECK(clocked.exit_code == 2);
     CHECK(contains(clocked.err, comet + ":7:9: with a clock `lobatto run` computes in double, but numbers are "
                                         "\"double-double\"; remove the clock, or give --numbers double"));
+}
+
+TEST_CASE("a sweep computes in the numbers that are asked for, with the digits of a run") {
+    const Place place;
+    const std::string csv = place.file("sweep.csv"), alone = place.file("run.csv");
+    const auto sweep = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> words{"sweep", oscillators, "--points", "12", "--until", "2", "--vary", "y=0.2,0.3"};
+        words.insert(words.end(), more.begin(), more.end());
+        words.insert(words.end(), {"-o", csv});
+        const test::Finished done = place.run(words);
+        REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+        return read_trajectory(csv);
+    };
+    const std::vector<std::vector<double>> in_double = sweep({}).rows;
+    for (const std::string numbers : {"double-double", "quadruple", "long double"}) {
+        CAPTURE(numbers);
+        const TrajectoryTable table = sweep({"--numbers", numbers});
+        CHECK(contains(test::read_file(csv), ", in " + numbers + "\n"));
+        const std::size_t parts = numbers == "quadruple" ? 3 : 2;
+        const auto x = static_cast<std::size_t>(std::find(table.columns.begin(), table.columns.end(), "x") -
+                                                table.columns.begin());
+        REQUIRE(x + 2 * parts < table.columns.size());
+        CHECK(table.columns[x + 1] == "x.rest");
+        CHECK(table.columns[x + parts] == "y");
+        // The second trajectory is the scene itself: its digits are those of a run.
+        REQUIRE(place.run({"run", oscillators, "--points", "12", "--until", "2", "--numbers", numbers, "-o", alone})
+                    .exit_code == 0);
+        const std::vector<std::string> end = last_row(alone);
+        for (std::size_t k = 0; k < 2; ++k) {
+            double whole[3];
+            REQUIRE(read_decimal(end[1 + k], whole, static_cast<int>(parts)));
+            for (std::size_t part = 0; part < parts; ++part) CHECK(table.rows[1][x + k * parts + part] == whole[part]);
+        }
+        const auto error = table.rows[1].back();
+        CHECK(error < 1e-12);  // measured, as without the option
+        CHECK(std::fabs(table.rows[0][x] - in_double[0][x]) < 1e-14);
+    }
+    // Two starts side by side in vector registers.
+    const std::vector<std::vector<double>> in_float = sweep({"--numbers", "float"}).rows;
+    REQUIRE(in_float.size() == in_double.size());
+    for (std::size_t i = 0; i < in_float.size(); ++i)
+        for (std::size_t c = 0; c + 2 < in_float[i].size(); ++c)
+            CHECK(std::fabs(in_float[i][c] - in_double[i][c]) < 1e-4);
+    CHECK(in_float[1].back() > 1e-9);
+    CHECK(in_float[1].back() < 1e-3);
+}
+
+TEST_CASE("sweeps in other numbers go on where they were stopped, and refuse what is computed in double alone") {
+    const Place place;
+    const std::string csv = place.file("sweep.csv");
+    const std::vector<std::string> words{"sweep", pendulum,    "--vary",        "q=0.1:1:40", "--until",
+                                         "2",     "--numbers", "double-double", "-o",         csv};
+    REQUIRE(place.run(words).exit_code == 0);
+    const std::string whole = test::read_file(csv);
+    std::filesystem::rename(csv, csv + ".partial");
+    std::filesystem::resize_file(csv + ".partial", whole.size() * 2 / 3);
+    std::vector<std::string> again = words;
+    again.push_back("--resume");
+    const test::Finished resumed = place.run(again);
+    REQUIRE_MESSAGE(resumed.exit_code == 0, resumed.err);
+    CHECK(contains(resumed.out, "resumed"));
+    CHECK(test::read_file(csv) == whole);
+    const test::Finished kept =
+        place.run({"sweep", pendulum, "--vary", "q=0.1,1", "--keep", "max(q)", "--numbers", "float", "-o", csv});
+    CHECK(kept.exit_code == 2);
+    CHECK(contains(kept.err,
+                   "what sweeps keep of a trajectory is computed in double, but numbers are \"float\"; leave "
+                   "out --keep, or give --numbers double"));
+}
+
+TEST_CASE("verify proves the steps of a scene in its own numbers beside those in double and quadruple") {
+    const Place place;
+    for (const std::string numbers : {"double-double", "long double", "float"}) {
+        CAPTURE(numbers);
+        const test::Finished done = place.run({"verify", oscillators, "--points", "6", "--numbers", numbers});
+        CHECK_MESSAGE(done.exit_code == 0, done.out);
+        for (const std::string claim : {"20 steps against quadruple, ", "20 steps and back, ", "symplectic defect, "})
+            CHECK(contains(done.out, claim + numbers));
+        CHECK_FALSE(contains(done.out, "FAILED"));
+    }
 }

@@ -8,6 +8,7 @@
 
 #include "cli/table/hdf5_file.hpp"
 #include "cli/table/table_reader.hpp"
+#include "runtime/run/decimal.hpp"
 #include "tests/cli/tables.hpp"
 
 using namespace lobatto;
@@ -87,9 +88,22 @@ TEST_CASE("a run as .npy or .h5 has the numbers of its CSV") {
         CHECK(run(name, {"--resume"}).err ==
               "--resume: " + place.file(name) + " cannot be continued, only a .csv can; leave --resume out\n");
         const test::Finished wide = run("wide" + std::string(ending_of(format)), {"--numbers", "quadruple"});
-        CHECK(wide.exit_code == 2);
-        CHECK(wide.err == "-o: a " + std::string(ending_of(format)) +
-                              " holds numbers of 64 bits, but those of the run are \"quadruple\"; name a .csv\n");
+        REQUIRE_MESSAGE(wide.exit_code == 0, wide.err);
+        TableReader wide_reader(place.file("wide" + std::string(ending_of(format))), format,
+                                place.file("wide" + std::string(ending_of(format)) + ".json"));
+        // Three columns for each number, of which it is the sum.
+        REQUIRE(wide_reader.head().columns.size() == 3 * text.columns.size());
+        CHECK(wide_reader.head().columns[3].name == "q");
+        CHECK(wide_reader.head().columns[4].name == "q.rest");
+        CHECK(wide_reader.head().columns[5].name == "q.rest2");
+        REQUIRE(run("wide.csv", {"--numbers", "quadruple"}).exit_code == 0);
+        const std::string line = test::read_file(place.file("wide.csv"));
+        const std::size_t last = line.rfind('\n', line.size() - 2) + 1, first = line.find(',', last) + 1;
+        double parts[3];
+        REQUIRE(read_decimal(line.substr(first, line.find(',', first) - first), parts, 3));
+        REQUIRE(wide_reader.read(cells, 1000) == text.rows.size());
+        for (std::size_t part = 0; part < 3; ++part)
+            CHECK(real_in(cells[cells.size() - 3 * text.columns.size() + 3 + part]) == parts[part]);
     }
 }
 

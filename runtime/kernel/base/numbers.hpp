@@ -22,6 +22,10 @@ struct Limits {
                                                              : real(1.0 / 8589934592.0);  // 2^-33
 };
 
+// Whether a type is one of base/many_digits.hpp.
+template <class real>
+constexpr bool is_many_digits = false;
+
 // The C library's functions by the names that the compiler knows them by: <cmath> would take longer to read than all of
 // this support. Templates of one type, so that the library's own functions come first where both are in sight. Sine and
 // cosine of double are in base/trigonometry.hpp.

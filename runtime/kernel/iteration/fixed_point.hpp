@@ -35,7 +35,9 @@ struct FixedPoint : StageMap<K, typename K::real> {
     using Tables::n, Tables::s, Tables::m, Tables::with_end, Tables::absorbs, Tables::width, Tables::parts,
         Tables::entries;
     using typename Tables::V;
-    static constexpr int evaluation_limit = 16, carried_limit = 24;
+    // Of many digits each iteration gains as many as in double: more of them are still worth less than Newton's.
+    static constexpr bool is_long = is_many_digits<real>;
+    static constexpr int evaluation_limit = is_long ? 60 : 16, carried_limit = is_long ? 80 : 24;
 
     struct Arrays {
         V base[parts * n], X[parts * n], W[parts * n], S[parts * entries], Y[parts * n], carried[parts * n];

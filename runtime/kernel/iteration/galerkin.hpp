@@ -63,7 +63,7 @@ struct GalerkinFixedPoint {
     using V = typename Layout::V;
     static constexpr bool in_lanes = Layout::in_lanes;
     static constexpr int width = Layout::width, parts = Layout::parts_of(r), entries = K::mass_entries;
-    static constexpr int evaluation_limit = 30;
+    static constexpr int evaluation_limit = is_many_digits<real> ? 60 : 30;
     using ActiveMask = decltype(T() < T());
 
     static constexpr bool has_kappa() {

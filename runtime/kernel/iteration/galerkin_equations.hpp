@@ -100,8 +100,10 @@ struct NodeProducts {
                         K::b[i] * Tables::weight(row, i, j) * Tables::weight(column, i, k + 1);
     }
 };
-template <class K, Slot row, Slot column>
+template <class K, Slot row, Slot column, bool computed_at_start = is_many_digits<typename K::real>>
 constexpr NodeProducts<K, row, column> node_products{};
+template <class K, Slot row, Slot column>  // MPFR is no part of the compiler
+inline const NodeProducts<K, row, column> node_products<K, row, column, true>{};
 
 // A motion with the equations of its steps. What is marked `solver` is in the order of the unknowns that solve.hpp has.
 template <class K>

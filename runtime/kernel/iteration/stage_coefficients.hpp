@@ -25,8 +25,10 @@ struct StageCoefficients {
             }
     }
 };
-template <class K>
+template <class K, bool computed_at_start = is_many_digits<typename K::real>>
 constexpr StageCoefficients<K> stage_coefficients{};
+template <class K>
+inline const StageCoefficients<K> stage_coefficients<K, true>{};  // MPFR is no part of the compiler
 
 }  // namespace lobatto
 

@@ -132,7 +132,7 @@ TEST_CASE("the command names the compiler that CXX names and all flags, and fuse
               " -O2 -fpeel-loops -march=native -fno-math-errno -ffp-contract=off -fPIC -shared "
               "-fvisibility=hidden -std=c++17 answer.cpp -o answer.so");
     CHECK(
-        compile({answer.name, answer.text, false, true})
+        compile({answer.name, answer.text, false, 0, true})
             .command.starts_with(compiler + " -O2 -fpeel-loops --param max-completely-peeled-insns=60 -march=native "));
     const EnvironmentVariable words("CXX", compiler + "  -DLOBATTO_UNUSED='a' ");
     CHECK(compile(answer).command.starts_with(compiler + " '-DLOBATTO_UNUSED='\\''a'\\''' -O2 "));
