@@ -17,7 +17,7 @@ namespace lobatto {
 namespace {
 
 // A wait costs a processor nothing: MPI's own would turn in a loop.
-constexpr std::chrono::microseconds moment{200};
+constexpr std::chrono::microseconds moment{1000};
 
 class MpiRanks : public Ranks {
 public:
