@@ -46,8 +46,11 @@ int look_at(dl_phdr_info* module, std::size_t, void* found) {
     for (int i = 0; i < module->dlpi_phnum; ++i) {
         const ElfW(Phdr)& part = module->dlpi_phdr[i];
         std::string& id = *static_cast<std::string*>(found);
-        if (part.p_type == PT_NOTE && id.empty())
-            id = id_among(reinterpret_cast<const char*>(module->dlpi_addr + part.p_vaddr), part.p_memsz);
+        if (part.p_type != PT_NOTE || !id.empty()) continue;
+        // The loader tells addresses as numbers.
+        const auto* notes =
+            reinterpret_cast<const char*>(module->dlpi_addr + part.p_vaddr);  // NOLINT(performance-no-int-to-ptr)
+        id = id_among(notes, part.p_memsz);
     }
     return 1;
 }

@@ -390,7 +390,7 @@ TEST_CASE("an event may hold the time where the Lagrangian does not") {
         header(scene("time = \"t\"\nlagrangian = \"x'^2/2 - x^4/4\"\n[coordinates]\n"
                      "x = { position = 1, velocity = 0 }\n" +
                      run + "[output]\nevents = [\"x = t/10 falling\"]\n"));
-    CHECK(text.find("void event(const Coefficients&, real time,") != std::string::npos);
+    CHECK(text.find("void event(const CoefficientsOf<given>&, number time,") != std::string::npos);
 }
 
 TEST_CASE("a driven chain absorbs only what does not depend on the time") {
