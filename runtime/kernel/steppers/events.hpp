@@ -134,7 +134,7 @@ struct Events {
 
     // Where the functions are sampled first.
     static real grid_at(int i) {
-        constexpr real beside = real(1) / real(1024 * pieces);
+        const real beside = real(1) / real(1024 * pieces);
         return i == 0               ? real(0)
                : i == 1             ? beside
                : i == grid_size - 2 ? real(1) - beside
