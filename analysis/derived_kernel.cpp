@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/derived_kernel.hpp"
 
+#include <cln/real_io.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -34,7 +35,17 @@ std::string key_of(const Scene& scene, const KernelWish& wish) {
     std::ostringstream step;
     step << scene.evaluate(scene.run.step, "the step");
     key += fmt::format("step: {}\n", step.str());
-    for (const TableUse& table : scene.tables) key += fmt::format("table: {}\n", spline_name(table.spline));
+    // With all digits: the name of a spline knows those of double.
+    for (const TableUse& table : scene.tables) {
+        const Spline& spline = spline_of(table.spline);
+        std::ostringstream digits;
+        for (std::size_t i = 0; i < spline.x().size(); ++i) {
+            digits << ' ' << spline.x()[i];
+            if (i < spline.coefficients().size())
+                for (const cln::cl_R& c : spline.coefficients()[i]) digits << ',' << c;
+        }
+        key += fmt::format("table: {}{}\n", spline_name(table.spline), digits.str());
+    }
     return key + "scene:\n" + scene.source.content();
 }
 

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/tape.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -12,14 +15,70 @@ namespace lobatto {
 
 using GiNaC::ex;
 
+namespace {
+
+// GiNaC's order of sums and products changes from process to process, and so would the rounding. This one follows from
+// what the operands are; not from their signs, which it chooses by its own order: (a - b)^3 is -(b - a)^3.
+class Order {
+public:
+    explicit Order(const Tape::Variables& variables) : variables_(variables) {}
+
+    std::vector<ex> operands(const ex& formula) {
+        std::vector<ex> all;
+        for (std::size_t i = 0; i < formula.nops(); ++i) all.push_back(formula.op(i));
+        if (GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula))
+            std::stable_sort(all.begin(), all.end(), [&](const ex& a, const ex& b) { return of(a) < of(b); });
+        return all;
+    }
+
+private:
+    static std::uint64_t mixed(std::uint64_t hash, std::uint64_t more) {
+        hash = (hash ^ more) * 0x9E3779B97F4A7C15u;
+        return hash ^ (hash >> 29);
+    }
+    std::uint64_t of(const ex& formula) {
+        const auto known = known_.find(formula);
+        return known != known_.end() ? known->second : known_.emplace(formula, computed(formula)).first->second;
+    }
+    std::uint64_t computed(const ex& formula) {
+        if (GiNaC::is_a<GiNaC::symbol>(formula)) {
+            const auto found = variables_.number.find(formula);
+            return mixed(1, found == variables_.number.end() ? 0 : found->second + 1);
+        }
+        const bool is_product = GiNaC::is_a<GiNaC::mul>(formula);
+        std::uint64_t hash = is_product ? 2 : GiNaC::is_a<GiNaC::add>(formula) ? 3 : 4;
+        if (GiNaC::is_a<GiNaC::function>(formula)) {
+            for (const char letter : GiNaC::ex_to<GiNaC::function>(formula).get_name())
+                hash = mixed(hash, static_cast<unsigned char>(letter));
+        } else if (!is_product && hash != 3 && !GiNaC::is_a<GiNaC::power>(formula)) {
+            const ex number = formula.evalf();
+            if (!GiNaC::is_a<GiNaC::numeric>(number)) return 5;
+            return mixed(5, std::bit_cast<std::uint64_t>(
+                                std::fabs(GiNaC::ex_to<GiNaC::numeric>(GiNaC::real_part(number)).to_double())));
+        }
+        std::vector<ex> all = operands(formula);
+        if (is_product) std::erase_if(all, [](const ex& factor) { return factor.is_equal(-1); });
+        if (is_product && all.size() == 1) return of(all.front());
+        for (const ex& operand : all) hash = mixed(hash, of(operand));
+        return hash;
+    }
+
+    const Tape::Variables& variables_;
+    std::map<ex, std::uint64_t, GiNaC::ex_is_less> known_;
+};
+
+}  // namespace
+
 std::optional<Tape> Tape::of(const ex& formula, const Variables& variables) {
     Tape tape;
     Seen seen;
-    if (!tape.append(formula, variables, seen)) return std::nullopt;
+    Order order(variables);
+    const auto operands = [&](const ex& of) { return order.operands(of); };
+    if (!tape.append(formula, variables, operands, seen)) return std::nullopt;
     return tape;
 }
 
-bool Tape::append(const ex& formula, const Variables& variables, Seen& seen) {
+bool Tape::append(const ex& formula, const Variables& variables, const Operands& operands_of, Seen& seen) {
     static const std::map<std::string, double (*)(double)> functions{
         {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"exp", std::exp},
         {"log", std::log},   {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh},
@@ -37,8 +96,9 @@ bool Tape::append(const ex& formula, const Variables& variables, Seen& seen) {
         instruction.operation = Operation::recall;
         instruction.slot = slot;
     } else if (is_function || is_power || GiNaC::is_a<GiNaC::add>(formula) || GiNaC::is_a<GiNaC::mul>(formula)) {
-        for (std::size_t i = is_table_value(formula) ? 2 : 0; i < formula.nops(); ++i)
-            if (!append(formula.op(i), variables, seen)) return false;
+        const std::vector<ex> operands = operands_of(formula);
+        for (std::size_t i = is_table_value(formula) ? 2 : 0; i < operands.size(); ++i)
+            if (!append(operands[i], variables, operands_of, seen)) return false;
         instruction.operands = static_cast<int>(formula.nops());
         instruction.operation = is_function                        ? Operation::call
                                 : is_power                         ? Operation::power

@@ -4,6 +4,7 @@
 
 #include <ginac/ginac.h>
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -28,7 +29,8 @@ public:
         double value, size;  // size: the largest term, of a sum
     };
     Value sized(const std::vector<double>& variables) const;
-    double operator()(const std::vector<double>& variables) const { return sized(variables).value; }
+    // Zero has no sign: that of -(a - b) and b - a would be another.
+    double operator()(const std::vector<double>& variables) const { return sized(variables).value + 0.0; }
 
 private:
     enum class Operation { number, variable, recall, sum, product, power, call, angle, table };
@@ -43,7 +45,9 @@ private:
         std::optional<std::size_t> slot = std::nullopt;  // of the memory: where its result stays, or is found again
     };
     using Seen = std::map<GiNaC::ex, std::size_t, GiNaC::ex_is_less>;  // parts of the formula, and their instructions
-    bool append(const GiNaC::ex& formula, const Variables& variables, Seen& seen);
+    using Operands =
+        std::function<std::vector<GiNaC::ex>(const GiNaC::ex&)>;  // in an order that is the same everywhere
+    bool append(const GiNaC::ex& formula, const Variables& variables, const Operands& operands_of, Seen& seen);
 
     std::vector<Instruction> instructions_;  // operands come before what is done with them
     std::size_t slots_ = 0;

@@ -198,7 +198,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     if (goes_alone(trajectory, start)) return alone(trajectory, start);
     if (known_.empty() || trajectory.index >= first_ + std::ssize(known_)) compute(trajectory.index);
     const std::int64_t place = trajectory.index - first_;
-    if (place >= std::ssize(known_)) return {unknown, false};  // interrupted
+    if (place >= std::ssize(known_)) return {unknown, false, true};
     Known& known = known_[static_cast<std::size_t>(place)];
     const std::size_t n = groups_.size();
     const Records& kept = trajectory.kept;

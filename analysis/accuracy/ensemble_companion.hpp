@@ -23,7 +23,8 @@ public:
         // Of the positions at the end, each by its own amplitude; the largest. The largest of all, where the two were
         // so far apart that they may have met again by chance. Not a number: unknown.
         double relative;
-        bool lost;  // it was as large as the motion, or the companion could not reach the end
+        bool lost;                 // it was as large as the motion, or the companion could not reach the end
+        bool interrupted = false;  // before it was measured
     };
     // Of a trajectory that reached the end. To be asked in the order of the indices: the companions of many are
     // computed together.

@@ -6,21 +6,27 @@
 namespace lobatto {
 
 Judges::Judges(const Scene& scene, const Outline& derivation, const KernelSource& plain, const Kernel& plain_kernel,
-               const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost)
+               const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost,
+               std::recursive_mutex& algebra)
     : request_(request),
       watch_(derivation, plain, plain_kernel, request),
       domains_(scene, derivation.system),
-      accepts_lost_(accepts_lost) {
+      accepts_lost_(accepts_lost),
+      algebra_(algebra) {
     if (measures) companion_.emplace(derivation, kernel, plain_kernel, request);
 }
 
 Verdict Judges::judge(const EnsembleTrajectory& trajectory) {
     Verdict verdict{static_cast<int>(trajectory.status), std::nan("")};
     if (verdict.status != LOBATTO_OK) return verdict;
-    if (watch_.departs(trajectory)) verdict.status = departed;
+    {
+        const std::lock_guard lock(algebra_);
+        if (watch_.departs(trajectory)) verdict.status = departed;
+    }
     if (companion_) {
         const EnsembleCompanion::Error error = companion_->of(trajectory);
         verdict.error = error.relative;
+        verdict.interrupted = error.interrupted;
         if (error.lost && !accepts_lost_ && verdict.status == LOBATTO_OK) verdict.status = unresolved;
     }
     if (!is_defined(trajectory)) verdict.status = undefined;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -35,7 +36,8 @@ static_assert(sweep_statuses.size() == LOBATTO_STATUSES);
 
 struct Verdict {
     int status = LOBATTO_OK;
-    double error = 0;  // at the end, relative to the amplitude; not a number: not measured
+    double error = 0;          // at the end, relative to the amplitude; not a number: not measured
+    bool interrupted = false;  // before all was known of the trajectory
 };
 
 // Judges the trajectories, in their order: by their energies, by their companions, by where formulas have values.
@@ -44,7 +46,8 @@ public:
     // What is handed over outlives it. `plain`, `plain_kernel`: in double. `measures`: errors, by companions;
     // `accepts_lost`: trajectories of which nothing is left are no failures.
     Judges(const Scene& scene, const Outline& derivation, const KernelSource& plain, const Kernel& plain_kernel,
-           const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost);
+           const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost,
+           std::recursive_mutex& algebra);
 
     Verdict judge(const EnsembleTrajectory& trajectory);
 
@@ -59,6 +62,7 @@ private:
     Domains domains_;
     std::optional<EnsembleCompanion> companion_;
     bool accepts_lost_;
+    std::recursive_mutex& algebra_;  // formulas, which threads that make starts may evaluate too
 };
 
 }  // namespace lobatto

@@ -52,7 +52,7 @@ SweepStarts::SweepStarts(const Scene& scene, const StartsRequest& request, std::
             fmt::format("--vary: {} settings of the method; each is a sweep of its own, so at most {}: "
                         "give fewer values",
                         count_ / of_setting_, most_settings));
-    if (scene.run.assemble) {
+    if (scene.run.assemble && !scene.constraints.empty()) {
         if (scene.start == Start::momentum)
             throw InputError(fmt::format(
                 "{}: sweeps assemble starts by their velocities: give velocities in place of momenta", scene.path));

@@ -47,11 +47,6 @@ std::int64_t states_kept(const Overrides& overrides, const Scene& scene) {
     return scene.clock ? std::min<std::int64_t>(every, 1) : every;
 }
 
-// Formulas in more than one thread: one at a time.
-std::unique_lock<std::recursive_mutex> locked(std::recursive_mutex* algebra) {
-    return algebra == nullptr ? std::unique_lock<std::recursive_mutex>() : std::unique_lock(*algebra);
-}
-
 // Whether trajectories of these numbers go side by side in vector registers.
 bool has_ensembles(Precision numbers) {
     return numbers == Precision::double_ || numbers == Precision::single;
@@ -84,7 +79,7 @@ void StudyTimes::add(const StudyTimes& more) {
 
 SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options,
                        std::recursive_mutex* algebra)
-    : as_written_(std::move(scene)), options_(options), algebra_(algebra) {
+    : as_written_(std::move(scene)), options_(options), algebra_(algebra == nullptr ? own_.get() : algebra) {
     if (!as_written_.outputs.kept.empty() && options.overrides.every)
         throw InputError("--every: what is kept of a trajectory is one row; leave out --every, or --keep");
     check_numbers(as_written_);
@@ -98,7 +93,7 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
             "--until");
     if (options.steps && *options.steps < 0)
         throw InputError(fmt::format("--steps: {} is not a number of steps", *options.steps));
-    starts_ = std::make_unique<SweepStarts>(scene_, starts, algebra);
+    starts_ = std::make_unique<SweepStarts>(scene_, starts, algebra_);
     for (std::int64_t number = 0; number < starts_->settings(); ++number) {
         Scene of_setting = starts_->with_settings(scene_, number * starts_->count_of_setting());
         steps_.push_back(steps_of_setting(of_setting).count);
@@ -177,23 +172,23 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     request.every = looked_at(states_kept(options_.overrides, scene), setting.steps.count, options_.measures);
     request.threads = options_.threads;
     request.stops = !scene.run.stops.empty();
-    if (!scene.outputs.kept.empty())
-        request.reducer = [this, &scene] {
-            const auto lock = locked(algebra_);
-            return std::make_unique<Reductions>(scene);
+    if (!scene.outputs.kept.empty())  // threads copy it: formulas are not for several at once
+        request.reducer = [reductions = std::make_shared<const Reductions>(scene)] {
+            return std::make_unique<Reductions>(*reductions);
         };
     return request;
 }
 
 void SweepStudy::enter(std::int64_t number) {
     if (current_ && current_->number == number) return;
-    const auto lock = locked(algebra_);
+    const std::lock_guard lock(*algebra_);
     note_warning();
     judges_.reset();
     current_ = prepare(number);
     const Setting& setting = *current_;
     judges_.emplace(setting.scene, *setting.derivation, *setting.plain_source, *setting.plain, *setting.kernel,
-                    setting.request, options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon);
+                    setting.request, options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon,
+                    *algebra_);
 }
 
 StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink& sink,
@@ -209,7 +204,10 @@ StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink
         request.interrupted = interrupted;
         if (progress) request.progress = [&](std::int64_t done) { progress(steps_gone + done); };
         request.sink = [&](const EnsembleTrajectory& trajectory) {
-            sink(trajectory, judges_->judge(trajectory), request);
+            if (times.interrupted) return;  // what is handed on has no gaps
+            const Verdict verdict = judges_->judge(trajectory);
+            times.interrupted = verdict.interrupted;
+            if (!verdict.interrupted) sink(trajectory, verdict, request);
         };
         const EnsembleResult result = integrate(*current_->kernel, request);
         steps_gone += request.count * request.steps;

@@ -84,7 +84,8 @@ private:
 
     Scene as_written_, scene_;
     StudyOptions options_;
-    std::recursive_mutex* algebra_;
+    std::unique_ptr<std::recursive_mutex> own_ = std::make_unique<std::recursive_mutex>();
+    std::recursive_mutex* algebra_;  // formulas in more than one thread: one at a time
     std::unique_ptr<SweepStarts> starts_;
     std::unique_ptr<SweepRows> rows_;
     // By family and number: what was derived and emitted.

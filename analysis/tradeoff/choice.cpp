@@ -96,7 +96,7 @@ Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& req
         best = find_in(experiment, request, numbers);
         members += best.search.members;
         is_rounding = is_rounding || (numbers == Precision::double_ && best.search.is_rounding && !best.search.best);
-        least = std::fmin(least, std::fmax(best.search.least_error, best.search.best ? best.error : 0));
+        least = std::fmin(least, std::fmax(best.search.least_error, best.error));
         if (best.keeps(request.error)) break;
     }
     if (!best.keeps(request.error)) {

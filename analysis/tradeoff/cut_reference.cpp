@@ -38,6 +38,7 @@ public:
         result_.disagreement.assign(cut_samples + 1, std::numeric_limits<double>::infinity());
         double last = 0;
         std::int64_t ratio = 1;
+        bool has_arrived = false;  // any run, at the end
         for (int halving = 0; halving <= most_halvings; ++halving, ratio *= 2) {
             result_.is_late = 2.2 * last > request_.seconds_limit - elapsed();
             if (result_.is_late) break;
@@ -48,6 +49,7 @@ public:
                 before.clear();
                 continue;
             }
+            has_arrived = true;
             set_scale(states);
             if (!before.empty()) {
                 const std::vector<double> now = difference(before, states);
@@ -57,7 +59,7 @@ public:
             }
             before = states;
         }
-        if (result_.first.empty() && result_.is_late)
+        if (result_.first.empty() && result_.is_late && has_arrived)
             throw TooSlow(fmt::format("a reference to t = {:.6g} takes longer than the {:.3g} s that the budget leaves "
                                       "for it. Give more time with --budget, or an earlier --until",
                                       request_.until, request_.seconds_limit),

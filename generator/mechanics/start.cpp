@@ -57,6 +57,7 @@ public:
     void require_equations() {
         if (scene_.run.assemble) return;
         for (const Eliminated& x : scene_.eliminated) {
+            if (x.coordinate.follows) continue;
             require_equation(x, x.position, x.initial_position, "position");
             require_equation(x, x.velocity, x.initial_velocity, "velocity");
         }
@@ -442,7 +443,9 @@ void check_domains(const Scene& scene) {
     const Scene in_time = in_clock_time(scene);
     System system = undifferentiated(in_time);
     system.formulas = std::make_shared<const Formulas>();
-    StartCheck(in_time, system).require_domains();
+    StartCheck check(in_time, system);
+    check.require_domains();
+    check.require_equations();
 }
 
 }  // namespace lobatto

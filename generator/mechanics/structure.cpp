@@ -332,6 +332,21 @@ private:
                          count == 1 ? "one" : std::to_string(count), list, static_cast<std::size_t>(n_) - count, n_));
     }
 
+    // Second derivatives that cancel between formulas have no place that a loop could add them to.
+    bool has_places_of(const Elements& elements) const {
+        std::vector<std::pair<int, int>> places = separable_.entries;
+        if (form_ == Form::general) {
+            places.clear();
+            for (const auto& [place, value] : general_.routhian.second.entries()) places.push_back(place);
+        }
+        std::sort(places.begin(), places.end());
+        for (const Element& element : elements.repeated)
+            for (const auto& [i, j] : pairs_of(element))
+                for (const std::vector<int>& row : element.rows)
+                    if (!std::binary_search(places.begin(), places.end(), std::pair(row[i], row[j]))) return false;
+        return true;
+    }
+
     // Terms of V, or of L, that are one formula of many variables.
     void repetition() {
         const bool general = form_ == Form::general;
@@ -351,7 +366,7 @@ private:
         if (count < looped_from) return;
         Elements elements = find_elements(system_, general ? general_.routhian.z : system_.q, terms, forces);
         const std::size_t single = elements.others.size() + elements.other_forces.size();
-        result_.looped = 4 * single <= count;
+        result_.looped = 4 * single <= count && has_places_of(elements);
         if (result_.looped) result_.elements = std::move(elements);
         const std::size_t formulas = result_.elements.repeated.size();
         find("repeated terms", result_.looped,

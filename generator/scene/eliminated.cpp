@@ -44,6 +44,7 @@ public:
             follows_[coordinate.position] = solved.formula;
             follows_[coordinate.velocity] = rate_of_change(solved.formula, scene_);
         }
+        tell_momenta();
         hand_on_forces();
         substitute();
         remove();
@@ -68,19 +69,9 @@ private:
         if (std::count_if(scene_.constraints.begin(), scene_.constraints.end(),
                           [&](const Constraint& other) { return other.solved_for == k; }) > 1)
             return "it has several equations";
-        if (holds_momentum(k)) return fmt::format("p_{} stands in a formula", x.name);
         const std::string rough = what_is_not_smooth(constraint.solution);
         if (!rough.empty()) return "its equation holds " + rough;
         return solve(k, constraint);
-    }
-
-    bool holds_momentum(std::size_t k) const {
-        if (scene_.outputs.momenta_of_kept.empty()) return false;
-        const ex p = scene_.outputs.momenta_of_kept[k];
-        return std::any_of(scene_.outputs.kept.begin(), scene_.outputs.kept.end(),
-                           [&](const Reduction& kept) { return kept.value.has(p); }) ||
-               std::any_of(scene_.plots.begin(), scene_.plots.end(),
-                           [&](const Plot& plot) { return plot.value.has(p); });
     }
 
     // Of what has fewer than three derivatives, or jumps.
@@ -122,6 +113,18 @@ private:
         return std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(), [&](const Coordinate& c) {
             return constraint.solution.has(c.position) && !scene_.lagrangian.has(c.velocity);
         });
+    }
+
+    // What keeps and plots hold of p_x: dL/dx' of L as it is written.
+    void tell_momenta() {
+        if (scene_.outputs.momenta_of_kept.empty()) return;
+        GiNaC::exmap momenta;
+        for (const auto& [k, solved] : formulas_) {
+            ex momentum = scene_.lagrangian.diff(scene_.coordinates[k].velocity);
+            put_into(momentum);
+            momenta[scene_.outputs.momenta_of_kept[k]] = momentum;
+        }
+        follows_.insert(momenta.begin(), momenta.end());
     }
 
     // Virtual work: a force on x is one on what x follows from, F dx/dq.

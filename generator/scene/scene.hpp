@@ -24,6 +24,7 @@ struct Coordinate {
     Position rate_at = {};  // where its initial velocity or momentum stands
     std::string written = name;  // in formulas: x[3]
     Position force_at = {};      // where its first force stands
+    bool follows = false;        // its start is left out: its equation tells it
 };
 
 struct Parameter {

@@ -53,6 +53,7 @@ void SystemReader::follow_equations(std::set<std::size_t>& missing) {
             value_in_range(source_, equation.at, scene_.initial_rate[k], "the initial velocity of " + name,
                            parameter_values_);
             scene_.coordinates[k].rate_at = equation.at;
+            scene_.coordinates[k].follows = true;
             missing.erase(k);
             know(k);
         }

@@ -301,8 +301,12 @@ void SystemReader::require_velocities() const {
         if (symbols.count(coordinate.velocity) == 0)
             fail(entry->value.at,
                  fmt::format("the Lagrangian is degenerate: the velocity {0}' of coordinate {0} does not occur in it; "
-                             "add the kinetic energy of {0}, or remove the coordinate",
-                             coordinate.written));
+                             "add the kinetic energy of {0}, or remove the coordinate{1}",
+                             coordinate.written,
+                             scene_.not_eliminated.empty()
+                                 ? ""
+                                 : ". Equations would give it some, but not all are eliminated. " +
+                                       scene_.not_eliminated.front()));
 }
 
 // x = ..., "x[3]" = ..., or "x[i]" = ... for all elements; forces on one coordinate add up.

@@ -37,6 +37,29 @@ TEST_CASE("a run has the same bytes again, from a new cache and from a copy of t
     }
 }
 
+TEST_CASE("columns beside the state and what sweeps keep have the same bytes in every process") {
+    const TemporaryFolder folder;
+    const auto same = [&](const std::vector<std::string>& command, const char* name) {
+        std::string first;
+        for (int i = 0; i < 4; ++i) {
+            std::vector<std::string> words = command;
+            words.insert(words.begin(), LOBATTO_PROGRAM);
+            words.insert(words.end(), {"--unmeasured", "-o", (folder / "table.csv").string()});
+            const Finished done = run(words);
+            REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+            const std::string bytes = read_file(folder / "table.csv");
+            if (i == 0) first = bytes;
+            CHECK_MESSAGE(bytes == first, name);
+        }
+        CHECK(first.size() > 500);
+    };
+    for (const char* name : {"rigid_top", "slider_crank"})
+        same({"run", scene_file(name), "--step", "0.01", "--until", "0.2"}, name);
+    same({"sweep", scene_file("double_pendulum"), "--vary", "a=0.1:2:12", "--until", "2", "--keep",
+          "last(sin(a)*b' + cos(b)*a' + a*b + 3*a' + b'/7)"},
+         "sweep");
+}
+
 TEST_CASE("a sweep has the same bytes from a new cache and with any number of threads") {
     const TemporaryFolder folder;
     std::string first;

@@ -112,6 +112,18 @@ TEST_CASE("bodies in loops beside coordinates of their own, whose matrix has zer
     CHECK(jacobian_defect(derivation, exact, at.parameters, at.q, at.p, 0.05) < 1e-12);
 }
 
+TEST_CASE("second derivatives that cancel between formulas are in no loop") {
+    const Scene scene = test::scene_of(
+        "sum(i = 1 .. 9, x[i]'^2/2) - sum(i = 1 .. 8, (x[i] - x[i+1])^4) + sum(i = 1 .. 8, x[i]^4 - 4*x[i]^3*x[i+1] + "
+        "6*x[i]^2*x[i+1]^2 - 4*x[i]*x[i+1]^3)",
+        "x = { count = 9, position = \"i/10\", velocity = 0 }", 4);
+    const Derivation derivation = derive(scene);
+    CHECK_FALSE(derivation.structure.looped);
+    const Kernel kernel = test::kernel_in_own_cache(derivation, Precision::double_);
+    const StartIn<double> start = start_in<double>(ExactStart(scene), kernel, 0.01);
+    CHECK(trajectory_leaves<double>(derivation, kernel, start.parameters, start.q, start.p, 0.01) < 4);
+}
+
 TEST_CASE("parameters may have the names that loops give to what varies") {
     const Scene scene = test::scene_of("sum(i = 1 .. 9, m[i]*x[i]'^2/2 - m[i]*a0*x0*x[i]^4)",
                                        "x = { count = 9, position = \"i\", velocity = 0 }", 4,
