@@ -53,7 +53,7 @@ std::string excerpt(const std::string& text, const std::string& from, const std:
 std::string without_times(const std::string& text) {
     std::string kept;
     for (const std::string& line : lines_of(text))
-        if (!std::regex_search(line, std::regex("time per step|derived in|derived and written|symplectic defect")))
+        if (!std::regex_search(line, std::regex("time per step|derived in|derived and|symplectic defect")))
             kept += line + "\n";
     return kept;
 }
