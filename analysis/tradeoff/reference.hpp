@@ -22,7 +22,7 @@ struct Reference {
     std::size_t n = 0;
     std::size_t compared = 0;  // of the 2n: all; where walls throw the motion back, positions only: a momentum that
                                // jumps is another one just before and just after
-    std::int64_t steps = 0;            // of the family, where steps are cut; else 0
+    std::int64_t steps = 0;    // of the family, where steps are cut; else 0
     std::vector<double> high, low;     // (samples + 1) x 2n, q then p: the state is the sum of both
     std::vector<double> scale;         // 2n: half the way between smallest and largest value, the largest among the
                                        // coordinates of the same unit, momenta likewise; 1 where nothing moves

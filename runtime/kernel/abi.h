@@ -85,11 +85,11 @@ typedef struct lobatto_advance {
 /* One call of `refilled_advance`. Arrays have an entry a lane. */
 typedef struct lobatto_refilled_advance {
     /* in */
-    int64_t steps;          /* steps to take at most, of each lane whose status is LOBATTO_OK */
-    double tolerance;       /* as of lobatto_advance */
-    void* records;          /* room for rows of t, q[n], p[n] after each step, `capacity` a lane, at most so many steps */
-    int64_t capacity;       /* > 0 */
-    void* events;           /* room for rows as of lobatto_advance, event_capacity a lane; null: none are sought */
+    int64_t steps;    /* steps to take at most, of each lane whose status is LOBATTO_OK */
+    double tolerance; /* as of lobatto_advance */
+    void* records;    /* room for rows of t, q[n], p[n] after each step, `capacity` a lane, at most so many steps */
+    int64_t capacity; /* > 0 */
+    void* events;     /* room for rows as of lobatto_advance, event_capacity a lane; null: none are sought */
     int64_t event_capacity; /* at least events_of_step */
     /* in and out */
     int32_t* status; /* LOBATTO_STOPPED: the last row of events says where and why, and the step is not among those
