@@ -72,6 +72,9 @@ double symplectic_defect(const NumberStepper& stepper, const NumberStepper::Part
         throw ComputationError("the symplectic defect cannot be measured: the step from this state fails");
     const mpf_class zero(0, 2 * 53 * parts + 64);  // its precision is that of all others
     std::vector<mpf_class> T(rows * rows, zero);
+    for (const double part : whole)  // GMP knows finite numbers only
+        if (!std::isfinite(part))
+            throw ComputationError("the symplectic defect cannot be measured: the step has no derivative there");
     for (std::size_t i = 0; i < whole.size(); ++i) T[i / parts] += whole[i];
     double to_q = 0, to_p = 0;
     for (std::size_t a = 0; a < n; ++a)

@@ -52,11 +52,14 @@ struct Digits {
 // The largest difference of two lines.
 double apart(const std::vector<std::string>& a, const std::vector<std::string>& b) {
     double most = 0;
+    REQUIRE(a.size() == b.size());
     for (std::size_t i = 0; i < a.size(); ++i) {
         double x[parts], y[parts];
         REQUIRE(read_decimal(a[i], x, parts));
         REQUIRE(read_decimal(b[i], y, parts));
-        most = std::fmax(most, std::fabs(difference(x, y, parts)));
+        const double here = std::fabs(difference(x, y, parts));
+        REQUIRE(std::isfinite(here));
+        most = std::fmax(most, here);
     }
     return most;
 }
