@@ -117,21 +117,27 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     setting->scene = starts_->with_settings(scene_, first);
     setting->steps = steps_of_setting(setting->scene);
     const Method& method = setting->scene.method;
-    // Steps and values are the kernel's arguments: the scene is derived as it was written.
-    const auto derived_in = [&](Precision numbers) {
+    const bool is_double = method.numbers == Precision::double_;
+    Derived& known = derived_[{static_cast<int>(method.family), method.points}];
+    if (!known.outline) {
+        if (number == 0 && !options_.overrides.set.empty()) check_domains(scene_);
+        // Steps and values are the kernel's arguments: the scene is derived as it was written.
         Scene scene = starts_->with_settings(as_written_, first);
         if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;
-        return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch});
-    };
-    auto& [derivation, source] = derived_[{static_cast<int>(method.family), method.points}];
-    if (!derivation) {
-        if (number == 0 && !options_.overrides.set.empty()) check_domains(scene_);
-        DerivedKernel derived = derived_in(method.numbers);
-        derivation = std::make_shared<const Outline>(std::move(derived.outline));
-        source = std::make_shared<const KernelSource>(std::move(derived.source));
+        const auto derived_in = [&](Precision numbers, const Derivation* derivation) {
+            return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch}, derivation);
+        };
+        DerivedKernel derived = derived_in(method.numbers, nullptr);
+        known.source = std::make_shared<const KernelSource>(std::move(derived.source));
+        known.plain =
+            is_double
+                ? known.source
+                : std::make_shared<const KernelSource>(derived_in(Precision::double_, derived.derivation.get()).source);
+        known.outline = std::make_shared<const Outline>(std::move(derived.outline));
     }
-    setting->derivation = derivation;
-    setting->source = source;
+    setting->derivation = known.outline;
+    setting->source = known.source;
+    setting->plain_source = known.plain;
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
     // number of them changes what a trajectory becomes. Impacts are of single trajectories.
     const std::int64_t count = starts_->count_of_setting();
@@ -139,16 +145,10 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     const std::int64_t together =
         scene_.coordinates.size() > 2 ? std::min<std::int64_t>(count, 8) : count / thread_count(options_.threads);
     Compiled compiled;
-    const bool is_double = method.numbers == Precision::double_;
     const bool is_alone = scene_.is_cut() || !has_ensembles(method.numbers) || (is_refilled && !is_double);
-    setting->kernel = is_alone ? kernel_of(*source, method.numbers, &compiled)
-                               : ensemble_kernel_of(*source, method.numbers, together, &compiled, is_refilled);
-    setting->plain = setting->kernel;
-    setting->plain_source = source;
-    if (!is_double) {
-        setting->plain_source = std::make_shared<const KernelSource>(derived_in(Precision::double_).source);
-        setting->plain = kernel_of(*setting->plain_source, Precision::double_);
-    }
+    setting->kernel = is_alone ? kernel_of(*known.source, method.numbers, &compiled)
+                               : ensemble_kernel_of(*known.source, method.numbers, together, &compiled, is_refilled);
+    setting->plain = is_double ? setting->kernel : kernel_of(*known.plain, Precision::double_);
     setting->compiled = std::filesystem::path(compiled.object).stem().string();
     setting->request = request_of(*setting);
     return setting;

@@ -88,9 +88,11 @@ private:
     std::recursive_mutex* algebra_;  // formulas in more than one thread: one at a time
     std::unique_ptr<SweepStarts> starts_;
     std::unique_ptr<SweepRows> rows_;
-    // By family and number: what was derived and emitted.
-    std::map<std::pair<int, int>, std::pair<std::shared_ptr<const Outline>, std::shared_ptr<const KernelSource>>>
-        derived_;
+    struct Derived {
+        std::shared_ptr<const Outline> outline;
+        std::shared_ptr<const KernelSource> source, plain;  // plain: in double
+    };
+    std::map<std::pair<int, int>, Derived> derived_;  // by family and number of points
     std::unique_ptr<Setting> first_;
     std::unique_ptr<Setting> current_;
     std::optional<Judges> judges_;
