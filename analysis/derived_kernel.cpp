@@ -88,8 +88,8 @@ std::string kept_text(const SystemFacts& facts, const KernelSource& source) {
     return json.dump();
 }
 
-void wish_for_energy(Scene& scene, const Outline& outline, const KernelWish& wish) {
-    if (wish.wants_energy != nullptr && wish.wants_energy(outline)) scene.outputs.energy = true;
+void wish_for_energy(Outline& outline, const KernelWish& wish) {
+    if (wish.wants_energy != nullptr && wish.wants_energy(outline)) outline.scene.outputs.energy = true;
 }
 
 DerivedKernel from_text(const std::string& text, const Scene& scene, const KernelWish& wish) {
@@ -102,7 +102,7 @@ DerivedKernel from_text(const std::string& text, const Scene& scene, const Kerne
     kernel.source.header = json.at("header");
     kernel.source.support = json.at("support").get<std::vector<std::string>>();
     kernel.source.digest = json.at("digest");
-    wish_for_energy(kernel.outline.scene, kernel.outline, wish);
+    wish_for_energy(kernel.outline, wish);
     return kernel;
 }
 
@@ -110,8 +110,8 @@ DerivedKernel derived(const Scene& scene, const KernelWish& wish, const Derivati
     const auto derivation =
         std::make_shared<Derivation>(known != nullptr ? *known : derive_kernel(scene, wish.general));
     DerivedKernel kernel{Outline(*derivation), {}, false, derivation};
-    wish_for_energy(derivation->scene, kernel.outline, wish);
-    kernel.outline.scene.outputs.energy = derivation->scene.outputs.energy;
+    wish_for_energy(kernel.outline, wish);
+    derivation->scene.outputs.energy = kernel.outline.scene.outputs.energy;
     kernel.source = emit(*derivation, {wish.precision, {}});
     return kernel;
 }

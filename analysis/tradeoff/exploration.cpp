@@ -133,9 +133,7 @@ void explore(Experiment& experiment) {
     const double all = experiment.request().seconds, reserve = 0.12 * all;
     double last_order = 0.25 * all;  // what is ordered later would not be used
     std::vector<Member> waiting = tour();
-    waiting.erase(std::remove_if(waiting.begin(), waiting.end(),
-                                 [&](const Member& member) { return !kernel_builder.allows(member); }),
-                  waiting.end());
+    std::erase_if(waiting, [&](const Member& member) { return !kernel_builder.allows(member); });
     std::set<Scan> done;
     const auto name = [](const Member& member) {
         return fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision));

@@ -97,7 +97,7 @@ bool KernelBuilder::allows(const Member& member) const {
 
 std::vector<StepClock> KernelBuilder::clocks() const {
     std::vector<StepClock> clocks(allowed_.begin(), allowed_.end());
-    clocks.erase(std::remove(clocks.begin(), clocks.end(), StepClock::none), clocks.end());
+    std::erase(clocks, StepClock::none);
     return clocks;
 }
 

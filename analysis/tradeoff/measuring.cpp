@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -11,6 +10,7 @@
 #include "analysis/gradients.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/measure/extrapolation.hpp"
+#include "runtime/run/timing.hpp"
 
 namespace lobatto {
 
@@ -23,12 +23,6 @@ constexpr int defect_limit = 32;         // coordinates; tangent maps of more ta
 constexpr double timing_seconds = 4e-3;  // of repetitions in all
 constexpr int most_repetitions = 5;
 constexpr double block_seconds = 0.05;  // between two looks at the interruption
-
-double processor_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 // A run of the kernel with records at the samples, in blocks so that it can be interrupted. With a clock the samples
 // are arrivals, beside the chain of its steps.

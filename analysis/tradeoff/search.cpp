@@ -377,9 +377,7 @@ Search search(Experiment& experiment, double goal, Precision numbers) {
             experiment.left() > 0) {
             tried_clean = true;
             queue = cleaner(tried);
-            queue.erase(std::remove_if(queue.begin(), queue.end(),
-                                       [&](const Member& member) { return !kernel_builder.allows(member); }),
-                        queue.end());
+            std::erase_if(queue, [&](const Member& member) { return !kernel_builder.allows(member); });
             for (const Member& member : queue) kernel_builder.order(member);
         }
         if (queue.empty()) {

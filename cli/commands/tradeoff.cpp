@@ -16,7 +16,7 @@
 #include "cli/tradeoff/pictures.hpp"
 #include "cli/tradeoff/report.hpp"
 #include "generator/mechanics/impacts.hpp"
-#include "generator/pipeline.hpp"
+#include "generator/scene/scene.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/partial_file.hpp"
 

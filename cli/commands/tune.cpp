@@ -16,7 +16,7 @@
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/mechanics/impacts.hpp"
-#include "generator/pipeline.hpp"
+#include "generator/scene/scene.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {

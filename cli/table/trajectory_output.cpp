@@ -44,10 +44,9 @@ void TrajectoryOutput::write(const Records& records) {
     const auto put = [&](const double* numbers, std::size_t count) {
         for (std::size_t c = 0; c < count * parts_; ++c) cells_.push_back(cell_of(numbers[c]));
     };
-    const double *const rows = records.whole != nullptr ? records.whole : records.rows, *const energy =
-                                                                                            records.whole != nullptr
-                                                                                                ? records.whole_energy
-                                                                                                : records.energy;
+    const bool is_whole = records.whole != nullptr;
+    const double* const rows = is_whole ? records.whole : records.rows;
+    const double* const energy = is_whole ? records.whole_energy : records.energy;
     for (std::size_t i = 0; i < static_cast<std::size_t>(records.count); ++i) {
         put(rows + i * static_cast<std::size_t>(records.columns) * parts_, columns_);
         if (beside_ > 0) put(records.beside + i * beside_ * parts_, beside_);

@@ -22,7 +22,6 @@ struct Outline {
     Quadrature quadrature;
     std::optional<ClosedSolution> closed_solution;  // q'' = -w2 q, or -w2 sin(q)
 
-    Outline() = default;
     Outline(const Scene& scene, const SystemFacts& facts);
     Outline(const Derivation& derivation);  // NOLINT(google-explicit-constructor): it knows all that is asked for
 

@@ -69,12 +69,12 @@ struct System : SystemOutline {
 // Throws InputError when L is degenerate (its second derivatives in the velocities are singular everywhere) or real
 // nowhere near the start, naming the direction or the reason. The start itself: generator/mechanics/start.hpp.
 System build_system(const Scene& scene);
+// The same for a caller that only writes a kernel: terms that repeat often stay `unwritten` where they may.
+System build_short_system(const Scene& scene);
 // The symbols of a scene, its Lagrangian and forces; nothing is differentiated.
 System undifferentiated(const Scene& scene);
 // L(q, q', t) + f(t) moves as L does, and a time that drops out need not be known: any moment will do.
 Scene without_time(const Scene& scene);
-// The same for who only writes a kernel: terms that repeat often stay `unwritten` where they may.
-System build_short_system(const Scene& scene);
 
 // A direction in words: a' = -1, b' = 1; components that are zero left out.
 std::string direction_text(const System& system, const std::vector<cln::cl_R>& direction);

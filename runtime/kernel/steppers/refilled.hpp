@@ -203,10 +203,10 @@ struct RefilledEnsemble : Ensemble<K, width> {
             if (any(active & !moved)) this->retry(active & !moved, time, evaluations, leave);
             if constexpr (has_events) {
                 if (events != nullptr) {
-                    const ActiveMask stirred =
+                    const ActiveMask restless =
                         active & looks.restless(motion, coefficients, begun, gone, step_size, q_before, rate_before);
-                    for (int lane = 0; any(stirred) && lane < width; ++lane) {
-                        if (!stirred[lane]) continue;
+                    for (int lane = 0; any(restless) && lane < width; ++lane) {
+                        if (!restless[lane]) continue;
                         const Status found =
                             look(lane, q_before, rate_before, tolerance,
                                  events + lane * event_capacity * Looks::columns, events_written[lane]);
