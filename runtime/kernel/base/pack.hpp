@@ -36,9 +36,9 @@
     Result result;                               \
     LOBATTO_EACH(result.part[i] = (__VA_ARGS__)) \
     return result
-#define LOBATTO_OPERATOR(Given, Result, operation)                                    \
-    LOBATTO_INLINE friend Result operator operation(const Given& a, const Given& b) { \
-        LOBATTO_PARTS(Result, typename Result::Part(a.part[i] operation b.part[i]));  \
+#define LOBATTO_OPERATOR(Given, Result, operation) /* NOLINTNEXTLINE(bugprone-macro-parentheses): a type */ \
+    LOBATTO_INLINE friend Result operator operation(const Given& a, const Given& b) {                       \
+        LOBATTO_PARTS(Result, typename Result::Part(a.part[i] operation b.part[i]));                        \
     }
 
 namespace lobatto {
@@ -190,7 +190,7 @@ LOBATTO_INLINE bool all(Truths truths) {
         return signs((type)truths) != 0;                            \
     }                                                               \
     LOBATTO_INLINE bool all(Register<real, width>::Truths truths) { \
-        return signs((type)truths) == (1 << width) - 1;             \
+        return signs((type)truths) == (1 << (width)) - 1;           \
     }
 #ifdef __SSE2__
 using Double2 = Register<double, 2>::Values;
@@ -362,7 +362,7 @@ struct Pack {
     Pack() = default;
     // One register at a time: g++ keeps a Pack in registers only while it is not copied as a whole.
     LOBATTO_INLINE Pack(const Pack& other) { LOBATTO_EACH(part[i] = other.part[i]); }
-    LOBATTO_INLINE Pack& operator=(const Pack& other) {
+    LOBATTO_INLINE Pack& operator=(const Pack& other) {  // NOLINT(bugprone-unhandled-self-assignment): each by itself
         LOBATTO_EACH(part[i] = other.part[i]);
         return *this;
     }
@@ -566,7 +566,7 @@ LOBATTO_INLINE auto fused_sum(const A& a, const B& b, const C& c) {
 template <class T>
 constexpr int lanes_of = 1;
 template <class real, int width>
-constexpr int lanes_of<Pack<real, width>> = width;
+inline constexpr int lanes_of<Pack<real, width>> = width;
 
 template <class T>
 struct RealOf {
