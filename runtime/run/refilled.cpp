@@ -147,7 +147,7 @@ void RefilledLanes::look(std::size_t number, Ended& ended) {
     const std::int64_t done = steps_done_[number];
     const auto place = static_cast<std::int64_t>(number);
     const double* const rows = records_.data() + place * capacity_ * columns_;
-    const double* const events = events_.data() + place * event_capacity_ * (1 + columns_);
+    const double* const events = events_.empty() ? nullptr : events_.data() + place * event_capacity_ * (1 + columns_);
     if (lane.reducer) {
         lane.reducer->observe(rows, done);
         lane.reducer->observe_events(events, events_written_[number]);

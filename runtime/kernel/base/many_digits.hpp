@@ -172,10 +172,20 @@ struct Limits<ManyDigits<bits>> {
     static constexpr real root_epsilon = real::power_of_two(-bits / 2);
 };
 
+// MPFR's functions keep constants for each thread: they go with it.
+inline void free_constants_at_the_end_of_the_thread() {
+    struct Constants {
+        ~Constants() { mpfr_free_cache(); }
+    };
+    thread_local const Constants constants;
+    static_cast<void>(constants);
+}
+
 #define LOBATTO_FUNCTION(f)                                                                          \
     template <int bits>                                                                              \
     inline ManyDigits<bits> f(const ManyDigits<bits>& x) {                                           \
         using real = ManyDigits<bits>;                                                               \
+        free_constants_at_the_end_of_the_thread();                                                   \
         return real::result_of([&](mpfr_ptr r) { mpfr_##f(r, typename real::View(x), MPFR_RNDN); }); \
     }
 LOBATTO_FUNCTION(acos)
@@ -201,6 +211,7 @@ inline ManyDigits<bits> fabs(const ManyDigits<bits>& x) {
     template <int bits>                                                                                    \
     inline ManyDigits<bits> f(const ManyDigits<bits>& x, const ManyDigits<bits>& y) {                      \
         using View = typename ManyDigits<bits>::View;                                                      \
+        free_constants_at_the_end_of_the_thread();                                                         \
         return ManyDigits<bits>::result_of([&](mpfr_ptr r) { mpfr_##f(r, View(x), View(y), MPFR_RNDN); }); \
     }
 LOBATTO_FUNCTION(atan2)
