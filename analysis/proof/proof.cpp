@@ -72,6 +72,16 @@ ProofRow decided(const std::string& claim, const Measure& measure) {
     }
 }
 
+// Checks of formulas at points near the start, if there are any where all of them have values.
+template <class Work>
+void near_the_start(std::vector<ProofRow>& rows, const std::string& claim, const Work& work) {
+    try {
+        for (const Check& check : work()) rows.push_back(row_of(check));
+    } catch (const DomainError& error) {
+        rows.push_back(not_decided(claim, std::string("no value at points near the start: ") + error.what()));
+    }
+}
+
 // Of whole systems, not of single numbers.
 ProofRow not_promised(const std::string& claim, const std::string& why) {
     return {claim, "not promised", why, true, ""};
@@ -339,9 +349,10 @@ Proof prove(const Scene& written, const MethodChoice& method,
     Proof proof{scene.title, scene.method.name(), {}, {}};
     std::vector<ProofRow>& rows = proof.rows;
     say("checking quadrature, equations and programs", 0.4);
-    for (const auto& checks : {check_quadrature(derivation.quadrature), check_equations(derivation),
-                               check_programs(with_walls, optimised_programs(with_walls).programs)})
-        for (const Check& check : checks) rows.push_back(row_of(check));
+    for (const Check& check : check_quadrature(derivation.quadrature)) rows.push_back(row_of(check));
+    near_the_start(rows, "equations", [&] { return check_equations(derivation); });
+    near_the_start(rows, "programs",
+                   [&] { return check_programs(with_walls, optimised_programs(with_walls).programs); });
 
     const auto start = start_with_step<double>(exact_start, step, kernel);
     const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);

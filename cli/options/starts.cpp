@@ -40,6 +40,9 @@ StartsRequest StartsOption::request() const {
     if (vary.empty() && file.empty() && !random)
         throw InputError(
             "nothing is varied: give --vary NAME=FROM:TO:COUNT, --starts FILE, or --random COUNT with --draw");
+    if (seed_given != 0 && !random)
+        throw InputError(
+            "--seed: nothing is drawn; say what and how much, such as --random 1000 --draw \"q ~ normal(0, 0.1)\"");
     StartsRequest request = *this;
     request.seed = static_cast<std::uint64_t>(seed_given);
     return request;

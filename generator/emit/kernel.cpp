@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Graph to C++ text: the only file that prints C++.
+// Graph to the C++ text of a kernel.
 #include "generator/emit/kernel.hpp"
 
 #include <fmt/format.h>
