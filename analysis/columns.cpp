@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "analysis/tape.hpp"
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 
 namespace lobatto {
 

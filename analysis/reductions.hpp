@@ -9,7 +9,7 @@
 
 #include "analysis/tape.hpp"
 #include "generator/scene/scene.hpp"
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 
 namespace lobatto {
 

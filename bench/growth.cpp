@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 
 namespace lobatto::bench {

@@ -9,7 +9,7 @@
 #include <regex>
 #include <sstream>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "bench/kernels.hpp"
 #include "runtime/build/cache.hpp"
 #include "runtime/build/compiler.hpp"

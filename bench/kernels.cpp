@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "analysis/gradients.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/stability/limit.hpp"
 #include "bench/reference.hpp"
 #include "generator/pipeline.hpp"

@@ -7,9 +7,9 @@
 #include <tuple>
 
 #include "generator/formula/limits.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/constraints/constraints.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/programs/programs.hpp"
 

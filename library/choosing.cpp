@@ -4,7 +4,7 @@
 
 #include "analysis/proof/proof.hpp"
 #include "analysis/tradeoff/choice.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "library/parts.hpp"
 

@@ -7,7 +7,7 @@
 #include <new>
 #include <system_error>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/method_choice.hpp"
 #include "analysis/motion.hpp"
 #include "generator/mechanics/derivation.hpp"

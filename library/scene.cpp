@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Scenes of the library: read, described, emitted.
 #include "analysis/checked_scene.hpp"
+#include "analysis/kernel/support_text.hpp"
 #include "analysis/stability/json.hpp"
-#include "analysis/support_text.hpp"
 #include "generator/describe/describe.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/constraints/constraints.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "library/parts.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "analysis/derived_kernel.hpp"
+#include "analysis/kernel/derived_kernel.hpp"
 #include "generator/formula/suggest.hpp"
 #include "generator/mechanics/start.hpp"
 #include "library/parts.hpp"

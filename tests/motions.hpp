@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "runtime/build/library.hpp"
 #include "tests/scenes/scenes.hpp"
 

@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "analysis/derived_kernel.hpp"
+#include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/stability/linear_departure.hpp"
-#include "generator/mechanics/automatic_clock.hpp"
+#include "generator/mechanics/clock/automatic_clock.hpp"
 #include "generator/mechanics/start.hpp"
 
 namespace lobatto {

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "analysis/accuracy/companion.hpp"
-#include "analysis/accuracy/domains.hpp"
-#include "analysis/accuracy/energy_watch.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/formulas/domains.hpp"
 #include "analysis/accuracy/step_judge.hpp"
-#include "analysis/accuracy/watch.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/accuracy/watch/energy_watch.hpp"
+#include "analysis/accuracy/watch/watch.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "generator/mechanics/outline.hpp"
 

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "analysis/exact_start.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 

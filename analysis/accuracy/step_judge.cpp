@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/stability/limit.hpp"
 #include "runtime/measure/frequency.hpp"
 

@@ -6,9 +6,9 @@
 
 #include "analysis/exact_start.hpp"
 #include "generator/check/check.hpp"
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 
 namespace lobatto {
 

@@ -7,10 +7,10 @@
 
 #include "analysis/accuracy/taken_steps.hpp"
 #include "analysis/exact_start.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/proof/own_numbers.hpp"
 #include "generator/check/check.hpp"
-#include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/clock/clock.hpp"
 #include "generator/method/splitting.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "generator/mechanics/sample.hpp"
-#include "generator/mechanics/system.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/system/system.hpp"
 
 namespace lobatto {
 

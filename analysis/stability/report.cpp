@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "analysis/stability/linearisation.hpp"
 #include "generator/formula/limits.hpp"

@@ -7,12 +7,12 @@
 #include <optional>
 #include <string>
 
-#include "analysis/accuracy/domains.hpp"
-#include "analysis/accuracy/ensemble_companion.hpp"
-#include "analysis/accuracy/sweep_watch.hpp"
+#include "analysis/accuracy/companion/ensemble_companion.hpp"
+#include "analysis/accuracy/formulas/domains.hpp"
+#include "analysis/accuracy/watch/sweep_watch.hpp"
 #include "generator/emit/kernel.hpp"
 #include "generator/mechanics/outline.hpp"
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 
 namespace lobatto {
 

@@ -12,8 +12,8 @@
 
 #include "analysis/sweep/axis.hpp"
 #include "runtime/build/sha256.hpp"
-#include "runtime/run/npy.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/npy.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -14,9 +14,9 @@
 #include "analysis/sweep/axis.hpp"
 #include "analysis/sweep/draw.hpp"
 #include "analysis/sweep/start_table.hpp"
-#include "generator/mechanics/system.hpp"
+#include "generator/mechanics/system/system.hpp"
 #include "generator/scene/scene.hpp"
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 
 namespace lobatto {
 

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "analysis/accuracy/companion.hpp"
-#include "analysis/accuracy/energy_watch.hpp"
-#include "analysis/derived_kernel.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/watch/energy_watch.hpp"
 #include "analysis/exact_start.hpp"
+#include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/reductions.hpp"
 #include "generator/mechanics/start.hpp"
 #include "runtime/run/output.hpp"

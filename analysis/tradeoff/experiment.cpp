@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"

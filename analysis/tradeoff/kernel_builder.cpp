@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "analysis/kernel_of.hpp"
-#include "generator/mechanics/automatic_clock.hpp"
+#include "analysis/kernel/kernel_of.hpp"
+#include "generator/mechanics/clock/automatic_clock.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 

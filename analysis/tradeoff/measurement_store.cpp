@@ -11,7 +11,7 @@
 
 #include "analysis/tradeoff/measurement_json.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -8,8 +8,8 @@
 #include <regex>
 #include <vector>
 
+#include "runtime/files/partial_file.hpp"
 #include "runtime/run/output.hpp"
-#include "runtime/run/partial_file.hpp"
 
 namespace lobatto {
 

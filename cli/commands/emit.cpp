@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <iostream>
 
-#include "analysis/support_text.hpp"
+#include "analysis/kernel/support_text.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
@@ -17,7 +17,7 @@
 #include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -6,7 +6,7 @@
 #include "cli/options/output_path.hpp"
 #include "cli/print/manual.hpp"
 #include "generator/formula/source.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

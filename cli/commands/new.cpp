@@ -15,7 +15,7 @@
 #include "generator/formula/suggest.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

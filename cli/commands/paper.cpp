@@ -10,7 +10,7 @@
 #include "cli/paper/document.hpp"
 #include "cli/print/say.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -17,11 +17,11 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/constraints/constraints.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

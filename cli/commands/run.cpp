@@ -23,8 +23,8 @@
 #include "cli/print/tell.hpp"
 #include "cli/table/trajectory_output.hpp"
 #include "runtime/error.hpp"
+#include "runtime/files/decimal.hpp"
 #include "runtime/measure/diagnostics.hpp"
-#include "runtime/run/decimal.hpp"
 #include "runtime/run/output.hpp"
 
 namespace lobatto {

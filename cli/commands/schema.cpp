@@ -4,8 +4,8 @@
 
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
-#include "generator/scene/schema.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "generator/scene/file/schema.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -16,9 +16,9 @@
 #include "cli/print/drawing.hpp"
 #include "cli/print/stability_text.hpp"
 #include "generator/formula/source.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constraints.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/constraints/constraints.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/method/splitting_stability.hpp"
 
 namespace lobatto {

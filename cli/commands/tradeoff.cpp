@@ -15,10 +15,10 @@
 #include "cli/tradeoff/page.hpp"
 #include "cli/tradeoff/pictures.hpp"
 #include "cli/tradeoff/report.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

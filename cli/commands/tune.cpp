@@ -15,7 +15,7 @@
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/error.hpp"
 

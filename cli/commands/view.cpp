@@ -19,7 +19,7 @@
 #include "cli/view/motion.hpp"
 #include "cli/view/video.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

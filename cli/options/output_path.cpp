@@ -14,7 +14,7 @@
 
 #include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -10,7 +10,7 @@
 
 #include "cli/paper/tables.hpp"
 #include "cli/print/drawing.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/paper/midpoint.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"

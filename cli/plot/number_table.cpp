@@ -15,8 +15,8 @@
 #include "generator/formula/source.hpp"
 #include "generator/formula/suggest.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/npy.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/npy.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

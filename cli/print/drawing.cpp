@@ -8,8 +8,8 @@
 
 #include "runtime/build/process.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/partial_file.hpp"
-#include "runtime/run/scratch_folder.hpp"
+#include "runtime/files/partial_file.hpp"
+#include "runtime/files/scratch_folder.hpp"
 
 namespace lobatto {
 

@@ -12,7 +12,7 @@
 #include <optional>
 
 #include "cli/print/drawing.hpp"
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 
 namespace lobatto {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "analysis/accuracy/companion.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 

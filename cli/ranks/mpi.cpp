@@ -10,7 +10,7 @@
 
 #include "cli/ranks/ranks.hpp"
 #include "runtime/error.hpp"
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 
 namespace lobatto {
 

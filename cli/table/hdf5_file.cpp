@@ -15,7 +15,7 @@
 #include <fstream>
 #include <map>
 
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

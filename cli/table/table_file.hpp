@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cli/table/table_head.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

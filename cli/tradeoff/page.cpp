@@ -9,7 +9,7 @@
 
 #include "cli/tradeoff/report.hpp"
 #include "runtime/build/compiler.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 

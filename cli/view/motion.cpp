@@ -8,8 +8,8 @@
 #include <map>
 #include <set>
 
-#include "analysis/accuracy/energy_watch.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/accuracy/watch/energy_watch.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "analysis/tape.hpp"
 #include "cli/print/interruption.hpp"

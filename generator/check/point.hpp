@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "generator/check/check.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 #include "generator/mechanics/derivation.hpp"
-#include "generator/mechanics/sample.hpp"
 
 namespace lobatto {
 

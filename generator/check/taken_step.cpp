@@ -4,7 +4,7 @@
 
 #include "generator/check/check.hpp"
 #include "generator/check/discrete_action.hpp"
-#include "generator/mechanics/mass_equations.hpp"
+#include "generator/mechanics/system/mass_equations.hpp"
 
 namespace lobatto {
 

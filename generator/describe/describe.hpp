@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "generator/mechanics/structure.hpp"
+#include "generator/mechanics/structure/structure.hpp"
 
 namespace lobatto {
 

@@ -22,7 +22,7 @@ struct EmitOptions {
 };
 
 struct KernelSource {
-    Form form{};         // of its steps (generator/mechanics/structure.hpp)
+    Form form{};         // of its steps (generator/mechanics/structure/structure.hpp)
     std::string name;    // struct lobatto::kernels::NAME, a C identifier
     std::string header;  // the whole text of NAME.hpp
     // The parts of runtime/kernel/kernel.hpp that one trajectory stands on, beside those that they include.

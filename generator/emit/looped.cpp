@@ -6,7 +6,7 @@
 
 #include "generator/emit/looped.hpp"
 #include "generator/emit/tables.hpp"
-#include "generator/mechanics/all_pairs.hpp"
+#include "generator/mechanics/repeated/all_pairs.hpp"
 
 namespace lobatto {
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "generator/mechanics/discretisation.hpp"
-#include "generator/mechanics/structure.hpp"
-#include "generator/mechanics/system.hpp"
+#include "generator/mechanics/structure/structure.hpp"
+#include "generator/mechanics/system/system.hpp"
 #include "generator/method/quadrature.hpp"
 #include "generator/scene/scene.hpp"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "generator/mechanics/system.hpp"
+#include "generator/mechanics/system/system.hpp"
 #include "generator/method/quadrature.hpp"
 
 namespace lobatto {

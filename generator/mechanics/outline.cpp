@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "generator/mechanics/outline.hpp"
 
-#include "generator/mechanics/clock.hpp"
+#include "generator/mechanics/clock/clock.hpp"
 
 namespace lobatto {
 

@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "generator/graph/notation.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/constrained_start.hpp"
-#include "generator/mechanics/elements.hpp"
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/constraints/constrained_start.hpp"
+#include "generator/mechanics/repeated/elements.hpp"
 
 namespace lobatto {
 

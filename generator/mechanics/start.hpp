@@ -2,7 +2,7 @@
 // Whether a motion can begin where a scene lets it begin.
 #pragma once
 
-#include "generator/mechanics/system.hpp"
+#include "generator/mechanics/system/system.hpp"
 
 namespace lobatto {
 

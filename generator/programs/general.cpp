@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The programs of any other Lagrangian: one node's slopes and second derivatives in z = (v, q, P), from which the
 // support header assembles the equations of a step (D25 ... D30).
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 #include "generator/programs/builder.hpp"
 #include "generator/programs/identifier.hpp"
 

@@ -8,7 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "generator/mechanics/all_pairs.hpp"
+#include "generator/mechanics/algebra/constant_part.hpp"
+#include "generator/mechanics/repeated/all_pairs.hpp"
 #include "generator/programs/builder.hpp"
 
 namespace lobatto {

@@ -14,10 +14,10 @@
 #include "generator/formula/real.hpp"
 #include "generator/formula/token.hpp"
 #include "generator/method/splitting.hpp"
-#include "generator/scene/document.hpp"
 #include "generator/scene/eliminated.hpp"
-#include "generator/scene/scene_system.hpp"
-#include "generator/scene/table.hpp"
+#include "generator/scene/file/document.hpp"
+#include "generator/scene/file/table.hpp"
+#include "generator/scene/system_reader.hpp"
 
 namespace lobatto {
 namespace {

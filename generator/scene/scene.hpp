@@ -90,15 +90,15 @@ struct Outputs {
     void watch_kept();  // makes the events of what is kept events of the kernel
 };
 
-// A clock: steps are equally long in a time tau with dt = g(q) dtau (generator/mechanics/clock.hpp).
+// A clock: steps are equally long in a time tau with dt = g(q) dtau (generator/mechanics/clock/clock.hpp).
 struct Clock {
     std::string text;  // as written, white space collapsed: "r^(3/2)"
     GiNaC::ex rate;    // g, in positions and parameters
     Position at = {};
     GiNaC::symbol energy{"energy_of_start"};  // E
-    bool is_automatic = false;                // "auto": g follows from L (generator/mechanics/automatic_clock.hpp)
-    bool is_applied = false;                  // the scene is one in tau
-    GiNaC::ex lagrangian;                     // then: L(q, w / g), with w = dq/dtau
+    bool is_automatic = false;  // "auto": g follows from L (generator/mechanics/clock/automatic_clock.hpp)
+    bool is_applied = false;    // the scene is one in tau
+    GiNaC::ex lagrangian;       // then: L(q, w / g), with w = dq/dtau
 };
 
 // A holonomic constraint: phi(q, t) = 0 at all times.
@@ -123,7 +123,7 @@ struct Eliminated {
 };
 
 // A wall: the motion is on the one side of it where `when` has not happened, and is thrown back when it meets it
-// (generator/mechanics/impacts.hpp).
+// (generator/mechanics/constraints/impacts.hpp).
 struct Impact {
     std::string name;            // an identifier; element 3 of an array touch is touch_3
     std::string written = name;  // in the scene: touch[3]

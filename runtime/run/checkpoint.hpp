@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/run/checksum.hpp"
+#include "runtime/files/checksum.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {

@@ -11,7 +11,7 @@
 #include <fstream>
 
 #include "runtime/error.hpp"
-#include "runtime/run/decimal.hpp"
+#include "runtime/files/decimal.hpp"
 
 namespace lobatto {
 

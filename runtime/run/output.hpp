@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Trajectories as CSV files that round-trip: every number is a text that reads back to the same bits, the shortest for
-// double (runtime/run/decimal.hpp).
+// double (runtime/files/decimal.hpp).
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/run/checksum.hpp"
-#include "runtime/run/partial_file.hpp"
+#include "runtime/files/checksum.hpp"
+#include "runtime/files/partial_file.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {

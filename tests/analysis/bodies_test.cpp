@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/run/trajectory.hpp"

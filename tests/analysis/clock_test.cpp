@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
-#include "generator/mechanics/clock.hpp"
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/clock/clock.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/run/output.hpp"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/exact_start.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "generator/mechanics/start.hpp"
 #include "generator/pipeline.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What was derived is found again, and is the same; what changes the kernel is derived anew.
-#include "analysis/derived_kernel.hpp"
+#include "analysis/kernel/derived_kernel.hpp"
 
 #include <doctest/doctest.h>
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/columns.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "analysis/overrides.hpp"
 #include "generator/mechanics/start.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "generator/check/check.hpp"
 #include "generator/pipeline.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The kernel support headers inside the program: joined whole for programs, and of a library only what its kernel
 // stands on.
-#include "analysis/support_text.hpp"
+#include "analysis/kernel/support_text.hpp"
 
 #include <doctest/doctest.h>
 
@@ -9,7 +9,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "tests/scenes/scenes.hpp"
 
 using namespace lobatto;

@@ -11,7 +11,7 @@
 
 #include "analysis/tradeoff/choice.hpp"
 #include "analysis/tradeoff/method_text.hpp"
-#include "generator/mechanics/impacts.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/reference.hpp"

@@ -14,7 +14,7 @@
 #include <set>
 #include <thread>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/stability/limit.hpp"
 #include "analysis/tradeoff/experiment.hpp"
 #include "analysis/tradeoff/measurement_json.hpp"

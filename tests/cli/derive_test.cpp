@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "analysis/support_text.hpp"
+#include "analysis/kernel/support_text.hpp"
 #include "generator/describe/describe.hpp"
 #include "generator/pipeline.hpp"
 #include "tests/support.hpp"

@@ -79,7 +79,8 @@ std::string tour() {
         "`lobatto derive` prints them; this is the discrete Lagrangian and its equations.\n\n";
     text += block("", excerpt(derived, "The discrete Lagrangian", "The full system"));
     text +=
-        "\n## 3. What the scene needs\n\n`generator/mechanics/structure.cpp` looks for what the kernel may leave out. "
+        "\n## 3. What the scene needs\n\n`generator/mechanics/structure/structure.cpp` looks for what the kernel may "
+        "leave out. "
         "`lobatto check` says what it found.\n\n";
     text += block("", excerpt(output_of({"check", scene}), "Found,", "The kernel"));
     const std::string emitted = output_of({"emit", scene, "--no-support", "-o", folder.string()});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Frequencies, masses and amplitudes from 1e-150 to 1e150 and beyond: the same motion in other units, to the last bit,
 // and closed forms.
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 #include "runtime/measure/reference.hpp"
 #include "tests/extremes/extremes.hpp"
 

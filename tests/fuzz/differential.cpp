@@ -16,7 +16,7 @@
 #include <iostream>
 #include <random>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/check/check.hpp"
 #include "generator/graph/optimise.hpp"
 #include "generator/pipeline.hpp"

@@ -19,7 +19,7 @@
 #include <optional>
 
 #include "analysis/exact_start.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/overrides.hpp"
 #include "analysis/tape.hpp"
 #include "generator/pipeline.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "analysis/exact_start.hpp"
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 #include "tests/support.hpp"
 

@@ -4,7 +4,8 @@
 //
 // For double: one path without branches, polynomials in Estrin's order (a step waits for their latency), and the
 // library for lanes beyond the path's range. float is computed in double and rounded. long double and __float128 are
-// the library's. Accuracy and speed: docs/measurements/vector_functions.md, measured by bench/functions.cpp.
+// the library's. Accuracy and speed: docs/measurements/vector_functions.md, measured by
+// bench/measurements/functions.cpp.
 #ifndef LOBATTO_KERNEL_FUNCTIONS_HPP
 #define LOBATTO_KERNEL_FUNCTIONS_HPP
 

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <regex>
 
-#include "analysis/support_text.hpp"
+#include "analysis/kernel/support_text.hpp"
 #include "generator/emit/declarations.hpp"
 #include "generator/emit/function_text.hpp"
 #include "generator/pipeline.hpp"

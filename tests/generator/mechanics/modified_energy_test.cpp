@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "generator/graph/notation.hpp"
-#include "generator/mechanics/sample.hpp"
+#include "generator/mechanics/algebra/sample.hpp"
 #include "generator/method/stability.hpp"
 #include "tests/scenes/scenes.hpp"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The JSON schema of scenes, beside the reader: what one refuses the other must not take.
-#include "generator/scene/schema.hpp"
+#include "generator/scene/file/schema.hpp"
 
 #include <doctest/doctest.h>
 
 #include "cli/print/embedded.hpp"
-#include "generator/scene/document.hpp"
+#include "generator/scene/file/document.hpp"
 #include "generator/scene/scene.hpp"
 #include "tests/json_schema.hpp"
 #include "tests/support.hpp"

@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 #include "runtime/run/trajectory.hpp"
 #include "tests/motions.hpp"
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/run/ensemble.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 #include "tests/motions.hpp"
 
 using namespace lobatto;

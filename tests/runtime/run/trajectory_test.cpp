@@ -8,7 +8,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/kernel_of.hpp"
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"

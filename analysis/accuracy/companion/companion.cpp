@@ -1,0 +1,457 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/companion/companion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "runtime/run/parts.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t most_numbers = 16384;  // of all comparisons together, positions and momenta
+constexpr std::int64_t most_comparisons = 256;
+constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude
+constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
+constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
+constexpr int most_coupled = 16;               // coordinates of which that is looked for
+constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double finest = 0x1p-30;  // steps are never shorter than this part of those of the run
+constexpr std::int64_t most_looked = 500000;  // steps of the companion, for what is narrow in them
+constexpr double exponential = 30;            // times more than errors that grow with the square of the time
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// `row`: q, p.
+void lose(MeasuredError& error, double time, const std::vector<double>& row) {
+    const auto middle = row.begin() + std::ssize(row) / 2;
+    error.lost_after = time;
+    error.lost_q.assign(row.begin(), middle);
+    error.lost_p.assign(middle, row.end());
+}
+
+std::vector<double> joined(std::vector<double> q, const std::vector<double>& p) {
+    q.insert(q.end(), p.begin(), p.end());
+    return q;
+}
+
+}  // namespace
+
+std::int64_t companion_steps(std::int64_t steps) {
+    std::int64_t taken = steps + (steps + 1) / 2;
+    while (std::gcd(steps, taken) != 1) ++taken;
+    return taken;
+}
+
+Companion::Companion(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request)
+    : kernel_(kernel),
+      parts_(static_cast<std::size_t>(kernel->parts)),
+      groups_(amplitude_groups(derivation.scene)),
+      order_(derivation.quadrature.order()),
+      rows_a_step_(1 + request.dense),
+      narrow_(derivation.system) {
+    narrow_.set_parameters(request.parameters);
+    const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {
+        return whole.empty() ? as_parts(doubles, parts_) : whole;
+    };
+    request_.whole_parameters = all_of(request.whole_parameters, request.parameters);
+    request_.whole_step = all_of(request.whole_step, {request.step});
+    request_.whole_q = all_of(request.whole_q, request.q);
+    request_.whole_p = all_of(request.whole_p, request.p);
+    request_.q = request.q;
+    request_.p = request.p;
+    request_.time = request.time;
+    request_.step = request.step;
+    request_.steps = request.steps;
+    request_.arrivals = request.arrivals;
+    request_.arrivals.keeps_chain = false;
+    request_.every = request.every;
+    request_.tolerance = request.tolerance;
+    pulses_ = find_pulses(derivation.system, request.parameters, request.time, time_after(request, request.steps),
+                          std::fabs(request.step));
+    const std::int64_t comparisons =
+        std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
+    const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
+    stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
+    is_driven_ = !derivation.system.autonomous;
+    if (is_driven_) stride_ *= (fewest_driven_steps + stride_ - 1) / stride_;
+}
+
+Companion::~Companion() {
+    cancelled_ = true;
+    if (thread_.joinable()) thread_.join();
+}
+
+void Companion::observe(const Records& records) {
+    const std::size_t count = 2 * groups_.size();
+    for (std::int64_t i = 0; i < records.count; ++i) {
+        const double* const row = records.rows + i * records.columns + 1;
+        widen_to(least_, most_, row, count);
+        if (records.is_stop) continue;
+        // With a clock the states at its steps stand between the arrivals, which are told by their times.
+        const bool is_arrival = request_.arrivals.interval == 0 || row[-1] == time_after(request_, seen_);
+        if (!is_arrival) continue;
+        const std::int64_t number = seen_++;
+        if (number % rows_a_step_ != 0) continue;
+        const std::int64_t steps = std::min(number / rows_a_step_ * request_.every, request_.steps);
+        if (steps == 0 || (steps % stride_ != 0 && steps != request_.steps)) continue;
+        const double* const whole =
+            records.whole != nullptr ? records.whole + (i * records.columns + 1) * records.parts : row;
+        run_.push_back({steps, {whole, whole + count * parts_}});
+    }
+}
+
+Companion::Segment Companion::segment(std::size_t number) const {
+    Segment result;
+    result.begin = static_cast<std::int64_t>(number) * stride_;
+    result.steps = std::min(stride_, request_.steps - result.begin);
+    result.taken = is_clocked() ? result.steps : result.steps > 0 ? companion_steps(result.steps) : 0;
+    if (is_driven_ && !is_clocked() && result.steps < fewest_driven_steps)
+        result.taken = companion_steps(fewest_driven_steps);
+    return result;
+}
+
+// Steps of the companion for one of the run. With a clock both arrive at the same times, whatever their steps.
+double Companion::ratio_of(const Segment& part) const {
+    return is_clocked() ? clocked_ratio : static_cast<double>(part.taken) / static_cast<double>(part.steps);
+}
+
+void Companion::start() {
+    if (request_.steps > 0) thread_ = std::thread([this] { compute(); });
+}
+
+struct Companion::Place {
+    NumberStepper stepper;
+    std::vector<double> time, step;  // step: zero before the first
+    std::vector<double> q, p;
+    Arrivals arrivals;
+    lobatto_status status = LOBATTO_OK;
+
+    struct State {
+        std::vector<double> time, q, p;
+    };
+    State state() const { return {time, q, p}; }
+    void go_back(const State& to) {
+        time = to.time;
+        q = to.q;
+        p = to.p;
+        step.assign(step.size(), 0.0);
+    }
+
+    // Steps of another size begin at this place.
+    void set_step(const std::vector<double>& size, const std::vector<double>& parameters) {
+        if (size == step || status != LOBATTO_OK) return;
+        status = stepper.prepare(parameters, size);
+        if (status == LOBATTO_OK) status = stepper.start(time, q, p);
+        step = size;
+    }
+    std::int64_t advance(std::int64_t steps, double tolerance) {
+        lobatto_advance call{};
+        call.steps = steps;
+        call.tolerance = tolerance;
+        call.interval = arrivals.interval;
+        call.end = arrivals.end;
+        std::vector<double> none, nothing;
+        if (status == LOBATTO_OK) status = stepper.advance(call, none, nothing);
+        stepper.state(time, q, p);
+        return call.steps_done;
+    }
+};
+
+bool Companion::is_near_pulse(double from, double step) const {
+    const double begin = std::fmin(from, from + step), end = std::fmax(from, from + step), size = end - begin;
+    const auto first = std::lower_bound(pulses_.begin(), pulses_.end(), begin - graded * size,
+                                        [](const Pulse& pulse, double time) { return pulse.time < time; });
+    for (auto pulse = first; pulse != pulses_.end() && pulse->time < end + graded * size; ++pulse) {
+        const double distance = std::fmax(0.0, std::fmax(begin - pulse->time, pulse->time - end));
+        if (size > std::fmax(pulse->width / 2, distance / graded)) return true;
+    }
+    return false;
+}
+
+bool Companion::can_halve(double from, double step) const {
+    return std::fabs(step) > finest * std::fmax(std::fabs(request_.step), std::fabs(from));
+}
+
+// Steps shorter and shorter towards a pulse.
+void Companion::take_finely(Place& place, double from, double step) {
+    if (place.status != LOBATTO_OK || cancelled_) return;
+    if (is_near_pulse(from, step) && can_halve(from, step)) {
+        take_finely(place, from, step / 2);
+        take_finely(place, from + step / 2, step / 2);
+        return;
+    }
+    take_one(place, from, step);
+}
+
+// One step; shorter ones in its place, if the motion met something narrow in it.
+void Companion::take_one(Place& place, double from, double step) {
+    const Place::State before = place.state();
+    place.set_step(as_parts({step}, parts_), request_.whole_parameters);
+    place.advance(1, request_.tolerance);
+    if (narrow_.empty() || place.status != LOBATTO_OK || looked_ >= most_looked) return;
+    ++looked_;
+    NarrowTerms::State begin{from, rounded(before.q, parts_), {}}, end{from + step, rounded(place.q, parts_), {}};
+    if (place.stepper.velocity(before.time, before.q, before.p, begin.v) != LOBATTO_OK ||
+        place.stepper.velocity(place.time, place.q, place.p, end.v) != LOBATTO_OK)
+        return;
+    begin.v = rounded(begin.v, parts_);
+    end.v = rounded(end.v, parts_);
+    const std::optional<Pulse> met = narrow_.on_the_way(begin, end);
+    if (!met || !can_halve(from, step)) return;
+    pulses_.insert(std::upper_bound(pulses_.begin(), pulses_.end(), *met,
+                                    [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
+                   *met);
+    place.go_back(before);
+    take_finely(place, from, step);
+}
+
+void Companion::take(Place& place, const Segment& part) {
+    const double from = time_after(request_, part.begin), size = request_.step / ratio_of(part);
+    const std::vector<double> whole_size =
+        is_clocked() ? as_parts({size}, parts_) : times_fraction(request_.whole_step, part.steps, part.taken);
+    const std::int64_t piece = std::max<std::int64_t>(1, request_.steps / amplitude_looks);
+    std::int64_t done = 0;
+    while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
+        const double here = from + static_cast<double>(done) * size;
+        const bool looks = !narrow_.empty() && !is_clocked() && looked_ < most_looked;
+        std::int64_t count = 0;
+        while (!looks && count < std::min(piece, part.taken - done) &&
+               (pulses_.empty() || !is_near_pulse(here + static_cast<double>(count) * size, size)))
+            count = pulses_.empty() ? std::min(piece, part.taken - done) : count + 1;
+        if (count == 0) {
+            take_finely(place, here, size);
+            ++done;
+        } else {
+            place.set_step(whole_size, request_.whole_parameters);
+            done += place.advance(count, request_.tolerance);
+        }
+        const std::vector<double> row = rounded(joined(place.q, place.p), parts_);
+        const std::lock_guard lock(mutex_);
+        widen_to(companion_least_, companion_most_, row.data(), row.size());
+    }
+}
+
+void Companion::compute() {
+    Place place{NumberStepper(kernel_), as_parts({request_.time}, parts_),
+                as_parts({0}, parts_),  request_.whole_q,
+                request_.whole_p,       request_.arrivals};
+    std::size_t done = 0;
+    {
+        const std::lock_guard lock(mutex_);
+        done = companion_.size();
+        if (done > 0) {
+            const auto middle = companion_.back().row.begin() + std::ssize(place.q);
+            place.q.assign(companion_.back().row.begin(), middle);
+            place.p.assign(middle, companion_.back().row.end());
+            place.time = is_clocked() ? as_parts({time_after(request_, companion_.back().steps)}, parts_)
+                                      : times_fraction(request_.whole_step, companion_.back().steps, 1);
+            if (!is_clocked()) place.time[0] += request_.time;
+        }
+    }
+    if (done == 0) {
+        std::vector<double> moved = place.q;
+        for (std::size_t k = 0; k < moved.size(); k += parts_) {
+            if (moved[k] == 0) continue;
+            if (kernel_->real_kind == LOBATTO_DOUBLE)
+                moved[k] = beside(moved[k]);
+            else
+                moved[k + parts_ - 1] += 4 * kernel_->epsilon * moved[k];
+        }
+        if (place.stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
+            place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
+            place.q = moved;  // else the start is at the edge of where the Lagrangian is real
+    }
+    for (Segment part = segment(done); part.steps > 0; part = segment(++done)) {
+        take(place, part);
+        if (cancelled_) return;
+        const std::lock_guard lock(mutex_);
+        if (place.status != LOBATTO_OK) {
+            stopped_ = place.time[0];
+            break;
+        }
+        companion_.push_back({part.begin + part.steps, joined(place.q, place.p)});
+    }
+    finished_ = true;
+}
+
+std::vector<double> Companion::save() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<double> all{static_cast<double>(seen_), static_cast<double>(run_.size()),
+                            static_cast<double>(companion_.size())};
+    for (const auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
+        all.push_back(static_cast<double>(range->size()));
+        all.insert(all.end(), range->begin(), range->end());
+    }
+    for (const auto* points : {&run_, &companion_})
+        for (const Point& point : *points) {
+            all.push_back(static_cast<double>(point.steps));
+            all.insert(all.end(), point.row.begin(), point.row.end());
+        }
+    return all;
+}
+
+void Companion::restore(const std::vector<double>& saved) {
+    auto at = saved.begin();
+    const auto take = [&](std::ptrdiff_t count) {
+        if (saved.end() - at < count) return std::vector<double>();
+        std::vector<double> part(at, at + count);
+        at += count;
+        return part;
+    };
+    const std::vector<double> counts = take(3);
+    if (counts.empty()) return;
+    seen_ = std::llround(counts[0]);
+    for (auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
+        const std::vector<double> size = take(1);
+        if (!size.empty()) *range = take(std::llround(size[0]));
+    }
+    for (const auto& [points, count] : {std::pair{&run_, counts[1]}, std::pair{&companion_, counts[2]}})
+        for (std::int64_t i = 0; i < std::llround(count); ++i) {
+            const std::vector<double> point = take(1 + 2 * std::ssize(groups_) * static_cast<std::ptrdiff_t>(parts_));
+            if (!point.empty()) points->push_back({std::llround(point[0]), {point.begin() + 1, point.end()}});
+        }
+}
+
+// Where a stop ended the run before its time: whether nothing is left to compare.
+bool Companion::has_caught_up() const {
+    const std::lock_guard lock(mutex_);
+    return companion_.size() >= run_.size();
+}
+
+std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
+    const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
+    if (has_end) {
+        const bool begins_now = !thread_.joinable();  // there is one processor: it waited until now
+        if (begins_now) start();
+        const auto now = std::chrono::steady_clock::now();
+        const double longest = result.seconds < short_run ? std::numeric_limits<double>::infinity()
+                               : begins_now               ? result.seconds / 2
+                                                          : 0;
+        while (!finished_ && !has_caught_up() && seconds_since(now) < longest)
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    cancelled_ = true;
+    if (thread_.joinable()) thread_.join();
+    if (!has_end || run_.empty()) return std::nullopt;
+    return compare(result);
+}
+
+std::vector<double> Companion::amplitudes() const {
+    const std::size_t n = groups_.size();
+    std::vector<double> least = least_, most = most_;
+    for (const auto* row : {&companion_least_, &companion_most_})
+        if (!row->empty()) widen_to(least, most, row->data(), row->size());
+    std::vector<double> shared = amplitudes_of(least, most, groups_);
+    // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
+    NumberStepper stepper(kernel_);
+    std::vector<double> T;
+    if (kernel_->has_tangent != 0 && n <= most_coupled &&
+        stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
+        stepper.tangent(as_parts({request_.time}, parts_), request_.whole_q, request_.whole_p, T) == LOBATTO_OK) {
+        T = rounded(T, parts_);
+        const std::vector<double> found = shared;
+        for (std::size_t i = 0; i < 2 * n; ++i)
+            for (std::size_t j = 0; j < 2 * n; ++j)
+                if (i % n != j % n && found[i] > 0)
+                    shared[i] = std::fmax(shared[i], noise * std::fabs(T[i * 2 * n + j]) * found[j]);
+    }
+    return shared;
+}
+
+MeasuredError Companion::compare(const TrajectoryResult& result) const {
+    const std::size_t n = groups_.size();
+    const std::vector<double> amplitude = amplitudes();
+    MeasuredError error;
+    error.companion_stopped = stopped_;
+    std::vector<std::pair<double, double>> course;  // time, largest error until then
+    struct {
+        double end = 0, absolute = 0;
+        std::size_t coordinate = 0;
+    } worst;
+    const std::size_t count = std::min(run_.size(), companion_.size());
+    for (std::size_t j = 0; j < count; ++j) {
+        const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -order_));
+        error.until = time_after(request_, run_[j].steps);
+        error.end = 0;
+        double apart = 0;
+        for (std::size_t i = 0; i < 2 * n; ++i) {
+            if (!(amplitude[i] > 0)) continue;
+            const double distance =
+                std::fabs(difference(run_[j].row.data() + i * parts_, companion_[j].row.data() + i * parts_, parts_));
+            apart = std::fmax(apart, distance / amplitude[i]);
+            if (i >= n || !(of_run * distance / amplitude[i] > error.end)) continue;
+            error.end = of_run * distance / amplitude[i];
+            error.coordinate = i;
+            error.absolute = of_run * distance;
+        }
+        if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
+        error.largest = std::fmax(error.largest, error.end);
+        course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
+        if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, rounded(run_[j].row, parts_));
+    }
+    if (!error.lost_after && stopped_)
+        lose(error, *stopped_, count > 0 ? rounded(run_[count - 1].row, parts_) : joined(request_.q, request_.p));
+    error.complete = count == run_.size();
+    // Exponential growth: from the first error that is there to the first that is as large as it can be.
+    const auto first = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > 0; });
+    auto last = std::find_if(first, course.end(), [](const auto& c) { return c.second > out_of_step / 2; });
+    if (last == course.end() && first != course.end()) last = std::prev(course.end());
+    if (first != course.end() && last > first) {
+        const double growth = last->second / first->second, times = last->first / first->first;
+        // Half of the way in half of the time: a jump is no growth.
+        const auto middle = first + (last - first) / 2;
+        const double part = std::log(middle->second / first->second) / std::log(growth);
+        if (growth > exponential * times * times && part > 0.2 && part < 0.8)
+            error.doubling = (last->first - first->first) / std::log2(growth);
+    }
+    // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
+    const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
+    if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
+        const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
+        lose(error, time_after(request_, point.steps), rounded(point.row, parts_));
+    }
+    // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
+    // difference is what is known.
+    if (error.largest > by_chance) {
+        error.end = worst.end;
+        error.absolute = worst.absolute;
+        error.coordinate = worst.coordinate;
+    }
+    error.at_end = error.end;
+    if (!error.complete && !course.empty()) {
+        const double whole = std::fabs(result.time - request_.time), part = course.back().first;
+        error.at_end *= error.doubling ? std::exp2((whole - part) / *error.doubling) : whole * whole / (part * part);
+    }
+    return error;
+}
+
+std::string text_of(const MeasuredError& error, const Scene& scene) {
+    const std::string chaos = error.doubling ? fmt::format("; errors double every {:.3g}", *error.doubling) : "";
+    if (error.companion_stopped && error.lost_after)
+        return fmt::format("not known after t = {:.4g}, where the same run with 2/3 of the step stops",
+                           *error.lost_after);
+    if (error.lost_after)
+        return fmt::format("as large as the motion itself from t = {:.4g} on{}", *error.lost_after, chaos);
+    const std::string place = error.complete ? "at the end" : fmt::format("at t = {:.4g}", error.until);
+    std::string text = error.largest > 3 * error.end
+                           ? fmt::format("{:.1e} of the amplitude at most; {} {:.1e}", error.largest, place, error.end)
+                           : fmt::format("{:.1e} of the amplitude {}", error.end, place);
+    const Coordinate& worst = scene.coordinates[error.coordinate];
+    if (error.end > 0)
+        text +=
+            fmt::format(" ({:.1e}{} in {})", error.absolute, worst.unit.empty() ? "" : " " + worst.unit, worst.written);
+    if (!error.complete)
+        text += fmt::format(", not measured beyond; perhaps {:.0e} at the end", std::fmin(error.at_end, 1));
+    return text + chaos;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The error of a run, measured: a companion beside it, in a thread of its own, takes the same motion in about 3/2 of
+// the steps. With a method of order p the difference D of the two is (1 - r^-p) times the error of the run, r the ratio
+// of their steps; where rounding decides, D is the error itself, about.
+//
+// Where explicit time makes short pulses, or the motion meets terms that are narrower than a step (narrow_terms.hpp),
+// which steps may miss, the companion takes short ones. In equally many times it takes steps of a number without a
+// common divisor with that of the run: oscillations that look constant to the one do not to the other.
+//
+// The companion begins four units in the last place beside the start: what no number of steps can know, and what grows
+// where nearby trajectories diverge, is an error too.
+#pragma once
+
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/formulas/narrow_terms.hpp"
+#include "analysis/accuracy/formulas/pulses.hpp"
+#include "generator/mechanics/outline.hpp"
+#include "runtime/run/trajectory.hpp"
+
+namespace lobatto {
+
+inline constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
+
+struct MeasuredError {
+    double end = 0;                      // at `until`: of the positions, relative to the amplitude of each; the largest
+    std::size_t coordinate = 0;          // of which it is
+    double absolute = 0;                 // the same in its unit
+    double largest = 0;                  // over all comparisons
+    double until = 0;                    // the time of the last comparison
+    bool complete = false;               // that is the end of the run
+    double at_end = 0;                   // `end`; of what was not compared, as errors of this run grew so far
+    std::vector<double> lost_q, lost_p;  // where the run was then
+    std::optional<double> lost_after;    // from then on the error is as large as the motion
+    std::optional<double> doubling;      // of errors that grow exponentially: the time in which they double
+    std::optional<double> companion_stopped;  // the time where the companion could not go on, though the run could
+
+    bool is_lost() const { return lost_after.has_value(); }
+    double worst() const { return std::fmax(at_end, largest); }
+};
+
+// Of a companion, for so many steps of the run: about 3/2 of them, without a common divisor.
+std::int64_t companion_steps(std::int64_t steps);
+// Of a run with explicit time between two comparisons, at least: in fewer steps common divisors cannot be avoided.
+inline constexpr std::int64_t fewest_driven_steps = 8;
+
+// Of a companion with a clock: its steps for one of the run, both equally long in the time of the clock.
+inline constexpr double clocked_ratio = 1.5;
+
+// One line.
+std::string text_of(const MeasuredError& error, const Scene& scene);
+
+class Companion {
+public:
+    // What is handed over is copied, but for what the kernel needs. `request`: the run's.
+    Companion(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request);
+    ~Companion();
+
+    // The kept states of the run go by.
+    void observe(const Records& records);
+    // Begins to compute. Before, `restore` may say what an earlier part of the run had.
+    void start();
+    std::vector<double> save() const;
+    void restore(const std::vector<double>& saved);
+
+    // Waits for the companion, where the run took less than a second of processor time, and compares what there is; of
+    // a longer run that is as much as was computed beside it. Nothing: the run was stopped, or took no step.
+    std::optional<MeasuredError> finish(const TrajectoryResult& result);
+
+private:
+    struct Point {
+        std::int64_t steps;       // of the run
+        std::vector<double> row;  // q, p, as parts
+    };
+    struct Segment {
+        std::int64_t begin = 0, steps = 0;  // of the run
+        std::int64_t taken = 0;             // of the companion
+    };
+
+    struct Place;  // where the companion is, and its stepper
+
+    Segment segment(std::size_t number) const;
+    bool is_clocked() const { return request_.arrivals.interval != 0; }
+    double ratio_of(const Segment& part) const;
+    void compute();
+    void take(Place& place, const Segment& part);
+    void take_finely(Place& place, double from, double step);
+    void take_one(Place& place, double from, double step);
+    bool has_caught_up() const;
+    bool can_halve(double from, double step) const;
+    bool is_near_pulse(double from, double step) const;
+    std::vector<double> amplitudes() const;  // 2n; 0: of what does not move, or by rounding alone
+    MeasuredError compare(const TrajectoryResult& result) const;
+
+    Kernel kernel_;
+    std::size_t parts_;  // of its numbers
+    TrajectoryRequest request_;
+    std::vector<int> groups_;
+    int order_, rows_a_step_;
+    std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
+    NarrowTerms narrow_;         // likewise, where the motion meets them
+    std::int64_t looked_ = 0;    // steps of the companion at which that was looked at
+    bool is_driven_ = false;     // explicit time
+    std::int64_t stride_;        // steps of the run between comparisons
+    std::int64_t seen_ = 0;
+    std::vector<Point> run_;            // of the run, at comparisons
+    std::vector<double> least_, most_;  // of the run's kept states
+    mutable std::mutex mutex_;          // guards what follows
+    std::vector<Point> companion_;      // of the companion
+    std::vector<double> companion_least_, companion_most_;
+    std::optional<double> stopped_;  // where the companion stopped with another status than ok
+    std::atomic<bool> cancelled_{false}, finished_{false};
+    std::thread thread_;
+};
+
+}  // namespace lobatto

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/companion/ensemble_companion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
+#include "runtime/build/number_stepper.hpp"
+#include "runtime/run/parts.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::int64_t numbers_at_once = 1 << 20;  // of companions that are computed together
+constexpr std::int64_t between_looks = 8;          // steps of a companion, at least
+
+const double unknown = std::numeric_limits<double>::quiet_NaN();
+
+// In how many parts a companion looks at its way from one comparison to the next: states that are kept after whole
+// periods are all at one place, and tell no amplitude.
+std::int64_t looks_of(std::int64_t every) {
+    for (const std::int64_t parts : {13, 11, 7, 5, 3})
+        if (every % parts != 0 && every / parts >= between_looks) return parts;
+    return 1;
+}
+
+// Steps for `every` of the sweep: about 3/2 of them, without a common divisor, in equal parts.
+std::int64_t steps_taken(std::int64_t every) {
+    const std::int64_t parts = looks_of(every);
+    std::int64_t taken = (companion_steps(every) + parts - 1) / parts * parts;
+    while (std::gcd(every, taken) != 1) taken += parts;
+    return taken;
+}
+
+// q and p of a kept state, with all digits.
+const double* whole_row(const Records& kept, std::int64_t i) {
+    return kept.whole == nullptr ? kept.rows + i * kept.columns + 1 : kept.whole + (i * kept.columns + 1) * kept.parts;
+}
+
+}  // namespace
+
+EnsembleCompanion::EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const Kernel& plain,
+                                     const EnsembleRequest& request)
+    : derivation_(derivation),
+      kernel_(kernel),
+      parts_(static_cast<std::size_t>(kernel->parts)),
+      request_(request),
+      groups_(amplitude_groups(derivation.scene)),
+      order_(derivation.quadrature.order()),
+      narrow_(derivation.system),
+      stepper_(plain) {}
+
+void EnsembleCompanion::compute(std::int64_t first) {
+    const auto n = static_cast<std::int64_t>(groups_.size());
+    const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
+                       rows = (request_.steps / every + 1) * looks_of(every),
+                       count =
+                           std::min(std::max<std::int64_t>(numbers_at_once / ((4 + 2 * rows) * n * kernel_->parts), 64),
+                                    request_.first + request_.count - first);
+    first_ = first;
+    known_.assign(static_cast<std::size_t>(count), {});
+    const std::int64_t whole = request_.steps / every * every;
+    take(0, whole, every);
+    if (whole < request_.steps) take(whole, request_.steps - whole, request_.steps - whole);
+}
+
+// The positions by four units in the last place.
+void EnsembleCompanion::move(EnsembleStart& start) const {
+    if (kernel_->real_kind == LOBATTO_DOUBLE) {
+        for (double& x : start.q)
+            if (x != 0) x = beside(x);
+        return;
+    }
+    std::vector<double>& q = parts_ == 1 ? start.q : start.whole_q;
+    for (std::size_t k = 0; k < q.size(); k += parts_) q[k + parts_ - 1] += 4 * kernel_->epsilon * q[k];
+}
+
+void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_t every) {
+    const std::size_t n = groups_.size();
+    EnsembleRequest companion = request_;
+    companion.first = 0;
+    companion.count = std::ssize(known_);
+    companion.start = [&](std::int64_t index, EnsembleStart& start) {
+        request_.start(first_ + index, start);
+        const std::vector<double>& rows = known_[static_cast<std::size_t>(index)].rows;
+        if (begin == 0) {
+            move(start);
+        } else if (rows.size() >= 2 * n * parts_) {
+            const auto one = static_cast<std::ptrdiff_t>(n * parts_);
+            (parts_ == 1 ? start.q : start.whole_q).assign(rows.end() - 2 * one, rows.end() - one);
+            (parts_ == 1 ? start.rate : start.whole_rate).assign(rows.end() - one, rows.end());
+        }
+    };
+    companion.from_velocities = request_.from_velocities && begin == 0;
+    companion.time = time_after(request_, begin);
+    const bool is_clocked = request_.arrivals.interval != 0;  // then both arrive at the same times
+    const std::int64_t taken = is_clocked ? every : steps_taken(every), looks = is_clocked ? 1 : looks_of(every);
+    companion.step = is_clocked ? request_.step / clocked_ratio
+                                : request_.step * static_cast<double>(every) / static_cast<double>(taken);
+    if (parts_ > 1) companion.whole_step = times_fraction(request_.whole_step, every, taken);
+    companion.steps = steps / every * taken;
+    companion.every = taken / looks;
+    companion.stops = false;
+    companion.reducer = nullptr;
+    companion.progress = nullptr;
+    companion.sink = [&](const EnsembleTrajectory& trajectory) {
+        Known& known = known_[static_cast<std::size_t>(trajectory.index)];
+        if (begin == 0 || known.status == LOBATTO_OK) known.status = trajectory.status;
+        for (std::int64_t i = 0; i < trajectory.kept.count; ++i) {
+            const double* const row = trajectory.kept.rows + i * trajectory.kept.columns + 1;
+            widen_to(known.least, known.most, row, 2 * n);
+            if (i == 0 || i % looks != 0) continue;
+            const double* const whole = whole_row(trajectory.kept, i);
+            known.rows.insert(known.rows.end(), whole, whole + 2 * n * parts_);
+        }
+    };
+    if (integrate(kernel_, companion).interrupted) known_.clear();
+}
+
+bool EnsembleCompanion::has_pulses(const EnsembleStart& start) {
+    if (start.parameters == pulse_parameters_ && !start.parameters.empty()) return has_pulses_;
+    pulse_parameters_ = start.parameters;
+    const double end = request_.time + static_cast<double>(request_.steps) * request_.step;
+    has_pulses_ =
+        !find_pulses(derivation_.system, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
+    return has_pulses_;
+}
+
+bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
+    if (narrow_.empty() || request_.arrivals.interval != 0) return false;
+    if (stepper_.prepare(start.parameters, request_.step) != LOBATTO_OK) return false;
+    narrow_.set_parameters(start.parameters);
+    const auto n = static_cast<std::ptrdiff_t>(groups_.size());
+    const auto reach = static_cast<double>(request_.every == 0 ? request_.steps : request_.every);
+    for (std::int64_t i = 0; i < trajectory.kept.count; ++i) {
+        const double* const row = trajectory.kept.rows + i * trajectory.kept.columns;
+        NarrowTerms::State state{row[0], {row + 1, row + 1 + n}, {}};
+        if (stepper_.velocity(row[0], state.q, {row + 1 + n, row + 1 + 2 * n}, state.v) != LOBATTO_OK ||
+            narrow_.may_be_met(state, request_.step, reach))
+            return true;
+    }
+    return false;
+}
+
+bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
+    if (meets_narrow_terms(trajectory, start)) return true;
+    if (derivation_.system.autonomous) return false;
+    return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
+}
+
+// As of a run: companions take short steps at pulses, each at its own.
+EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& trajectory,
+                                                  const EnsembleStart& start) const {
+    TrajectoryRequest request;
+    request.parameters = start.parameters;
+    request.q = start.q;
+    LoadedStepper<double> stepper(stepper_.kernel());
+    if (stepper.prepare(start.parameters, request_.step) != LOBATTO_OK) return {unknown, true};
+    request.p = request_.from_velocities ? stepper.momentum(request_.time, start.q, start.rate) : start.rate;
+    if (parts_ > 1) {
+        request.whole_parameters = start.whole_parameters;
+        request.whole_q = start.whole_q;
+        request.whole_p = start.whole_rate;
+        request.whole_step = request_.whole_step;
+        NumberStepper numbers(kernel_);
+        if (numbers.prepare(request.whole_parameters, request.whole_step) != LOBATTO_OK) return {unknown, true};
+        if (request_.from_velocities)
+            request.whole_p = numbers.momentum(as_parts({request_.time}, parts_), start.whole_q, start.whole_rate);
+    }
+    request.time = request_.time;
+    request.step = request_.step;
+    request.steps = request_.steps;
+    request.every = request_.every == 0 ? request_.steps : request_.every;
+    request.tolerance = request_.tolerance;
+    Companion companion(derivation_, kernel_, request);
+    Records kept = trajectory.kept;
+    if (trajectory.stop >= 0) --kept.count;  // where it was stopped, between two steps
+    companion.observe(kept);
+    TrajectoryResult result;
+    result.steps_done = trajectory.steps_done;
+    result.time = time_after(request_, trajectory.steps_done);
+    const std::optional<MeasuredError> error = companion.finish(result);
+    if (!error || error->companion_stopped) return {unknown, true};
+    return {error->end, error->is_lost()};
+}
+
+EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& trajectory) {
+    if (request_.steps == 0) return {0, false};
+    EnsembleStart start;
+    start.parameters.resize(static_cast<std::size_t>(kernel_->parameters));
+    start.q.resize(groups_.size());
+    start.rate.resize(groups_.size());
+    request_.start(trajectory.index, start);
+    if (goes_alone(trajectory, start)) return alone(trajectory, start);
+    if (known_.empty() || trajectory.index >= first_ + std::ssize(known_)) compute(trajectory.index);
+    const std::int64_t place = trajectory.index - first_;
+    if (place >= std::ssize(known_)) return {unknown, false, true};
+    Known& known = known_[static_cast<std::size_t>(place)];
+    const std::size_t n = groups_.size();
+    const Records& kept = trajectory.kept;
+    const std::int64_t compared = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n * parts_);
+    const bool is_stopped = trajectory.stop >= 0;
+    // Of a trajectory that was stopped: the start, and where it was stopped, between two steps.
+    const std::int64_t comparisons = is_stopped ? std::max<std::int64_t>(kept.count - 2, 0) : compared,
+                       skipped = is_stopped ? 1 : kept.count - comparisons;
+    if (known.status != LOBATTO_OK && !(is_stopped && comparisons < compared)) return {unknown, true};
+    for (std::int64_t i = 0; i < kept.count; ++i)
+        widen_to(known.least, known.most, kept.rows + i * kept.columns + 1, 2 * n);
+    const std::vector<double> amplitude = amplitudes_of(known.least, known.most, groups_);
+    const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
+    const double ratio = request_.arrivals.interval != 0
+                             ? clocked_ratio
+                             : static_cast<double>(steps_taken(every)) / static_cast<double>(every),
+                 of_run = 1 / (1 - std::pow(ratio, -order_));
+    Error error{0, false};
+    double largest = 0;
+    for (std::int64_t j = 0; j < comparisons; ++j) {
+        const double* const run = whole_row(kept, skipped + j);
+        const double* const companion = known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
+        error.relative = 0;
+        for (std::size_t i = 0; i < 2 * n; ++i) {
+            if (!(amplitude[i] > 0)) continue;
+            const double apart = std::fabs(difference(run + i * parts_, companion + i * parts_, parts_)) / amplitude[i];
+            if (i < n) error.relative = std::fmax(error.relative, of_run * apart);
+            error.lost = error.lost || !(apart < out_of_step);
+        }
+        largest = std::fmax(largest, error.relative);
+    }
+    if (largest > by_chance) error.relative = largest;
+    return error;
+}
+
+}  // namespace lobatto

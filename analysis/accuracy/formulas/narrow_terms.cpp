@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/formulas/narrow_terms.hpp"
+
+#include <ginac/ginac.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "generator/formula/real.hpp"
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+constexpr std::size_t coordinate_limit = 16, most_terms = 32;
+constexpr int most_parts = 20000;  // of a formula that are looked at
+constexpr int places = 8;          // at the way
+constexpr int sections = 40;       // shorter ones
+constexpr double shorter = 0.381966;
+constexpr double smallest = 745;  // exp(-745) is the least number
+constexpr double fine = 0.25;     // of the scale on which a term changes: what it does to the motion may be large
+constexpr double flat = 20;       // tanh(20) is 1
+
+}  // namespace
+
+NarrowTerms::NarrowTerms(const SystemOutline& system) {
+    if (system.q.size() > coordinate_limit) return;
+    std::vector<GiNaC::symbol> moving{system.t};
+    for (const auto* list : {&system.q, &system.v}) moving.insert(moving.end(), list->begin(), list->end());
+    const auto moves = [&](const ex& part) {
+        return std::any_of(moving.begin(), moving.end(), [&](const auto& symbol) { return part.has(symbol); });
+    };
+    std::vector<GiNaC::symbol> variables = moving;
+    variables.insert(variables.end(), system.parameters.begin(), system.parameters.end());
+    const Tape::Variables numbered(variables);
+    GiNaC::exset known;
+    const auto add = [&](Kind kind, const ex& u) {
+        if (terms_.size() == most_terms || !moves(u) || !known.insert(u).second) return;
+        if (const auto tape = Tape::of(u, numbered)) terms_.push_back({kind, *tape});
+    };
+    static const std::map<std::string, Kind> kinds{{"exp", Kind::peak},  {"tanh", Kind::step}, {"sinh", Kind::step},
+                                                   {"cosh", Kind::step}, {"atan", Kind::tail}, {"log", Kind::pole}};
+    int parts = 0;
+    const auto look_at = [&](const ex& formula) {
+        for (auto part = formula.preorder_begin(); part != formula.preorder_end() && parts < most_parts; ++part) {
+            ++parts;
+            if (GiNaC::is_a<GiNaC::function>(*part)) {
+                const std::string name = GiNaC::ex_to<GiNaC::function>(*part).get_name();
+                if (const auto kind = kinds.find(name); kind != kinds.end()) add(kind->second, part->op(0));
+                if (is_angle(*part)) add(Kind::pole, GiNaC::pow(part->op(0), 2) + GiNaC::pow(part->op(1), 2));
+                if (name == "tan") add(Kind::pole, GiNaC::cos(part->op(0)));
+                if (name == "asin" || name == "acos") add(Kind::pole, 1 - GiNaC::pow(part->op(0), 2));
+            } else if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::nonnegint)) {
+                add(Kind::pole, part->op(0));
+            }
+        }
+    };
+    look_at(system.lagrangian);
+    for (const ex& force : system.outer_force) look_at(force);
+    for (const auto& [place, mass] : system.momentum_v.entries())
+        if (place.first == place.second) add(Kind::pole, mass);
+}
+
+// Where on the way, 0 to 1, exp(u) is largest, or |u| least, if the term changes there within half of the way.
+template <class U>
+std::optional<NarrowTerms::Found> NarrowTerms::narrow_place(Kind kind, const U& u) {
+    const double begin = u(0), middle = u(0.5), end = u(1);
+    const double variation = std::fabs(end - begin) + 4 * std::fabs(2 * middle - begin - end);
+    const double least = std::fmin(std::fabs(middle), std::fmin(std::fabs(begin), std::fabs(end)));
+    if (!(variation > (kind == Kind::pole ? least / 2 : kind == Kind::tail ? std::fmax(1, least) : 1))) return {};
+    // Small where the term is narrow.
+    const auto height = [&](double place) { return kind == Kind::peak ? -u(place) : std::fabs(u(place)); };
+    std::array<double, places + 1> heights{};
+    for (int i = 0; i <= places; ++i) {
+        heights[static_cast<std::size_t>(i)] = height(static_cast<double>(i) / places);
+        if (!std::isfinite(heights[static_cast<std::size_t>(i)])) return {};
+    }
+    const auto lowest = std::min_element(heights.begin(), heights.end());
+    double place = static_cast<double>(lowest - heights.begin()) / places, low = std::fmax(0, place - 1.0 / places),
+           high = std::fmin(1, place + 1.0 / places), here = *lowest;
+    for (int i = 0; i < sections; ++i) {
+        const bool is_above = high - place > place - low;
+        const double trial = place + shorter * ((is_above ? high : low) - place), there = height(trial);
+        if (there < here) {
+            (is_above ? low : high) = place;
+            place = trial;
+            here = there;
+        } else {
+            (is_above ? high : low) = trial;
+        }
+    }
+    if (here > (kind == Kind::step ? flat : smallest) && kind != Kind::tail && kind != Kind::pole) return {};
+    const double change = kind == Kind::pole ? here : kind == Kind::tail ? std::fmax(1, here) : 1, at_place = u(place);
+    for (double width = 0x1p-40; width < 0.5; width *= 2)
+        if (std::fabs(u(place + width) - at_place) > change || std::fabs(u(place - width) - at_place) > change)
+            return Found{place, width};
+    return {};
+}
+
+std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to) const {
+    const std::size_t n = from.q.size();
+    const double duration = to.time - from.time;
+    std::vector<double> variables(1 + 2 * n);
+    variables.insert(variables.end(), parameters_.begin(), parameters_.end());
+    std::optional<Found> narrowest;
+    for (const Term& term : terms_) {
+        const auto u = [&](double s) {
+            variables[0] = from.time + s * duration;
+            const double r = 1 - s;
+            for (std::size_t k = 0; k < n; ++k) {
+                const double a = duration * from.v[k], b = duration * to.v[k], way = to.q[k] - from.q[k];
+                variables[1 + k] = from.q[k] + s * s * (3 - 2 * s) * way + s * r * (r * a - s * b);
+                variables[1 + n + k] = (6 * s * r * way + r * (1 - 3 * s) * a + s * (3 * s - 2) * b) / duration;
+            }
+            return term.tape(variables);
+        };
+        const std::optional<Found> found = narrow_place(term.kind, u);
+        if (found && (!narrowest || found->width < narrowest->width)) narrowest = found;
+    }
+    if (!narrowest) return {};
+    return Pulse{from.time + narrowest->place * duration, fine * narrowest->width * std::fabs(duration)};
+}
+
+bool NarrowTerms::may_be_met(const State& at, double step, double reach) const {
+    const std::size_t n = at.q.size();
+    std::vector<double> variables{at.time};
+    variables.insert(variables.end(), at.q.begin(), at.q.end());
+    variables.insert(variables.end(), at.v.begin(), at.v.end());
+    variables.insert(variables.end(), parameters_.begin(), parameters_.end());
+    return std::any_of(terms_.begin(), terms_.end(), [&](const Term& term) {
+        const auto u = [&](double steps) {
+            variables[0] = at.time + steps * step;
+            for (std::size_t k = 0; k < n; ++k) variables[1 + k] = at.q[k] + steps * step * at.v[k];
+            return term.tape(variables);
+        };
+        const double before = u(-1), here = u(0), after = u(1);
+        if (!std::isfinite(before + after)) return true;
+        if (term.kind != Kind::pole) return std::fmax(std::fabs(after - here), std::fabs(before - here)) > 1;
+        // |u| is least where this parabola is, or where it vanishes.
+        const double slope = (after - before) / 2, bend = before - 2 * here + after;
+        if (std::fabs(slope) * reach > std::fabs(here) && std::fabs(bend) * reach < std::fabs(slope)) return true;
+        const double place = -slope / bend, least = here + slope * place / 2;
+        return std::fabs(place) <= reach && !(2 * std::fabs(least) > std::fabs(bend) / 4);
+    });
+}
+
+}  // namespace lobatto

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/formulas/pulses.hpp"
+
+#include <ginac/ginac.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <set>
+#include <string>
+
+namespace lobatto {
+
+namespace {
+
+using GiNaC::ex;
+
+constexpr std::size_t most_pulses = 1000;
+constexpr int rounds = 200;        // of the simultaneous iteration for roots
+constexpr int samples = 8192;      // of what is no polynomial in time
+constexpr double real = 1e-9;      // |Im| of a real root, relative
+constexpr double multiple = 1e-3;  // the same of a multiple one, as rounding splits it
+constexpr double tiny = 0x1p-40;
+
+// All roots of c_0 + c_1 x + ... by the iteration of Durand and Kerner.
+std::vector<std::complex<double>> roots_of(std::vector<double> c) {
+    while (!c.empty() && c.back() == 0) c.pop_back();
+    if (c.size() < 2) return {};
+    const std::size_t degree = c.size() - 1;
+    double radius = 0;
+    for (std::size_t i = 0; i < degree; ++i)
+        radius = std::fmax(radius, std::pow(std::fabs(c[i] / c[degree]), 1.0 / static_cast<double>(degree - i)));
+    std::vector<std::complex<double>> x;
+    for (std::size_t i = 0; i < degree; ++i)
+        x.push_back(
+            std::polar(2 * radius, 0.4 + 6.283185307179586 * static_cast<double>(i) / static_cast<double>(degree)));
+    for (int round = 0; round < rounds; ++round)
+        for (std::size_t i = 0; i < degree; ++i) {
+            std::complex<double> value = c[degree], product = c[degree];
+            for (std::size_t j = degree; j-- > 0;) value = value * x[i] + c[j];
+            for (std::size_t j = 0; j < degree; ++j)
+                if (j != i) product *= x[i] - x[j];
+            if (product != 0.0) x[i] -= value / product;
+        }
+    return x;
+}
+
+class PulseFinder {
+public:
+    PulseFinder(const SystemOutline& system, const std::vector<double>& parameters, double begin, double end,
+                double widest)
+        : t_(system.t), begin_(std::fmin(begin, end)), end_(std::fmax(begin, end)), widest_(widest) {
+        for (std::size_t i = 0; i < parameters.size(); ++i)
+            values_[system.parameters[i]] = GiNaC::numeric(parameters[i]);
+        for (const auto& list : {system.q, system.v})
+            for (const GiNaC::symbol& symbol : list) motion_.insert(symbol);
+    }
+
+    void look_at(const ex& formula) {
+        for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
+            const bool is_function = GiNaC::is_a<GiNaC::function>(*part);
+            if (!is_function && !GiNaC::is_a<GiNaC::power>(*part)) continue;
+            const ex& inner = part->op(0);
+            if (!inner.has(t_) || holds_motion(*part) || !known_.insert(*part).second) continue;
+            const std::string name = is_function ? GiNaC::ex_to<GiNaC::function>(*part).get_name() : "";
+            const bool is_pole = !is_function && GiNaC::is_a<GiNaC::numeric>(part->op(1)) &&
+                                 GiNaC::ex_to<GiNaC::numeric>(part->op(1)).is_negative();
+            const ex u = inner.subs(values_);
+            if (u.is_polynomial(t_))
+                of_polynomial(u.expand(), name, is_pole);
+            else
+                of_samples(u, name, is_pole);
+        }
+    }
+
+    std::vector<Pulse> pulses() {
+        std::sort(pulses_.begin(), pulses_.end(), [](const Pulse& a, const Pulse& b) { return a.time < b.time; });
+        if (pulses_.size() > most_pulses) pulses_.resize(most_pulses);
+        return std::move(pulses_);
+    }
+
+private:
+    bool holds_motion(const ex& part) const {
+        for (auto inner = part.preorder_begin(); inner != part.preorder_end(); ++inner)
+            if (GiNaC::is_a<GiNaC::symbol>(*inner) && motion_.contains(*inner)) return true;
+        return false;
+    }
+    static bool is_switch(const std::string& name) {
+        return name == "tanh" || name == "atan" || name == "sinh" || name == "cosh";
+    }
+    void add(double time, double width) {
+        if (time >= begin_ - width && time <= end_ + width && width < widest_ && width > 0)
+            pulses_.push_back({time, width});
+    }
+
+    void of_polynomial(const ex& u, const std::string& name, bool is_pole) {
+        std::vector<double> c;
+        for (int i = 0; i <= u.degree(t_); ++i) {
+            const ex value = u.coeff(t_, i).evalf();
+            if (!GiNaC::is_a<GiNaC::numeric>(value)) return;
+            c.push_back(GiNaC::ex_to<GiNaC::numeric>(value).to_double());
+        }
+        const auto slope = [](const std::vector<double>& of) {
+            std::vector<double> result;
+            for (std::size_t i = 1; i < of.size(); ++i) result.push_back(static_cast<double>(i) * of[i]);
+            return result;
+        };
+        const auto at = [](const std::vector<double>& of, double x) {
+            double value = 0;
+            for (std::size_t j = of.size(); j-- > 0;) value = value * x + of[j];
+            return value;
+        };
+        const std::vector<double> first = slope(c);
+        if (name == "exp" && c.size() > 2)
+            for (const auto& root : roots_of(first)) {
+                if (std::fabs(root.imag()) > multiple * std::abs(root)) continue;
+                const double middle = root.real(), most = at(c, middle);
+                double width = 2 * widest_;  // on which u falls by 1
+                while (width > widest_ * tiny &&
+                       std::fmin(most - at(c, middle - width / 2), most - at(c, middle + width / 2)) >= 1)
+                    width /= 2;
+                add(middle, width);
+            }
+        if (is_switch(name) || (name == "exp" && c.size() == 2))
+            for (const auto& root : roots_of(c))
+                if (std::fabs(root.imag()) <= real * std::abs(root))
+                    add(root.real(), 1 / std::fabs(at(first, root.real())));
+        if (is_pole)
+            for (const auto& root : roots_of(c))
+                if (root.imag() > 0) add(root.real(), root.imag());
+    }
+
+    // Of any u(t): from its values at many times.
+    void of_samples(const ex& u, const std::string& name, bool is_pole) {
+        const auto value = [&](double time) {
+            const ex result = u.subs(t_ == GiNaC::numeric(time)).evalf();
+            const bool is_number =
+                GiNaC::is_a<GiNaC::numeric>(result) && GiNaC::ex_to<GiNaC::numeric>(result).is_real();
+            return is_number ? GiNaC::ex_to<GiNaC::numeric>(result).to_double() : std::nan("");
+        };
+        const double distance = (end_ - begin_) / samples, sign = name == "exp" ? -1 : 1;
+        if (name != "exp" && !is_pole && !is_switch(name)) return;
+        std::vector<double> values;
+        for (int i = 0; i <= samples; ++i) {
+            const double x = value(begin_ + i * distance);
+            values.push_back(is_pole ? std::fabs(x) : x);
+        }
+        for (std::size_t i = 1; i + 1 < values.size() && pulses_.size() < most_pulses; ++i) {
+            const double time = begin_ + static_cast<double>(i) * distance;
+            if (is_switch(name)) {
+                if ((values[i - 1] < 0) != (values[i] < 0)) add(time, distance / std::fabs(values[i] - values[i - 1]));
+                continue;
+            }
+            if (!(sign * values[i] <= sign * values[i - 1] && sign * values[i] < sign * values[i + 1])) continue;
+            const double curvature = sign * (values[i - 1] - 2 * values[i] + values[i + 1]) / (distance * distance);
+            if (curvature > 0)
+                add(time, name == "exp" ? std::sqrt(2 / curvature) : std::sqrt(2 * values[i] / curvature));
+        }
+    }
+
+    const GiNaC::symbol t_;
+    const double begin_, end_, widest_;
+    GiNaC::exmap values_;
+    GiNaC::exset motion_, known_;
+    std::vector<Pulse> pulses_;
+};
+
+}  // namespace
+
+std::vector<Pulse> find_pulses(const SystemOutline& system, const std::vector<double>& parameters, double begin,
+                               double end, double widest) {
+    if (system.autonomous) return {};
+    PulseFinder finder(system, parameters, begin, end, widest);
+    finder.look_at(system.lagrangian);
+    for (const ex& force : system.outer_force) finder.look_at(force);
+    return finder.pulses();
+}
+
+}  // namespace lobatto

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Short events in the explicit time of a Lagrangian or a force: pulses, switches, near poles. Narrower than the
+// distance of a step's nodes they may fall between all of them, and no step tells that they are there; but formulas do.
+#pragma once
+
+#include <vector>
+
+#include "generator/mechanics/system/system.hpp"
+
+namespace lobatto {
+
+struct Pulse {
+    double time;   // of its middle
+    double width;  // on this scale the formula changes there
+};
+
+// Those between two times that are narrower than `widest`, with the parameters at these values (scene order): of
+// exp(u) where u(t) is largest, of u^-k near complex roots of u, of tanh, atan, sinh, cosh and exp of a linear u where
+// u passes zero; u holds the time and parameters alone. In the order of time, at most 1000.
+std::vector<Pulse> find_pulses(const SystemOutline& system, const std::vector<double>& parameters, double begin,
+                               double end, double widest);
+
+}  // namespace lobatto

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/watch/energy_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/accuracy/watch/exact_energy.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr std::size_t most_states = 8;                          // for the mean kinetic energy
+constexpr std::int64_t longest_stride = std::int64_t{1} << 31;  // mixed numbers have 31 bits
+constexpr double departed = 0.5;                                // of it
+constexpr double walk = 2;                                      // times the rms of a random walk
+constexpr int fewest_states = 3;                                // of a mean of some
+constexpr double coarse = 0.05;                                 // third differences of the energy over second ones
+constexpr double most_energy = 1e300;                           // sums of it stay numbers
+constexpr double a_rounding = 0x1p-52;  // of what the energy is computed from: below it no double can tell
+
+struct State {
+    double time;
+    std::vector<double> q, p, v;  // v is empty where momenta determine none
+};
+State state_of(const LoadedStepper<double>& stepper, const std::vector<double>& row) {
+    const auto middle = row.begin() + 1 + std::ssize(row) / 2;
+    State state{row[0], {row.begin() + 1, middle}, {middle, row.end()}, {}};
+    if (stepper.velocity(state.time, state.q, state.p, state.v) != LOBATTO_OK) state.v.clear();
+    return state;
+}
+
+// Whether from one double to the next the energy changes as no parabola does, for one of the positions, at all these
+// states: its rounding is larger than the shape of the potential, as at 1e17 radians of a pendulum.
+bool is_too_coarse(ExactEnergy& energy, const std::vector<State>& states, double step) {
+    const auto may_be = [&](std::size_t k) {
+        return std::all_of(states.begin(), states.end(), [&](const State& state) {
+            return !state.v.empty() && std::fabs(state.q[k]) > 1e10 * std::fabs(step * state.v[k]);
+        });
+    };
+    for (std::size_t k = 0; k < states.front().q.size(); ++k) {
+        if (!may_be(k)) continue;
+        cln::cl_R second = 0, third = 0;
+        for (const State& state : states) {
+            std::vector<double> q = state.q;
+            std::vector<cln::cl_R> H;
+            for (int j = 0; j < 8; ++j, q[k] = std::nextafter(q[k], HUGE_VAL))
+                if (const auto here = energy.at(q, state.v)) H.push_back(here->value);
+            for (std::size_t j = 3; j < H.size(); ++j) {
+                const cln::cl_R bend = H[j] - 2 * H[j - 1] + H[j - 2], before = H[j - 1] - 2 * H[j - 2] + H[j - 3];
+                second = second + square(bend);
+                third = third + square(bend - before);
+            }
+        }
+        if (third > cln::rational(cln::cl_R(coarse * coarse)) * second) return true;
+    }
+    return false;
+}
+
+// What rounding in so many steps, a random walk of each position, does to the energy; of the velocity as much again.
+cln::cl_R rounding_of(ExactEnergy& energy, const State& state, double steps) {
+    cln::cl_R change = 0;
+    const auto here = energy.at(state.q, state.v);
+    for (std::size_t k = 0; here && k < state.q.size(); ++k)
+        for (const double sign : {-1.0, 1.0}) {
+            std::vector<double> q = state.q;
+            q[k] += sign * walk * std::sqrt(1 + steps) * a_rounding * std::fabs(q[k]);
+            if (const auto there = energy.at(q, state.v)) change = change + cln::abs(there->value - here->value);
+        }
+    return change;
+}
+
+std::string why(double step, bool too_coarse) {
+    if (too_coarse)
+        return "Positions are so large that the potential changes its shape from one number to the next. Try to "
+               "measure positions from a place nearer to the motion.";
+    return fmt::format(
+        "The step is too long for the method to be stable or for the forces met there, or it has gone past a "
+        "singularity of the potential. Try a smaller step, such as h = {:.6g}, an earlier end, or start elsewhere.",
+        step / 2);
+}
+
+// Mixed, so that states whose mixed numbers are multiples of something are at no equal distances: those of a motion
+// whose period they met would all be at one place, perhaps at rest.
+std::int64_t mixed_number(std::int64_t number) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(number) * 0x9e3779b97f4a7c15 >> 33);
+}
+
+}  // namespace
+
+bool EnergyWatch::can_watch(const Outline& derivation) {
+    return !derivation.scene.clock && derivation.scene.switches.empty() && derivation.conserves_energy() &&
+           derivation.system.q.size() <= ExactEnergy::most_coordinates;
+}
+
+EnergyWatch::EnergyWatch(const Outline& derivation, const Kernel& kernel)
+    : watches_(kernel->has_energy != 0 && can_watch(derivation)),
+      columns_(1 + 2 * derivation.system.q.size()),
+      rows_a_step_(1 + derivation.scene.outputs.dense) {}
+
+void EnergyWatch::observe(const Records& records) {
+    if (!watches_) return;
+    for (std::int64_t i = 0; i < records.count; ++i) {
+        if (seen_++ % rows_a_step_ != 0) continue;
+        const double* const row = records.rows + static_cast<std::size_t>(i) * columns_;
+        if (leaving_.empty()) energy_start_ = records.energy[i];
+        const double error = std::fabs(records.energy[i] - energy_start_);
+        const bool first_lost = std::isnan(error) && !lost_;
+        if (leaving_.empty() || error > 2 * energy_error_ || first_lost) {
+            leaving_.emplace_back(row, row + columns_);
+            if (first_lost)
+                lost_ = true;
+            else
+                energy_error_ = error;
+        }
+        const std::int64_t number = (seen_ - 1) / rows_a_step_;
+        if (mixed_number(number) % stride_ != 0 || some_.size() >= 2 * most_states) continue;
+        some_.emplace_back(row, row + columns_);
+        numbers_.push_back(number);
+        while (some_.size() >= 2 * most_states && stride_ < longest_stride) {
+            stride_ *= 2;
+            std::size_t kept = 0;  // about half of them; the start always
+            for (std::size_t j = 0; j < some_.size(); ++j)
+                if (mixed_number(numbers_[j]) % stride_ == 0) {
+                    some_[kept] = some_[j];
+                    numbers_[kept++] = numbers_[j];
+                }
+            some_.resize(kept);
+            numbers_.resize(kept);
+        }
+    }
+}
+
+std::vector<double> EnergyWatch::save() const {
+    std::vector<double> all{static_cast<double>(seen_),
+                            static_cast<double>(stride_),
+                            energy_start_,
+                            energy_error_,
+                            static_cast<double>(lost_),
+                            static_cast<double>(leaving_.size()),
+                            static_cast<double>(numbers_.size())};
+    all.insert(all.end(), numbers_.begin(), numbers_.end());
+    for (const States& states : {leaving_, some_})
+        for (const std::vector<double>& row : states) all.insert(all.end(), row.begin(), row.end());
+    return all;
+}
+
+void EnergyWatch::restore(const std::vector<double>& saved) {
+    auto at = saved.begin();
+    seen_ = std::llround(*at++);
+    stride_ = std::llround(*at++);
+    energy_start_ = *at++;
+    energy_error_ = *at++;
+    lost_ = *at++ != 0;
+    const auto leaving = static_cast<std::size_t>(std::llround(*at++));
+    numbers_.resize(static_cast<std::size_t>(std::llround(*at++)));
+    for (std::int64_t& number : numbers_) number = std::llround(*at++);
+    for (; at < saved.end(); at += static_cast<std::ptrdiff_t>(columns_))
+        (leaving_.size() < leaving ? leaving_ : some_).emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
+}
+
+// In 60 digits: of small motions the energy in double is rounding.
+std::string EnergyWatch::departure(const Outline& derivation, const Kernel& kernel,
+                                   const TrajectoryRequest& request) const {
+    LoadedStepper<double> stepper(kernel);
+    if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return "";
+    ExactEnergy energy(derivation, request.parameters);
+    const auto energy_of = [&](const State& state) {
+        return state.v.empty() ? std::nullopt : energy.at(state.q, state.v);
+    };
+    const auto kinetic_of = [&](const State& state) {
+        const auto here = energy_of(state);
+        return here && here->moving ? std::min(std::fabs(cln::double_approx(*here->moving)), most_energy) : 0;
+    };
+    std::vector<State> some;
+    std::vector<double> kinetic;
+    for (const std::vector<double>& row : some_) {
+        some.push_back(state_of(stepper, row));
+        kinetic.push_back(kinetic_of(some.back()));
+    }
+    // The start is no moment like others: it counts where there is nothing else.
+    const auto mean_until = [&](double time) -> std::optional<double> {
+        double sum = 0;
+        int states = 0;
+        for (std::size_t i = 1; i < some.size(); ++i)
+            if (kinetic[i] > 0 && std::fabs(some[i].time - request.time) <= std::fabs(time - request.time))
+                sum += kinetic[i], ++states;
+        return states >= fewest_states ? std::optional(sum / states) : std::nullopt;
+    };
+    const auto start = energy_of(state_of(stepper, leaving_.front()));
+    const double mean = mean_until(HUGE_VAL).value_or(*std::max_element(kinetic.begin(), kinetic.end()));
+    if (!start || !(mean > 0)) return "";
+    const bool too_coarse = is_too_coarse(energy, some, request.step);
+    struct Departure {
+        State state;
+        std::optional<cln::cl_R> error;  // none: the energy is not real
+    };
+    const auto first_beyond = [&](const auto& scale_of) -> std::optional<Departure> {
+        for (const std::vector<double>& row : leaving_) {
+            const State state = state_of(stepper, row);
+            if (state.v.empty()) continue;  // nothing can be told
+            const auto here = energy_of(state);
+            if (!here) return Departure{state, std::nullopt};
+            const cln::cl_R error = cln::abs(here->value - start->value);
+            if (error < cln::cl_R(departed * scale_of(state))) continue;
+            const double steps = std::fabs((state.time - request.time) / request.step);
+            if (!too_coarse &&
+                error <= cln::max(cln::rational(cln::cl_R(a_rounding)) * here->size, rounding_of(energy, state, steps)))
+                continue;
+            return Departure{state, error};
+        }
+        return std::nullopt;
+    };
+    if (!first_beyond([&](const State&) { return mean; })) return "";
+    // The mean of all may come from what is wrong; when that began is told by the mean until then.
+    const auto scale_at = [&](const State& state) {
+        const auto until_then = mean_until(state.time);
+        return until_then ? std::min(mean, std::max(*until_then, kinetic_of(state))) : mean;
+    };
+    const auto [state, error] = *first_beyond(scale_at);
+    return fmt::format(
+        "the run is wrong {}from step {} on, at t = {:.6g}, q = {}, p = {}: the energy, which the motion conserves, "
+        "{}. {}",
+        request.every > 1 ? "at the latest " : "", std::llround((state.time - request.time) / request.step), state.time,
+        list_text(state.q), list_text(state.p),
+        error ? fmt::format("is off there by {:.2g} of the mean kinetic energy{}",
+                            cln::double_approx(*error) / scale_at(state), scale_at(state) < mean ? " until then" : "")
+              : "is no real number there",
+        why(request.step, too_coarse));
+}
+
+}  // namespace lobatto

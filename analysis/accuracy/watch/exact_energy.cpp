@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/watch/exact_energy.hpp"
+
+namespace lobatto {
+
+ExactEnergy::ExactEnergy(const Outline& derivation, const std::vector<double>& parameters)
+    : system_(derivation.system) {
+    for (std::size_t i = 0; i < parameters.size(); ++i)
+        formulas_.set(system_.parameters[i], float_of(GiNaC::numeric(parameters[i])));
+    GiNaC::ex energy = -system_.lagrangian;
+    for (std::size_t k = 0; k < system_.q.size(); ++k) {
+        energy += system_.v[k] * system_.momentum[k];
+        for (const GiNaC::symbol& symbol : {system_.q[k], system_.v[k]}) formulas_.set(symbol, 0);
+    }
+    energy_ = formulas_.convert({energy});
+}
+
+std::optional<ExactEnergy::Energy> ExactEnergy::at(const std::vector<double>& q, const std::vector<double>& velocity) {
+    const auto energy_with = [&](bool moving) -> std::optional<Sized> {
+        for (std::size_t k = 0; k < q.size(); ++k) {
+            formulas_.set(system_.q[k], float_of(GiNaC::numeric(q[k])));
+            formulas_.set(system_.v[k], float_of(GiNaC::numeric(moving ? velocity[k] : 0.0)));
+        }
+        try {
+            return formulas_.evaluate_sized(energy_).front();
+        } catch (const DomainError&) {
+            return std::nullopt;
+        }
+    };
+    const auto whole = energy_with(true), resting = energy_with(false);
+    if (!whole) return std::nullopt;
+    Energy energy{whole->value, std::nullopt, whole->size};
+    if (resting) energy.moving = whole->value - resting->value;
+    return energy;
+}
+
+}  // namespace lobatto

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The energy of a state in 60 digits: what of an energy error is the motion's, and what is the rounding of H.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/outline.hpp"
+
+namespace lobatto {
+
+class ExactEnergy {
+public:
+    // Of a system whose formulas hold no time; parameters in the order of the scene.
+    ExactEnergy(const Outline& derivation, const std::vector<double>& parameters);
+
+    // H = q'.dL/dq' - L at positions and velocities, n each.
+    struct Energy {
+        cln::cl_R value;
+        std::optional<cln::cl_R> moving;  // H(q, q') - H(q, 0), the kinetic energy; none where rest is impossible
+        cln::cl_R size;  // what the rounding of H is measured against (generator/mechanics/algebra/sample.hpp)
+    };
+    // None where H is no real number.
+    std::optional<Energy> at(const std::vector<double>& q, const std::vector<double>& velocity);
+
+    static constexpr std::size_t most_coordinates = 64;
+
+private:
+    const SystemOutline& system_;
+    Formulas formulas_;
+    std::vector<Id> energy_;
+};
+
+}  // namespace lobatto

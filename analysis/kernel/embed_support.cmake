@@ -1,0 +1,27 @@
+# Writes the texts of the kernel support headers into one C++ file, so that the program needs no source tree to compile kernels.
+# The parts of kernel.hpp stand in an order in which each follows those that it includes.
+set(parts base/numbers.hpp base/many_digits.hpp base/pack.hpp base/functions.hpp base/trigonometry.hpp base/exponential.hpp base/arc.hpp base/spline.hpp base/double_double.hpp base/double_double_functions.hpp base/angles.hpp base/full_matrix.hpp base/contract.hpp base/solve.hpp base/shifts.hpp base/rows.hpp
+    iteration/tangent.hpp iteration/convergence.hpp iteration/stage_coefficients.hpp iteration/stage_equations.hpp iteration/newton.hpp iteration/stage_map.hpp iteration/fixed_point.hpp iteration/refinement.hpp
+    iteration/neighbours.hpp iteration/constrained_fixed_point.hpp iteration/galerkin.hpp iteration/galerkin_equations.hpp iteration/galerkin_newton.hpp iteration/velocity_of_momentum.hpp iteration/ensemble_fixed_point.hpp steppers/linear.hpp steppers/separable.hpp
+    steppers/clean.hpp steppers/splitting.hpp steppers/general.hpp steppers/clocked.hpp steppers/ensemble.hpp steppers/events.hpp steppers/impacts.hpp steppers/lent_steps.hpp steppers/refilled.hpp steppers/inputs.hpp)
+
+# The text of a file of runtime/kernel/ as a C++ literal, for which every compiler has 65,536 characters.
+function(literal name result)
+    file(READ ${SOURCE_DIR}/runtime/kernel/${name} content)
+    string(LENGTH "${content}" length)
+    if(length GREATER 65000)
+        message(FATAL_ERROR "runtime/kernel/${name} is too long for one string literal")
+    endif()
+    set(${result} "R\"~~~(${content})~~~\"" PARENT_SCOPE)
+endfunction()
+
+set(text "// Written by embed_support.cmake. The texts of the parts of runtime/kernel/kernel.hpp, of abi.h and export.hpp.\n")
+string(APPEND text "#include \"analysis/kernel/support_text.hpp\"\n\nnamespace lobatto {\n\nconst std::vector<SupportPart> support_parts = {\n")
+foreach(name ${parts})
+    literal(${name} quoted)
+    string(APPEND text "    {\"${name}\", ${quoted}},\n")
+endforeach()
+literal(abi.h kernel_abi_h)
+literal(export.hpp kernel_export_hpp)
+string(APPEND text "};\n\nconst std::string_view kernel_abi_h_text = ${kernel_abi_h};\n\nconst std::string_view kernel_export_hpp_text = ${kernel_export_hpp};\n\n}  // namespace lobatto\n")
+file(WRITE ${OUTPUT} "${text}")

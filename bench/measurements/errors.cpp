@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// How well the error that `lobatto run` measures follows the true one, over the scenes, members and steps
+// (docs/errors.md).
+//
+//   bench_errors FILE.csv SCENE...
+//   bench_errors --page FILE.csv docs
+//
+// A scene's rows are appended to FILE.csv when all are known; scenes that are there are not measured again.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <sstream>
+
+#include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/tradeoff/experiment.hpp"
+#include "cli/print/drawing.hpp"
+#include "generator/pipeline.hpp"
+#include "runtime/error.hpp"
+#include "runtime/files/partial_file.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+constexpr double seconds_a_scene = 60;  // of which the reference takes a part
+constexpr double longest_run = 0.4;     // seconds
+constexpr double least = 1e-13;         // smaller errors are the rounding of the states themselves
+constexpr double gone = 0.1;            // of the amplitude: what is to be told is that, no longer how much
+constexpr double fewest_radians = 4;    // h omega of the coarsest steps
+constexpr double ratio_of_steps = 1.35;
+constexpr double parts[] = {0.05, 0.5, 0.95, 1};
+
+std::vector<Member> members(bool is_separable) {
+    std::vector<Member> list;
+    for (const int points : {2, 3, 4, 6, 8, 10, 12}) list.push_back({Family::lobatto, points});
+    for (const int stages : {1, 2, 4, 6, 8, 10}) list.push_back({Family::gauss, stages});
+    for (const int stages : sizes_of(Family::splitting))
+        if (is_separable) list.push_back({Family::splitting, stages});
+    return list;
+}
+
+bool has(const std::string& file, const std::string& scene) {
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);)
+        if (line.starts_with(scene + ',')) return true;
+    return false;
+}
+
+// A run to the end, and the errors of its positions there.
+struct Row {
+    Member member;
+    std::int64_t steps = 0;
+    double true_error = 0;   // of the position that is worst, relative to its amplitude; not a number: it stopped
+    double printed = 0;      // likewise, as the companion finds it
+    bool is_told = false;    // that nothing is left
+    bool is_warned = false;  // that the error is large
+};
+
+// Where the true motion ends: positions, and the amplitude of each.
+struct End {
+    std::vector<double> high, low, scale;
+};
+
+End end_of(const Reference& reference) {
+    const auto last = static_cast<std::ptrdiff_t>(reference.samples) * 2 * static_cast<std::ptrdiff_t>(reference.n);
+    const auto of = [&](const std::vector<double>& rows, std::ptrdiff_t first) {
+        return std::vector<double>(rows.begin() + first, rows.begin() + first + std::ssize(reference.scale) / 2);
+    };
+    return {of(reference.high, last), of(reference.low, last), of(reference.scale, 0)};
+}
+
+Row row_of(const Experiment& experiment, const Kernel& kernel, const ExactStart& exact, const Member& member,
+           std::int64_t steps, const End& end, double& seconds) {
+    TrajectoryRequest request;
+    request.step = experiment.until() / static_cast<double>(steps);
+    request.steps = steps;
+    const StartIn<double> start = start_in<double>(exact, kernel, request.step);
+    request.parameters = start.parameters;
+    request.q = start.q;
+    request.p = start.p;
+    Derivation derivation = experiment.derivation();
+    derivation.scene = experiment.scene();
+    derivation.scene.method = member.method();
+    Companion companion(derivation, kernel, request);
+    request.sink = [&](const Records& records) { companion.observe(records); };
+    companion.start();
+    const TrajectoryResult result = integrate(kernel, request);
+    const std::optional<MeasuredError> measured = companion.finish(result);
+    seconds = result.seconds;
+    Row row{member,
+            steps,
+            std::nan(""),
+            measured ? measured->at_end : 0,
+            measured && measured->is_lost(),
+            measured && measured->worst() > large_error};
+    if (result.status != LOBATTO_OK) return row;
+    row.true_error = 0;
+    for (std::size_t i = 0; i < end.high.size(); ++i)
+        row.true_error = std::fmax(row.true_error, std::fabs((result.q[i] - end.high[i]) - end.low[i]) / end.scale[i]);
+    return row;
+}
+
+void measure(const std::string& path, const std::string& file) {
+    const Scene scene = read_scene(path);
+    if (has(file, scene.name) || !scene.constraints.empty()) return;  // there is no reference with constraints
+    ExperimentRequest wish;
+    wish.seconds = seconds_a_scene;
+    wish.wanted = 1e-15;
+    const Derivation derivation = derive(scene);
+    const std::vector<Member> list = members(derivation.system.separable);
+    wish.first = list;
+    wish.tries_clocks = false;
+    Experiment experiment(scene, scene, wish);
+    const Reference& reference = experiment.reference();
+    const ExactStart start(scene);
+    const End end = end_of(reference);
+    const double uncertainty = reference.disagreement.back();
+    std::string rows;
+    int count = 0;
+    for (const Member& member : list) {
+        const Kernel kernel = experiment.kernel_builder().kernel(member);
+        double best = std::numeric_limits<double>::infinity();
+        int no_better = 0;
+        const double coarsest = reference.until * reference.frequency / fewest_radians;
+        for (double steps = std::max(1.0, coarsest); steps < 1e6; steps = std::ceil(steps * ratio_of_steps)) {
+            double seconds = 0;
+            const Row row = row_of(experiment, kernel, start, member, std::llround(steps), end, seconds);
+            const bool ended = std::isfinite(row.true_error);
+            no_better = ended && row.true_error < 0.7 * best ? 0 : no_better + 1;
+            if (ended) best = std::min(best, row.true_error);
+            if (ended && row.true_error > 100 * uncertainty) {
+                rows +=
+                    fmt::format("{},{},{},{},{:.4g},{:.4g},{},{}\n", scene.name, word_of(member.family), member.points,
+                                row.steps, row.true_error, row.printed, row.is_told ? 1 : 0, row.is_warned ? 1 : 0);
+                ++count;
+            }
+            if (seconds > longest_run || (no_better >= 4 && best < 1e-6)) break;
+        }
+    }
+    if (count == 0) rows = scene.name + ",,,,,,,\n";  // nobody knows this motion to its end
+    std::ofstream(file, std::ios::app) << rows << std::flush;
+    fmt::print(stderr, "{}: {} runs in {:.0f} s\n", scene.name, count, experiment.elapsed());
+}
+
+std::map<std::string, std::vector<Row>> read(const std::string& path) {
+    std::map<std::string, std::vector<Row>> result;
+    std::ifstream in(path);
+    for (std::string line; std::getline(in, line);) {
+        std::vector<std::string> cells;
+        std::istringstream text(line);
+        for (std::string cell; std::getline(text, cell, ',');) cells.push_back(cell);
+        if (cells.empty()) continue;
+        std::vector<Row>& list = result[cells[0]];
+        if (cells.size() < 8) continue;
+        list.push_back({{family_of(cells[1]), std::atoi(cells[2].c_str())},
+                        std::atoll(cells[3].c_str()),
+                        std::strtod(cells[4].c_str(), nullptr),
+                        std::strtod(cells[5].c_str(), nullptr),
+                        cells[6] == "1",
+                        cells[7] == "1"});
+    }
+    return result;
+}
+
+// What is counted of some runs.
+struct Tally {
+    std::vector<double> ratios;  // true over printed, where nothing was told and errors are of interest
+    int lost = 0, told = 0;      // runs whose end is elsewhere, and those of them that were told
+    int missed = 0;              // errors 10 times as large as printed, and more, without a word
+
+    void add(const Row& row) {
+        const bool is_lost = row.true_error > gone;
+        lost += is_lost ? 1 : 0;
+        told += is_lost && (row.is_told || row.is_warned) ? 1 : 0;
+        if (row.is_told || row.true_error < least) return;
+        const double ratio = row.true_error / std::fmax(row.printed, 1e-16);
+        if (ratio > 10 && !row.is_warned) ++missed;
+        if (!is_lost) ratios.push_back(ratio);
+    }
+    double share(double from, double to) const {
+        const auto count = std::count_if(ratios.begin(), ratios.end(), [&](double x) { return x >= from && x <= to; });
+        return 100.0 * static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(1, ratios.size()));
+    }
+};
+
+std::string table_row(const std::string& name, Tally tally) {
+    std::sort(tally.ratios.begin(), tally.ratios.end());
+    std::string text = fmt::format("| {} | {} |", name, tally.ratios.size());
+    for (const double part : parts)
+        text += tally.ratios.empty()
+                    ? " – |"
+                    : fmt::format(" {:.2g} |", tally.ratios[static_cast<std::size_t>(
+                                                   std::lround(part * static_cast<double>(tally.ratios.size() - 1)))]);
+    return text + fmt::format(" {} | {} | {} |\n", tally.lost, tally.told, tally.missed);
+}
+
+constexpr const char* header =
+    "| runs | 5 % | 50 % | 95 % | largest | lost | of these told | missed |\n"
+    "|---|---|---|---|---|---|---|---|---|\n";
+
+std::string tables_of(const std::map<std::string, std::vector<Row>>& scenes) {
+    std::string by_scene, by_member, unknown;
+    Tally all;
+    std::map<Member, Tally> of_member;
+    for (const auto& [scene, list] : scenes) {
+        if (list.empty()) {
+            unknown += (unknown.empty() ? "`" : ", `") + scene + "`";
+            continue;
+        }
+        Tally tally;
+        for (const Row& row : list) {
+            tally.add(row);
+            all.add(row);
+            of_member[row.member].add(row);
+        }
+        by_scene += table_row(fmt::format("`{}`", scene), tally);
+    }
+    for (const auto& [member, tally] : of_member) by_member += table_row(Candidate{member, 0, 0}.name(), tally);
+    return fmt::format(
+        "| scene {0}{1}{2}\n| member {0}{3}\nThe true error is within a factor of 2 of the printed one in {4:.1f} % of "
+        "{5} runs, of 10 in {6:.2f} %.\n{7}",
+        header, by_scene, table_row("all", all), by_member, all.share(0.5, 2), all.ratios.size(), all.share(0.1, 10),
+        unknown.empty() ? "" : "\nNot here, because nobody knows the motion to its end: " + unknown + ".\n");
+}
+
+// How often which ratio: in per cent of the runs, in bins of a tenth of a decade.
+void draw_ratios(const std::map<std::string, std::vector<Row>>& scenes, const std::string& docs) {
+    Tally all;
+    for (const auto& [scene, list] : scenes)
+        for (const Row& row : list) all.add(row);
+    std::string text;
+    for (int bin = -15; bin <= 15; ++bin) {
+        const auto count = std::count_if(all.ratios.begin(), all.ratios.end(),
+                                         [&](double x) { return std::lround(10 * std::log10(x)) == bin; });
+        text += fmt::format("{:.4g},{:.4g}\n", bin / 10.0,
+                            100 * static_cast<double>(count) / static_cast<double>(all.ratios.size()));
+    }
+    draw(docs + "/choosing", "errors",
+         fmt::format("$run << END\n{}END\nset format x \"10^{{%g}}\"\nset xrange [-1.5:1.5]\nunset key\n"
+                     "set xlabel \"true error / printed error\"\nset ylabel \"runs, per cent in a tenth of a decade\"\n"
+                     "plot $run using 1:2 with histeps ls 1\n",
+                     text),
+         760, 400);
+}
+
+// What the page says of the measurements stands between two marks; the rest is written by hand.
+void write_page(const std::map<std::string, std::vector<Row>>& scenes, const std::string& docs) {
+    const std::string path = docs + "/errors.md", begin = "<!-- measured -->\n", end = "<!-- end -->";
+    std::ostringstream text;
+    text << std::ifstream(path).rdbuf();
+    std::string page = text.str();
+    const std::size_t from = page.find(begin), to = page.find(end);
+    if (from == std::string::npos || to == std::string::npos) throw InputError(path + ": the marks are missing");
+    page.replace(from + begin.size(), to - from - begin.size(), tables_of(scenes));
+    write_whole(path, "the page", page);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const std::vector<std::string> words(argv + 1, argv + argc);
+    try {
+        if (words.size() == 3 && words[0] == "--page") {
+            const auto scenes = read(words[1]);
+            draw_ratios(scenes, words[2]);
+            write_page(scenes, words[2]);
+            return 0;
+        }
+        if (words.size() < 2) {
+            fmt::print(stderr, "bench_errors FILE.csv SCENE...\nbench_errors --page FILE.csv docs\n");
+            return 2;
+        }
+        for (std::size_t i = 1; i < words.size(); ++i) {
+            try {
+                measure(words[i], words[0]);
+            } catch (const ComputationError& error) {
+                fmt::print(stderr, "{}: {}\n", words[i], error.what());
+            }
+        }
+        return 0;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "{}\n", error.what());
+        return 4;
+    }
+}

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "generator/mechanics/constraints/constrained_start.hpp"
+
+#include <fmt/format.h>
+
+#include "generator/formula/real.hpp"
+#include "generator/graph/notation.hpp"
+
+namespace lobatto {
+
+namespace {
+
+cln::cl_R power_of_ten(int exponent) {
+    return cln::expt(cln::cl_RA(10), exponent);
+}
+
+}  // namespace
+
+ConstrainedStart::ConstrainedStart(const Scene& scene, const System& system, Formulas& start,
+                                   const MassEquations& equations)
+    : scene_(scene), system_(system), start_(start), equations_(equations) {
+    std::vector<GiNaC::ex> momentum = system.momentum, rates = system.constraint_t, values;
+    for (const Constraint& constraint : system.constraints) {
+        mu_.emplace_back("mu_" + constraint.name);
+        start.set(mu_.back(), cln::cl_R(0));
+        values.push_back(constraint.value);
+    }
+    for (const auto& [place, slope] : system.constraint_q.entries()) {
+        const auto c = static_cast<std::size_t>(place.first), k = static_cast<std::size_t>(place.second);
+        momentum[k] += slope * mu_[c];
+        rates[c] += slope * system.v[k];
+    }
+    momentum_ = start.convert(momentum);
+    rates_ = start.convert(rates);
+    constraints_ = start.convert(values);
+}
+
+void ConstrainedStart::keep_positions() {
+    const std::optional<std::size_t> off = furthest(constraints_);
+    const std::string what =
+        off ? "its left side minus its right side is " + value_text(constraints_, *off) : std::string();
+    const Numbers given = values_of(system_.q);
+    move_positions(given);
+    if (off && !scene_.run.assemble) refuse(*off, what, moved_text(system_.q, given));
+}
+
+// Newton's iteration M (q - q0) + G^T mu = 0, phi(q) = 0, its steps halved while phi would grow.
+void ConstrainedStart::move_positions(const Numbers& given) {
+    const cln::cl_R small = power_of_ten(-working_digits() / 2);
+    Numbers q = given;
+    for (int iteration = 0; iteration < 100; ++iteration) {
+        Numbers away;
+        for (std::size_t k = 0; k < q.size(); ++k) away.push_back(q[k] - given[k]);
+        Numbers right = equations_.mass_times(away);
+        for (const cln::cl_R& phi : start_.evaluate(constraints_)) right.push_back(phi);
+        const Elimination step = equations_.eliminate(right);
+        if (step.singular) break;
+        const std::optional<cln::cl_R> before = square();
+        cln::cl_RA fraction = 1;
+        for (int halvings = 0; halvings < 60; ++halvings, fraction = fraction / 2) {
+            for (std::size_t k = 0; k < q.size(); ++k) start_.set(system_.q[k], q[k] - fraction * step.vector[k]);
+            const std::optional<cln::cl_R> now = square();
+            if (now && *now <= *before) break;
+        }
+        const Numbers moved = values_of(system_.q);
+        cln::cl_R change = 0, size = 0;
+        for (std::size_t k = 0; k < q.size(); ++k) {
+            change = cln::max(change, cln::abs(moved[k] - q[k]));
+            size = cln::max(size, cln::abs(moved[k]));
+        }
+        q = moved;
+        const bool stands = change <= size * small;
+        if (stands && !furthest(constraints_)) return;
+        if (stands && iteration > 0) break;
+    }
+    if (const std::optional<std::size_t> off = furthest(constraints_)) refuse_unreachable(*off);
+}
+
+// M (v - v0) + G^T mu = 0, G v + dphi/dt = 0; the second look takes the rounding of the first away.
+void ConstrainedStart::keep_velocities() {
+    const bool by_momentum = scene_.start == Start::momentum;
+    const std::optional<std::size_t> off = by_momentum ? pulled() : furthest(rates_);
+    const std::string what = !off          ? ""
+                             : by_momentum ? "its momenta are those of no velocity that keeps it"
+                                           : "its velocities change its left side minus its right side at the rate " +
+                                                 value_text(rates_, *off);
+    const Numbers given = values_of(system_.v);
+    for (int look = 0; look < 2; ++look) {
+        Numbers right(system_.q.size(), cln::cl_R(0));
+        for (const cln::cl_R& rate : start_.evaluate(rates_)) right.push_back(rate);
+        const Elimination step = equations_.eliminate(right);
+        for (std::size_t k = 0; k < system_.v.size(); ++k)
+            start_.set(system_.v[k], start_.get(system_.v[k]) - step.vector[k]);
+    }
+    if (!off || scene_.run.assemble) return;
+    refuse(*off, what,
+           by_momentum ? "the velocities " + moved_text(system_.v, Numbers(given.size(), cln::cl_R(0)))
+                       : moved_text(system_.v, given));
+}
+
+// The constraint, or its rate, that is furthest from 0, beyond the rounding of a double.
+std::optional<std::size_t> ConstrainedStart::furthest(const std::vector<Id>& of) const {
+    const std::vector<Sized> values = start_.evaluate_sized(of);
+    const cln::cl_R rounding = power_of_ten(-14);
+    std::optional<std::size_t> worst;
+    for (std::size_t c = 0; c < values.size(); ++c)
+        if (cln::abs(values[c].value) > values[c].size * rounding &&
+            (!worst || cln::abs(values[c].value) > cln::abs(values[*worst].value)))
+            worst = c;
+    return worst;
+}
+
+// The constraint whose multiplier takes most away from the momenta that are given, beyond the rounding of a double.
+std::optional<std::size_t> ConstrainedStart::pulled() const {
+    cln::cl_R size = 0;
+    for (const cln::cl_R& p : start_.evaluate(momentum_)) size = cln::max(size, cln::abs(p));
+    std::optional<std::size_t> most;
+    for (std::size_t c = 0; c < mu_.size(); ++c)
+        if (cln::abs(start_.get(mu_[c])) > size * power_of_ten(-14) &&
+            (!most || cln::abs(start_.get(mu_[c])) > cln::abs(start_.get(mu_[*most]))))
+            most = c;
+    return most;
+}
+
+// The sum of the squares of the constraints; nothing where one has no value.
+std::optional<cln::cl_R> ConstrainedStart::square() const {
+    try {
+        cln::cl_R sum = 0;
+        for (const cln::cl_R& phi : start_.evaluate(constraints_)) sum = sum + cln::square(phi);
+        return sum;
+    } catch (const DomainError&) {
+        return std::nullopt;
+    }
+}
+
+ConstrainedStart::Numbers ConstrainedStart::values_of(const std::vector<GiNaC::symbol>& symbols) const {
+    Numbers values;
+    for (const auto& symbol : symbols) values.push_back(start_.get(symbol));
+    return values;
+}
+
+std::string ConstrainedStart::value_text(const std::vector<Id>& of, std::size_t constraint) const {
+    return decimal(start_.evaluate(of)[constraint], 6);
+}
+
+// "x = 0.6, y = 0.8": of those that have moved.
+std::string ConstrainedStart::moved_text(const std::vector<GiNaC::symbol>& symbols, const Numbers& before) const {
+    std::string text;
+    int shown = 0;
+    for (std::size_t k = 0; k < symbols.size(); ++k) {
+        const cln::cl_R value = start_.get(symbols[k]);
+        if (cln::abs(value - before[k]) <= cln::abs(value) * power_of_ten(-30)) continue;
+        if (++shown > 8) return text + ", ...";
+        text += fmt::format("{}{} = {}", shown == 1 ? "" : ", ", symbols[k].get_name(), decimal(value, 17));
+    }
+    return text;
+}
+
+void ConstrainedStart::refuse(std::size_t constraint, const std::string& what, const std::string& nearest) const {
+    const Constraint& of = system_.constraints[constraint];
+    scene_.source.fail(of.at, fmt::format("the start does not keep the constraint {} ({}): {}; the nearest start that "
+                                          "keeps all constraints has {}: write that, or add assemble = true to [run]",
+                                          of.written, of.text, what, nearest));
+}
+
+void ConstrainedStart::refuse_unreachable(std::size_t constraint) const {
+    const Constraint& of = system_.constraints[constraint];
+    scene_.source.fail(
+        of.at, fmt::format("no positions near the start keep the constraints: {} ({}) stays off by {}. If they form a "
+                           "loop, it cannot close: change the lengths, or start nearer",
+                           of.written, of.text, value_text(constraints_, constraint)));
+}
+
+}  // namespace lobatto

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "generator/mechanics/constraints/impacts.hpp"
+
+#include <fmt/format.h>
+
+namespace lobatto {
+
+void check_impacts(const Scene& scene, const System& system) {
+    GiNaC::exmap start;
+    for (std::size_t k = 0; k < system.q.size(); ++k) start[system.q[k]] = scene.initial_position[k];
+    start[system.t] = 0;
+    for (const Impact& impact : scene.impacts) {
+        for (const auto& [place, mass] : system.momentum_v.entries())
+            for (const GiNaC::symbol& v : system.v)
+                if (impact.reset_position.empty() && mass.has(v))
+                    scene.source.fail(impact.when.at,
+                                      fmt::format("the wall {0} throws back velocities of a kinetic energy that is "
+                                                  "quadratic in them, and this one is not; give a reset, such as "
+                                                  "reset = {{ \"{1}'\" = \"-{1}'\" }}",
+                                                  impact.written, scene.coordinates.front().written));
+        const double value = scene.evaluate(impact.when.value.subs(start), "the wall " + impact.written).to_double();
+        if (value * impact.when.direction > 0)
+            scene.source.fail(impact.when.at,
+                              fmt::format("the start is behind the wall {}: the left side minus the right is {:.6g}, "
+                                          "and a wall met {} asks for one {} 0",
+                                          impact.written, value, impact.when.direction < 0 ? "falling" : "rising",
+                                          impact.when.direction < 0 ? "of at least" : "of at most"));
+    }
+}
+
+void refuse_impacts(const Scene& scene, const std::string& what) {
+    if (!scene.impacts.empty())
+        scene.source.fail(scene.impacts.front().when.at,
+                          what + " knows no impacts; run, sweep, emit, derive, check and verify do");
+    if (!scene.switches.empty() || !scene.tables.empty())
+        scene.source.fail(
+            scene.switches.empty() ? scene.tables.front().at : scene.switches.front().at,
+            what + " knows smooth formulas only; run, sweep, emit, derive, check and verify know such as this");
+}
+
+void refuse_jumps(const Scene& scene, const std::string& what) {
+    for (const Impact& impact : scene.impacts)
+        for (std::size_t k = 0; k < impact.reset_position.size(); ++k)
+            if (!impact.reset_position[k].is_equal(scene.coordinates[k].position))
+                scene.source.fail(impact.when.at,
+                                  fmt::format("{} compares positions along the motion, and the wall {} moves {}: just "
+                                              "before and just after they differ, however good the steps are",
+                                              what, impact.written, scene.coordinates[k].written));
+}
+
+}  // namespace lobatto

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "generator/mechanics/system/mass_equations.hpp"
+
+#include <fmt/format.h>
+
+namespace lobatto {
+
+MassEquations::MassEquations(const System& system, Formulas& formulas) : system_(system), formulas_(formulas) {
+    std::vector<GiNaC::ex> entries;
+    for (const auto& [place, value] : system.momentum_v.entries()) {
+        places_.push_back(place);
+        entries.push_back(value);
+    }
+    for (const auto& [place, value] : system.constraint_q.entries()) {
+        const int row = system.n + place.first;
+        places_.emplace_back(row, place.second);
+        places_.emplace_back(place.second, row);
+        entries.insert(entries.end(), 2, value);
+    }
+    values_ = formulas.convert(entries);
+}
+
+Elimination MassEquations::eliminate(std::vector<cln::cl_R> right) const {
+    right.resize(unknowns(), cln::cl_R(0));
+    const std::vector<Sized> values = formulas_.evaluate_sized(values_);
+    std::map<std::pair<int, int>, Sized> matrix;
+    for (std::size_t i = 0; i < places_.size(); ++i) matrix[places_[i]] = values[i];
+    return lobatto::eliminate(matrix, std::move(right));
+}
+
+std::vector<cln::cl_R> MassEquations::mass_times(const std::vector<cln::cl_R>& x) const {
+    const std::vector<cln::cl_R> values = formulas_.evaluate(values_);
+    std::vector<cln::cl_R> product(system_.q.size(), cln::cl_R(0));
+    for (std::size_t i = 0; i < system_.momentum_v.entries().size(); ++i) {
+        const auto row = static_cast<std::size_t>(places_[i].first),
+                   column = static_cast<std::size_t>(places_[i].second);
+        product[row] = product[row] + values[i] * x[column];
+    }
+    return product;
+}
+
+std::string MassEquations::dependent_constraints(const Elimination& singular) const {
+    const std::size_t n = system_.q.size();
+    const cln::cl_R tiny = cln::expt(cln::cl_RA(10), -30);
+    for (std::size_t k = 0; k < n; ++k)
+        if (cln::abs(singular.vector[k]) > tiny) return "";
+    std::string names;
+    int count = 0;
+    for (std::size_t c = 0; c < system_.constraints.size(); ++c) {
+        if (cln::abs(singular.vector[n + c]) <= tiny) continue;
+        if (++count <= 6) names += (count == 1 ? "" : ", ") + system_.constraints[c].written;
+    }
+    if (count == 1)
+        return fmt::format(
+            "the constraint {} has no slope: all its derivatives in the coordinates vanish there, as "
+            "those of x^2 = 0 do; write it so that it has one, as x = 0",
+            names);
+    return fmt::format(
+        "the constraints {}{} depend on one another: one of them follows from the others, or contradicts "
+        "them; remove it, or start away from a dead point",
+        names, count > 6 ? ", ..." : "");
+}
+
+}  // namespace lobatto

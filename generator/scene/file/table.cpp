@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Types and keys of the values in a table.
+#include "generator/scene/file/table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "generator/formula/suggest.hpp"
+
+namespace lobatto {
+
+Table::Table(const Source& source, const std::vector<Entry>& entries, Position at, std::string name,
+             const std::vector<Key>& keys, const std::vector<std::string>& allowed)
+    : source_(source), entries_(entries), keys_(keys), at_(at), name_(std::move(name)) {
+    const std::vector<std::string> known = allowed.empty() ? names_of(keys) : allowed;
+    for (const Entry& entry : entries_)
+        if (std::find(known.begin(), known.end(), entry.key) == known.end())
+            source_.fail(entry.at, fmt::format("unknown key '{}' in {}; known: {}.{}", entry.key.substr(0, 40), name_,
+                                               listing(known), suggestion(entry.key, known)));
+}
+
+const Entry* Table::find(const std::string& key) const {
+    const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key; });
+    return found == entries_.end() ? nullptr : &*found;
+}
+
+const Entry& Table::get(const std::string& key, const std::string& example) const {
+    if (const Entry* entry = find(key)) return *entry;
+    source_.fail(at_, fmt::format("{} has no {}: add {}", name_, key, example));
+}
+
+long long Table::whole(const Entry& entry, const std::string& range) const {
+    const auto key = std::find_if(keys_.begin(), keys_.end(), [&](const Key& one) { return one.name == entry.key; });
+    return integer_of(source_, entry, key->least, key->most, range);
+}
+
+namespace {
+
+[[noreturn]] void fail_type(const Source& source, const std::string& key, const Value& value,
+                            const std::string& expected) {
+    source.fail(value.at, fmt::format("{} must be {}, not {}", key, expected, value.kind_name()));
+}
+[[noreturn]] void fail_type(const Source& source, const Entry& entry, const std::string& expected) {
+    fail_type(source, entry.key, entry.value, expected);
+}
+
+}  // namespace
+
+const std::vector<Entry>& table_of(const Source& source, const Entry& entry, const std::string& example) {
+    if (entry.value.kind != Value::Kind::table) fail_type(source, entry, "a table such as " + example);
+    return entry.value.entries;
+}
+
+const Text& formula_of(const Source& source, const Entry& entry) {
+    return formula_of(source, entry.key, entry.value);
+}
+
+const Text& formula_of(const Source& source, const std::string& key, const Value& value) {
+    if (value.kind != Value::Kind::text && value.kind != Value::Kind::integer && value.kind != Value::Kind::real)
+        fail_type(source, key, value, "a number or a formula in quotes");
+    return value.text;
+}
+
+long long integer_of(const Source& source, const Entry& entry, long long least, long long most,
+                     const std::string& range) {
+    if (entry.value.kind != Value::Kind::integer) fail_type(source, entry, "a whole number");
+    if (entry.value.integer < least || entry.value.integer > most)
+        source.fail(entry.value.at, fmt::format("{} is {}; {}", entry.key, entry.value.integer, range));
+    return entry.value.integer;
+}
+
+bool boolean_of(const Source& source, const Entry& entry) {
+    if (entry.value.kind != Value::Kind::boolean) fail_type(source, entry, "true or false");
+    return entry.value.boolean;
+}
+
+std::string label_of(const Source& source, const Entry& entry, std::size_t longest) {
+    if (entry.value.kind != Value::Kind::text) fail_type(source, entry, "a text in quotes");
+    const std::string& text = entry.value.text.value;
+    if (text.size() > longest)
+        source.fail(entry.value.at, fmt::format("{} has {} bytes; at most {}", entry.key, text.size(), longest));
+    if (!is_printable(text) || text.find_first_of("\\\"") != std::string::npos)
+        source.fail(entry.value.at,
+                    fmt::format("{} must be one line without control characters, quotes and backslashes", entry.key));
+    return text;
+}
+
+}  // namespace lobatto

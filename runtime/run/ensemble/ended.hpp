@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// A trajectory of an ensemble on its way and when it has ended, and what its thread shares with the others.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "runtime/kernel/abi.h"
+#include "runtime/run/ensemble/ensemble.hpp"
+
+namespace lobatto {
+
+inline constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
+
+// With what it has kept.
+struct Ended {
+    lobatto_status status = LOBATTO_OK;
+    std::int64_t steps_done = 0, iterations = 0;
+    std::vector<double> rows, energies;
+    std::int64_t row_step = 0;  // steps before the last row
+    int stop = -1;              // of a trajectory that a stop ended: which
+    std::vector<double> reduced;
+    double energy_error_largest = 0;
+    // Where numbers have several parts: rows and energies with all of them. The energy at the start always.
+    std::vector<double> whole_rows, whole_energies, energy_start;
+
+    bool goes_on() const { return status == LOBATTO_OK && stop < 0; }
+    // A state with its energy; q and p have n numbers of so many parts.
+    void keep(const EnsembleRequest& request, double time, const double* q, const double* p, std::size_t n,
+              const double* energy, std::size_t parts = 1);
+};
+
+// The most rows that a trajectory keeps.
+std::int64_t rows_kept(const EnsembleRequest& request);
+
+struct EndedTogether {
+    std::vector<Ended> trajectories;  // fewer than there should be when interrupted
+    double processor_seconds = 0;
+};
+
+// What all threads see.
+struct Shared {
+    std::atomic<std::int64_t> steps_gone{0};
+    std::atomic<bool> halted{false};
+};
+
+// How many steps go between two looks at the interruption.
+class Chunk {
+public:
+    std::int64_t steps() const { return steps_; }
+    void took(std::int64_t steps, double seconds);
+
+private:
+    std::int64_t steps_ = 256;
+};
+
+}  // namespace lobatto
