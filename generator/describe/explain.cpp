@@ -170,9 +170,10 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    const bool has_fixed_point =
-        !derivation.structure.full() && (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
-        (derivation.structure.form() == Form::separable || derivation.system.n <= most_iterated);
+    const bool has_fixed_point = !derivation.structure.full() &&
+                                 (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
+                                 (derivation.structure.form() == Form::separable ||
+                                  derivation.system.n <= most_iterated || derivation.structure.light_mass());
     std::string text = derivation.structure.linear ? "once a step, without iteration; "
                        : has_fixed_point
                            ? "by fixed-point iteration over all points at once; where it does not contract, "

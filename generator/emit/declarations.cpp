@@ -97,7 +97,8 @@ const std::vector<Declaration>& general() {
          true,
          true},
         {"stage",
-         "(D35) Lv = dL/dvelocity, Lq = dL/dq + F, n each, and M = dLv/dvelocity as in legendre.",
+         "(D35) Lv = dL/dvelocity, Lq = dL/dq + F, n each, and M = dLv/dvelocity as in legendre; where masses are "
+         "scaled, one over its first entry alone.",
          "void",
          {{in, "q"}, {in, "velocity"}, {out, "Lv"}, {out, "Lq"}, {out, "M"}},
          true,
@@ -181,6 +182,7 @@ const std::set<std::string>& member_names() {
                                                 "mass_row",
                                                 "mass_column",
                                                 "constant_mass",
+                                                "scaled_mass",
                                                 "constraints",
                                                 "constraint_entries",
                                                 "constraint_row",

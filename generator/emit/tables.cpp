@@ -92,6 +92,8 @@ std::string general_shapes(const Derivation& d) {
     text += places("mass", mass);
     line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
          d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
+    line(text, fmt::format("bool scaled_mass = {}", d.structure.scaled_mass()),
+         d.structure.scaled_mass() ? "M is one function times a constant matrix" : "masses change in different ways");
     const auto slopes = places_of(d.system.constraint_q);
     line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
     line(text, fmt::format("int constraint_entries = {}", slopes.size()),

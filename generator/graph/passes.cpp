@@ -174,11 +174,12 @@ Id raised(Graph& graph, Id base, int exponent) {
 }
 
 // sqrt(x)^exponent with an odd exponent, as a power of x times a root: rounding of the root is not raised with it.
-Id raised_root(Graph& graph, Id root, int exponent) {
+// `known`: sqrt(x) is there anyway, and sqrt(1/x) = sqrt(x)/x.
+Id raised_root(Graph& graph, Id root, int exponent, bool known) {
     Id x = graph[root].operands[0];
     if (exponent < 0) {
         x = graph.raw(Op::power, {x}, -1);
-        root = graph.raw(Op::sqrt, {x});
+        root = known ? graph.raw(Op::multiply, {x, root}) : graph.raw(Op::sqrt, {x});
     }
     const int whole = (std::abs(exponent) - 1) / 2;
     return whole == 0 ? root : graph.raw(Op::multiply, {raised(graph, x, whole), root});
@@ -211,10 +212,15 @@ Programs multiply_powers(const Programs& programs) {
     // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...; with a
     // root as base, r = 1/x, then sqrt(r), r sqrt(r) ...
     std::map<Id, std::set<int>> negative;
-    for (const Id id : programs.graph.topological(roots_of(programs)))
-        if (programs.graph[id].op == Op::power && programs.graph[id].index < 0)
-            negative[programs.graph[id].operands[0]].insert(programs.graph[id].index);
-    return rewrite(programs, [&negative](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
+    std::set<Id> known;  // operands that are asked for themselves, or raised to positive powers
+    for (const Id id : programs.graph.topological(roots_of(programs))) {
+        const Node& node = programs.graph[id];
+        if (node.op == Op::power && node.index < 0)
+            negative[node.operands[0]].insert(node.index);
+        else
+            known.insert(node.operands.begin(), node.operands.end());
+    }
+    return rewrite(programs, [&](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
         if (node.op == Op::raise)
             if (const int k = odd_quarters(graph, operands[1]); k != 0)
@@ -222,7 +228,7 @@ Programs multiply_powers(const Programs& programs) {
         if (node.op != Op::power) return same(graph, node, std::move(operands));
         const bool shares = node.index < 0 && negative[node.operands[0]].size() > 1;
         if (graph[operands.front()].op == Op::sqrt && node.index % 2 != 0 && (node.index != -1 || shares))
-            return raised_root(graph, operands.front(), node.index);
+            return raised_root(graph, operands.front(), node.index, known.contains(node.operands.front()));
         if (shares) return raised(graph, graph.raw(Op::power, {operands.front()}, -1), -node.index);
         return raised(graph, operands.front(), node.index);
     });

@@ -69,7 +69,11 @@ private:
         std::size_t e = 0;
         for (const auto& [place, value] : d_.system.momentum_v.entries()) {
             legendre.outputs.push_back({at("M", e), convert(value)});
-            stage.outputs.push_back({at("M", e++), convert(value)});
+            if (!d_.structure.scaled_mass())
+                stage.outputs.push_back({at("M", e), convert(value)});
+            else if (e == 0)
+                stage.outputs.push_back({at("M", e), convert(GiNaC::pow(value, -1))});
+            ++e;
         }
         p_.programs.push_back(std::move(legendre));
         p_.programs.push_back(std::move(stage));

@@ -133,6 +133,7 @@ concept GeneralKernel = KernelOfAnyForm<K> && K::form == Form::general&& OrderOf
     K::extrapolation[K::controls * K::controls - 1];
     K::legendre_polynomial[0];
     { K::constant_mass } -> std::convertible_to<bool>;
+    { K::scaled_mass } -> std::convertible_to<bool>;
     { K::constraints } -> std::convertible_to<int>;
     { K::constraint_entries } -> std::convertible_to<int>;
     K::constraint_row[0];

@@ -27,6 +27,7 @@
 #include "iteration/galerkin_newton.hpp"
 #include "iteration/neighbours.hpp"
 #include "iteration/newton.hpp"
+#include "iteration/node_mass.hpp"
 #include "iteration/refinement.hpp"
 #include "iteration/stage_coefficients.hpp"
 #include "iteration/stage_equations.hpp"

@@ -191,6 +191,43 @@ TEST_CASE("arrivals are at their times, and leave the motion alone") {
     }
 }
 
+TEST_CASE("states at given times are as exact as the ends of steps") {
+    const test::TemporaryFolder folder;
+    for (const char* method : {"points = 9", "family = \"gauss\"\nstages = 8"}) {
+        INFO(method);
+        test::write_text(folder / "scene.toml", kepler(0.9, std::string(method) + "\nclock = \"auto\"",
+                                                       "step = 0.022\nuntil = 13", "[output]\nevery = 0.03125\n"));
+        REQUIRE(
+            test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"}).exit_code ==
+            0);
+        const auto rows = read_trajectory(folder / "run.csv").rows;
+        REQUIRE(rows.size() == 417);  // of 25 steps
+        double worst = 0;
+        for (const auto& row : rows) {
+            const std::vector<double> exact = ellipse(0.9, row[0]);
+            worst = std::fmax(worst, std::fmax(std::fabs(row[1] - exact[0]), std::fabs(row[2] - exact[1])));
+        }
+        CHECK(worst < 1e-9);
+    }
+}
+
+TEST_CASE("a clock's masses change alike, for any number of bodies") {
+    // Three coordinates of each of six bodies: more than a full matrix at every node is kept for.
+    std::string text =
+        "lagrangian = \"sum(i = 1 .. 6, m[i]*(x[i]'^2 + y[i]'^2 + z[i]'^2)/2) + sum(i = 1 .. 5, sum(j = i + 1 .. 6, "
+        "m[i]*m[j]/sqrt((x[i] - x[j])^2 + (y[i] - y[j])^2 + (z[i] - z[j])^2)))\"\n[parameters]\n"
+        "m = [1, 2, 3, 1, 2, 3]\n[coordinates]\nx = { position = [1, -2, 4, 0, 3, -3], velocity = 0 }\n"
+        "y = { position = [3, -1, -1, 2, 5, -4], velocity = 0.1 }\n"
+        "z = { position = [0, 1, -1, -3, 2, 2], velocity = 0 }\n[method]\npoints = 6\nclock = \"auto\"\n[run]\n"
+        "step = 0.1\nuntil = 4\n";
+    const Derivation derivation = derive(scene_of(text));
+    CHECK(derivation.structure.light_mass());
+    const Ended ended = run(scene_of(text), 1);
+    CHECK(ended.energy_error < 1e-9);
+    // Fixed-point iterations: Newton's would be 2 or 3 a step.
+    CHECK(ended.result.iterations > 5 * ended.result.chain_steps);
+}
+
 TEST_CASE("events of a motion with a clock happen at their physical times") {
     const test::TemporaryFolder folder;
     test::write_text(folder / "scene.toml", kepler(0.9, "points = 9\nclock = \"r^(3/2)\"", "step = 0.7\nuntil = 40") +

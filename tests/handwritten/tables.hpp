@@ -140,7 +140,8 @@ struct HandwrittenKernel {
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr const char* method = "by hand";
     static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false,
-                          clean = false, is_explicit = false, uses_hessian = true, has_remainder = false;
+                          clean = false, is_explicit = false, uses_hessian = true, has_remainder = false,
+                          scaled_mass = false;
     static constexpr int events = 0, angles = 0;
 };
 

@@ -80,7 +80,7 @@ ex automatic_clock(const Scene& scene) {
     ex U = 0;
     for (const ex& term : poles.terms)
         U += scene.evaluate(term.subs(start), "the clock at the start").is_negative() ? -term : term;
-    return GiNaC::pow(U.subs(start) / U, GiNaC::numeric(1) / *poles.least + GiNaC::numeric(1, 2));
+    return GiNaC::pow(U / U.subs(start), -(GiNaC::numeric(1) / *poles.least + GiNaC::numeric(1, 2)));
 }
 
 bool has_automatic_clock(const Scene& scene) {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <optional>
 
 #include "generator/mechanics/clock/automatic_clock.hpp"
@@ -41,14 +42,20 @@ public:
         Clock& clock = *result.clock;
         clock.is_applied = true;
         clock.rate = g_;
-        ex action = clock.rate * clock.energy;
+        // Terms of one degree stay together: their sum is differentiated as one factor, beside the power of g.
+        std::map<int, ex> of_degree{{0, clock.energy}};
+        ex action = 0;
         clock.lagrangian = 0;
         for (const ex& term : terms_of(scene_.lagrangian, motion_)) {
             const std::optional<int> degree = degree_of(term);
             const ex slow = degree ? term * GiNaC::pow(g_, -*degree) : in_clock_time(term);
             clock.lagrangian += slow;
-            action += degree ? term * GiNaC::pow(g_, 1 - *degree) : g_ * slow;
+            if (degree)
+                of_degree[*degree] += term;
+            else
+                action += g_ * slow;
         }
+        for (const auto& [degree, sum] : of_degree) action += sum * GiNaC::pow(g_, 1 - degree);
         result.lagrangian = action;
         result.outputs.energy = true;  // kernels take E from it
         for (DomainCondition& condition : result.conditions) condition.expression = in_clock_time(condition.expression);

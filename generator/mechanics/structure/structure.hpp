@@ -68,7 +68,9 @@ struct SeparableForm : ConstantMassForm {
 };
 // Any L: all nodes but the first are implicit (D25 ... D30).
 struct GeneralForm {
-    bool full = false;  // asked for: nothing is looked for, matrices are full
+    bool full = false;         // asked for: nothing is looked for, matrices are full
+    bool scaled_mass = false;  // M = m(q, v, t) M0 with a constant M0 (scaled_mass.hpp)
+    bool light_mass = false;   // and M0 is diagonal
     Routhian routhian;
 };
 enum class Form { linear_map, separable, general };  // in the order of Structure's variant
@@ -95,6 +97,8 @@ struct Structure {
     bool diagonal_part() const { return form() == Form::separable && separable().diagonal_part; }
     bool absorbed() const { return form() == Form::separable && separable().absorbed; }
     bool full() const { return form() == Form::general && std::get<GeneralForm>(of_form).full; }
+    bool scaled_mass() const { return form() == Form::general && std::get<GeneralForm>(of_form).scaled_mass; }
+    bool light_mass() const { return form() == Form::general && std::get<GeneralForm>(of_form).light_mass; }
 };
 
 // Coordinates of a linear map; unknowns of a separable step whose constant mass matrix is full.

@@ -23,7 +23,8 @@
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
 //   multiplier_terms(k, q, velocity, r, s) what multipliers follow from; `constant_mass` that M is constant and forces
-//   hold no velocity. `angles`: how many sines and cosines `stage` takes as a last argument (base/angles.hpp).
+//   hold no velocity, `scaled_mass` that M is a function times a constant matrix: then `stage` gives one over the first
+//   entry of M in place of M. `angles`: how many sines and cosines `stage` takes as a last argument (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 

@@ -19,50 +19,37 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "convergence.hpp"
+#include "node_mass.hpp"
 #include "stage_map.hpp"
 
 namespace lobatto {
 
-// M = L D L^T of a symmetric matrix, in place: L below the diagonal, 1/D on it. No pivoting: a mass matrix is positive
-// definite as a rule, and where it is not, what fails shows as not finite or not converging.
-template <int n, class V>
-LOBATTO_INLINE void factor_symmetric(V* M) {
-#pragma GCC unroll 8
-    for (int k = 0; k < n; ++k) {
-        V row[n];  // L_kj D_j
-        V pivot = M[k * n + k];
-#pragma GCC unroll 8
-        for (int j = 0; j < k; ++j) {
-            row[j] = M[k * n + j];
-#pragma GCC unroll 8
-            for (int l = 0; l < j; ++l) row[j] = fused(-row[l], M[j * n + l], row[j]);
-            M[k * n + j] = row[j] * M[j * n + j];
-            pivot = fused(-row[j], M[k * n + j], pivot);
-        }
-        M[k * n + k] = V(real_of<V>(1)) / pivot;
+// A' of a kernel's nodes.
+template <class K>
+struct MomentumIntegration {
+    static constexpr int r = K::nodes;
+    typename K::real entry[r][r]{};
+
+    constexpr MomentumIntegration() {
+        for (int i = 0; i < r; ++i)
+            for (int j = 0; j < r; ++j)
+                entry[i][j] = K::b[j] * (typename K::real(1) - K::integration[j * r + i] / K::b[i]);
     }
-}
-template <int n, class V>
-LOBATTO_INLINE void solve_symmetric(const V* M, V* x) {
-#pragma GCC unroll 8
-    for (int k = 1; k < n; ++k)
-#pragma GCC unroll 8
-        for (int j = 0; j < k; ++j) x[k] = fused(-M[k * n + j], x[j], x[k]);
-    for (int k = n - 1; k >= 0; --k) {
-        x[k] *= M[k * n + k];
-#pragma GCC unroll 8
-        for (int j = k + 1; j < n; ++j) x[k] = fused(-M[j * n + k], x[j], x[k]);
-    }
-}
+};
+template <class K, bool computed_at_start = is_many_digits<typename K::real>>
+constexpr MomentumIntegration<K> momentum_integration{};
+template <class K>
+inline const MomentumIntegration<K> momentum_integration<K, true>{};  // MPFR is no part of the compiler
 
 template <class K, class T>
 struct GalerkinFixedPoint {
     using real = typename K::real;
     static constexpr int n = K::coordinates, r = K::nodes;
-    using Layout = NodeLayout<real, T, r - 1>;  // r nodes
+    using Layout = NodeLayout<real, T, r - 1, node_lanes<real>>;  // r nodes
     using V = typename Layout::V;
     static constexpr bool in_lanes = Layout::in_lanes;
-    static constexpr int width = Layout::width, parts = Layout::parts_of(r), entries = K::mass_entries;
+    using Mass = NodeMass<K, T, V>;
+    static constexpr int width = Layout::width, parts = Layout::parts_of(r), mass_room = Mass::room;
     static constexpr int evaluation_limit = is_many_digits<real> ? 60 : 30;
     using ActiveMask = decltype(T() < T());
 
@@ -73,7 +60,7 @@ struct GalerkinFixedPoint {
     }
 
     struct Arrays {
-        V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[parts * n * n];
+        V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[parts * mass_room];
         T flat[n * parts * width], flat_v[n * parts * width], inverse_scale[n];
         AngleTable<V, parts, K::angles> near;
     };
@@ -82,12 +69,15 @@ struct GalerkinFixedPoint {
     V weight[parts], legendre[parts];                  // h b and pi; zero in lanes to spare
     V ahead[r][parts], node_time[parts];
     real h{};
-    real tolerance{};  // of increments, relative; 0: to rounding
-    T v[n * r];        // velocities at the nodes of the last step
-    T kappa[n];        // of the last step
-    T evaluations;     // of the last step
-    T increment;       // the last one of the last step, relative
-    T elapsed;         // of kernels with a clock: the physical time of the last step, sum_i h b_i clock(Q_i)
+    real tolerance{};             // of increments, relative; 0: to rounding
+    T v[n * r];                   // velocities at the nodes of the last step
+    T kappa[n];                   // of the last step
+    T evaluations;                // of the last step
+    T increment;                  // the last one of the last step, relative
+    T elapsed;                    // of kernels with a clock: the physical time of the last step, sum_i h b_i clock(Q_i)
+    T rates[K::clocked ? r : 1];  // and clock(Q_i)
+    bool is_guess{};              // v is not of the last step but what the next one begins with
+    Mass mass;
     Workspace<Arrays> workspace;
 
     void prepare(real step) {
@@ -97,7 +87,7 @@ struct GalerkinFixedPoint {
             const int node = is_node ? i : r - 1;
             for (int j = 0; j < r; ++j) {
                 put(position_map[j], i, h * K::integration[node * r + j]);
-                put(momentum_map[j], i, h * (K::b[j] * (real(1) - K::integration[j * r + node] / K::b[node])));
+                put(momentum_map[j], i, h * momentum_integration<K>.entry[node][j]);
                 put(ahead[j], i, K::ahead[node * r + j]);
             }
             put(node_time, i, h * K::c[node]);
@@ -106,8 +96,9 @@ struct GalerkinFixedPoint {
         }
     }
 
-    // Begins with this velocity.
-    void begin(const real* velocity, int lane = 0) {
+    // Begins at a state.
+    void begin(const typename K::Coefficients& k, real time, const real* q, const real* velocity, int lane = 0) {
+        mass.begin(k, time, q, velocity, lane);
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             for (int i = 0; i < r; ++i) set_lane(v[c * r + i], lane, velocity[c]);
@@ -144,6 +135,16 @@ private:
             values[i] = V(x);
     }
 
+    // The values of one part.
+    LOBATTO_INLINE static V at_nodes(const T* x, int part) {
+        if constexpr (in_lanes) {
+            V packed = V(x[r - 1]);
+            for (int i = part * width; i < r && i < (part + 1) * width; ++i) set_lane(packed, i % width, x[i]);
+            return packed;
+        } else {
+            return x[part];
+        }
+    }
     // base + sum_j column_j x_j of one part.
     LOBATTO_INLINE static V sum_of(const V& base, const V (*column)[parts], int p, const T* x) {
         V even = base, odd = V(real(0));
@@ -177,7 +178,7 @@ private:
 #pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
                 V& v_part = a.v[part * n + c];
-                v_part = sum_of(V(real(0)), ahead, part, v + c * r);
+                v_part = is_guess ? at_nodes(v + c * r, part) : sum_of(V(real(0)), ahead, part, v + c * r);
                 lay_flat<1>(&v_part, 1, flat + part * width);
                 fastest = maximum(fastest, fabs(v_part));
             }
@@ -221,7 +222,7 @@ private:
     LOBATTO_INLINE void prepare_angles(const Given& k, const Time& time, const T* q, Arrays& a) const {
         using Start = Pack<real, lanes_of<T>>;
         Angle<Start> angles[K::angles];
-        Start position[n], velocity[n], Lv[n], F[n], M[entries];
+        Start position[n], velocity[n], Lv[n], F[n], M[Mass::given];
         for (int c = 0; c < n; ++c) {
             position[c] = Start(q[c]);
             velocity[c] = Start(v[c * r + r - 1]);
@@ -244,8 +245,7 @@ private:
     LOBATTO_INLINE T iterate(const Given& k, const Time& time, const T* q, const T* p, T* kappa_now, Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
-            V packed[entries];
-            V* const M = a.M + part * n * n;
+            V packed[Mass::given];
             const V* const Q = a.Q + part * n;
             const V* const velocity = a.v + part * n;
             if constexpr (K::angles > 0)
@@ -253,10 +253,7 @@ private:
                                    AnglesNear<V>{a.near.of(part)});
             else
                 Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed);
-#pragma GCC unroll 8
-            for (int i = 0; i < n * n; ++i) M[i] = V(real(0));
-            for (int e = 0; e < entries; ++e) M[K::mass_row[e] * n + K::mass_column[e]] = packed[e];
-            factor_symmetric<n>(M);
+            Mass::take(packed, a.M + part * mass_room);
         }
         // P - L_v
 #pragma GCC unroll 8
@@ -267,18 +264,21 @@ private:
             for (int part = 0; part < parts; ++part) {
                 V& residual = a.Lv[part * n + c];
                 V target = sum_of(V(p[c]) - residual, momentum_map, part, flat);
-                if constexpr (has_kappa()) target = fused(legendre[part], V(kappa_now[c]), target);
+                if constexpr (has_kappa() && Mass::is_full) target = fused(legendre[part], V(kappa_now[c]), target);
                 residual = target;
             }
         }
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V* const x = a.Lv + part * n;
-            solve_symmetric<n>(a.M + part * n * n, x);
+            mass.solve(a.M + part * mass_room, x);
 #pragma GCC unroll 8
             for (int c = 0; c < n; ++c) x[c] += a.v[part * n + c];  // the new velocities
         }
-        if constexpr (has_kappa()) correct(kappa_now, a);
+        if constexpr (has_kappa() && Mass::is_full)
+            correct(kappa_now, a);
+        else if constexpr (has_kappa())
+            correct_each(kappa_now, a);
         V worst = V(real(0));
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
@@ -299,6 +299,30 @@ private:
             return fabs(worst);
     }
 
+    // The same for masses that do not couple coordinates, or do so by M0 alone, which drops out: kappa = M0 d is found
+    // anew, and P does not hold it.
+    LOBATTO_INLINE void correct_each(T* kappa_now, Arrays& a) {
+        V weighted[parts], moved[parts * mass_room];  // h b pi, M^-1 pi
+        T share[mass_room], d[n];
+        for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
+#pragma GCC unroll 8
+        for (int c = 0; c < mass_room; ++c) {
+            for (int part = 0; part < parts; ++part)
+                moved[part * mass_room + c] = legendre[part] * a.M[part * mass_room + c];
+            share[c] = T(real(-1)) / over_nodes(weighted, moved + c, mass_room);
+        }
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            const int of = c < mass_room ? c : 0;
+            d[c] = share[of] * over_nodes(weighted, a.Lv + c, n);
+            for (int part = 0; part < parts; ++part) {
+                V& x = a.Lv[part * n + c];
+                x = fused(moved[part * mass_room + of], V(d[c]), x);
+            }
+        }
+        mass.momentum_of(d, kappa_now);
+    }
+
     // kappa <- kappa + d, V <- V + M^-1 pi d with sum b pi V = 0.
     LOBATTO_INLINE void correct(T* kappa_now, Arrays& a) {
         V weighted[parts];  // h b pi
@@ -315,7 +339,7 @@ private:
             for (int part = 0; part < parts; ++part) {
 #pragma GCC unroll 8
                 for (int i = 0; i < n; ++i) columns[part * n + i] = i == c ? legendre[part] : V(real(0));
-                solve_symmetric<n>(a.M + part * n * n, columns + part * n);
+                mass.solve(a.M + part * mass_room, columns + part * n);
             }
 #pragma GCC unroll 8
             for (int i = c; i < n; ++i) S[i * n + c] = over_nodes(weighted, columns + i, n);
@@ -327,7 +351,7 @@ private:
             V x[n];
 #pragma GCC unroll 8
             for (int c = 0; c < n; ++c) x[c] = legendre[part] * V(d[c]);
-            solve_symmetric<n>(a.M + part * n * n, x);
+            mass.solve(a.M + part * mass_room, x);
 #pragma GCC unroll 8
             for (int c = 0; c < n; ++c) a.Lv[part * n + c] += x[c];
         }
@@ -352,9 +376,13 @@ private:
             const T passed = over_nodes(weight, rate, 1);
             not_finite += passed - passed;
             elapsed = select(done, passed, elapsed);
+            T flat[parts * width];
+            lay_flat<parts>(rate, 1, flat);
+            for (int i = 0; i < r; ++i) rates[i] = select(done, flat[i], rates[i]);
         }
         done = done & (not_finite == T(real(0)));
         if (!any(done)) return done;
+        is_guess = false;
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             const T* const flat = a.flat_v + c * parts * width;
@@ -385,7 +413,7 @@ struct LaneStepper<K, T, Form::general, stepping> {
         real velocity[n] = {};
         const Chain& chain = single;  // with a clock: dq/dtau
         chain.velocity(chain.time(), single.q, single.p, velocity);
-        fixed_point.begin(velocity, lane);
+        fixed_point.begin(chain.coefficients, chain.time(), single.q, velocity, lane);
     }
     void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);

@@ -25,20 +25,22 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
     using typename Newton::real, typename Newton::Arrays, typename Newton::Layout, typename Newton::Nothing;
     static constexpr int nodes = K::nodes, multiplier_room = constraints > 0 ? constraints : 1;
 
-    // Fixed-point iterations need the mass matrix of a node alone, which is full for them.
+    // Fixed-point iterations need the mass matrix of a node alone, which is full for them unless it is light.
     static constexpr bool iterates_on_constraints = constraints > 0 && K::constant_mass;
-    static constexpr bool has_fixed_point =
-        (K::any_number || iterates_on_constraints) && !K::linear && N > 0 && n <= most_full;
+    static constexpr bool has_fixed_point = (K::any_number || iterates_on_constraints) && !K::linear && N > 0 &&
+                                            (n <= most_full || has_light_mass<K>());
+    static constexpr bool iterates_on_velocities = has_fixed_point && !iterates_on_constraints;
     struct FixedPointState {
         std::conditional_t<iterates_on_constraints, ConstrainedFixedPoint<K>, GalerkinFixedPoint<K, real>> iteration;
         Pause pause;
     };
 
-    real q_before[n]{};         // before the last step
-    real elapsed{};             // of kernels with a clock: the physical time of the last step
-    bool has_history{};         // there is a last step
-    mutable bool is_current{};  // what follows is of the last step; else the iterations' memory is
-    mutable real Y[room]{};     // displacements at the control points, then kappa, in the order of the solver
+    real q_before[n]{};                // before the last step
+    real elapsed{};                    // of kernels with a clock: the physical time of the last step
+    real rates[K::clocked ? r : 1]{};  // and dt/dtau at its nodes
+    bool has_history{};                // there is a last step
+    mutable bool is_current{};         // what follows is of the last step; else the iterations' memory is
+    mutable real Y[room]{};            // displacements at the control points, then kappa, in the order of the solver
     mutable real cyclic_rates[r * cyclic_room]{};  // -g_P at the nodes
     std::conditional_t<has_fixed_point, FixedPointState, Nothing> fixed_point{};
     std::conditional_t<(cyclic > 0), real[m * m], Nothing> integration{};  // inverse of D at the first m nodes
@@ -195,6 +197,8 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
 
     // Velocity of coordinate c at node i of the last step.
     real node_velocity(int c, int i) const {
+        if constexpr (iterates_on_velocities)
+            if (!is_current) return fixed_point.iteration.v[c * r + i];
         refresh();
         for (int j = 0; j < cyclic; ++j)
             if (K::cyclic_index[j] == c) return cyclic_rates[i * cyclic + j];
@@ -234,7 +238,10 @@ private:
     template <class AnyFixedPoint>
     void begin_fixed_point(AnyFixedPoint& any, const real* v) {
         any.pause = Pause();
-        any.iteration.begin(v);
+        if constexpr (iterates_on_constraints)
+            any.iteration.begin(v);
+        else
+            any.iteration.begin(coefficients, this->time(), q, v);
     }
 
     // A step by iterations; where they fail, all is made ready for Newton's iteration.
@@ -257,7 +264,10 @@ private:
             }
             iterations = static_cast<std::int32_t>(any.iteration.evaluations);
             increment = any.iteration.increment;
-            if constexpr (K::clocked) elapsed = any.iteration.elapsed;
+            if constexpr (K::clocked) {
+                elapsed = any.iteration.elapsed;
+                for (int i = 0; i < r; ++i) rates[i] = any.iteration.rates[i];
+            }
             if constexpr (constraints > 0)
                 for (int c = 0; c < constraints; ++c) last_multiplier[c] = any.iteration.lambda[c * r + r - 1];
             any.pause.succeed();
@@ -353,7 +363,7 @@ private:
     }
 
     // sum_i h b_i clock(Q_i) of the stages just solved.
-    real time_passed(Arrays& a) const {
+    real time_passed(Arrays& a) {
         real passed = real(0);
         if constexpr (K::clocked) {
             real Q[n];
@@ -361,7 +371,8 @@ private:
             for (int i = 0; i < r; ++i) {
                 this->node_variables(q, p, a.Y, i, a.z);
                 for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
-                passed += K::b[i] * Formulas<K>::clock(coefficients, this->time(), static_cast<const real*>(Q));
+                rates[i] = Formulas<K>::clock(coefficients, this->time(), static_cast<const real*>(Q));
+                passed += K::b[i] * rates[i];
             }
         } else {
             (void)a;

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Mass matrices whose entries all change alike.
+#pragma once
+
+#include "generator/mechanics/system/system.hpp"
+
+namespace lobatto {
+
+// Whether M = d2L/dvdv is m(q, v, t) M0 with a constant M0, by values: M_ij M'_e = M_e M'_ij for all entries and one of
+// them, e, with M' at the start, at points near it and away from it. Always so for one coordinate.
+bool has_scaled_mass(const Scene& scene, const System& system);
+
+}  // namespace lobatto
