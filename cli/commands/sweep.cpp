@@ -171,9 +171,7 @@ StudyTimes compute(SweepStudy& study, CrewLeader* crew, Results& results, std::i
     times = study.compute(
         first, last,
         [&](const EnsembleTrajectory& trajectory, const Verdict& verdict, const EnsembleRequest& request) {
-            block.figures.clear();
-            block.states.clear();
-            block.cells.clear();
+            block.clear();
             block.add(study, trajectory, verdict, request);
             results.take(block, columns, n);
         },
