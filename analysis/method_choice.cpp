@@ -1,11 +1,46 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/method_choice.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
 #include "generator/formula/source.hpp"
 
 namespace lobatto {
 
+namespace {
+
+// The command line refuses most of this one option at a time; settings of the library come as they are.
+void check_choice(const MethodChoice& choice) {
+    if (choice.points.has_value() + choice.stages.has_value() + choice.splitting.has_value() > 1)
+        throw InputError("points, stages and splitting name different methods; give one of them");
+    if (const std::optional<Method> named = choice.member()) {
+        const std::vector<int>& sizes = sizes_of(named->family);
+        if (std::find(sizes.begin(), sizes.end(), named->points) == sizes.end())
+            throw InputError(fmt::format("there is no method {} with {}; there are {}", word_of(named->family),
+                                         named->points, fmt::join(sizes, ", ")));
+    }
+    if (choice.numbers && !precision_of(*choice.numbers))
+        throw InputError("unknown numbers; there are " + precision_list());
+    if (choice.arithmetic && *choice.arithmetic != "clean" && *choice.arithmetic != "plain")
+        throw InputError(fmt::format("unknown arithmetic '{}'; there are \"plain\" and \"clean\"", *choice.arithmetic));
+    if (!choice.tolerance) return;
+    const std::string complaint = tolerance_complaint(*choice.tolerance, fmt::format("{}", *choice.tolerance));
+    if (!complaint.empty()) throw InputError(complaint);
+}
+
+}  // namespace
+
+std::string tolerance_complaint(double tolerance, const std::string& written) {
+    if (tolerance > 0 && tolerance <= 1e-3) return "";
+    return "the tolerance is " + written +
+           "; it must be above 0 and at most 0.001; leave it out to iterate to rounding";
+}
+
 void MethodChoice::apply(Scene& scene) const {
+    check_choice(*this);
     Method& method = scene.method;
     if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
     if (numbers) method.numbers = *precision_of(*numbers);

@@ -14,10 +14,14 @@ struct MethodChoice {
     std::optional<double> tolerance;
     std::optional<std::string> arithmetic, numbers;
 
+    // InputError for what there is not, and for two methods at once.
     void apply(Scene& scene) const;
     // InputError where the scene asks for other numbers than double, in which alone `command` computes.
     static void require_double(const Scene& scene, const std::string& command);
     std::optional<Method> member() const;  // nothing where none is named
 };
+
+// What is wrong with a tolerance; empty: nothing. `written`: as errors show it.
+std::string tolerance_complaint(double tolerance, const std::string& written);
 
 }  // namespace lobatto

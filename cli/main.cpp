@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The program: its commands, and what each kind of error means for the exit code.
+// The program: its commands, and how errors are told.
 #include <fcntl.h>
 #include <fmt/color.h>
 #include <fmt/format.h>
@@ -10,23 +10,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <iostream>
-#include <new>
-#include <string>
-#include <string_view>
-#include <system_error>
 
 #include "cli/commands/commands.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/formula/source.hpp"
+#include "library/errors.hpp"
 #include "runtime/error.hpp"
 
 namespace {
 
 using namespace lobatto;
-
-enum Exit { success = 0, wrong_input = 2, failed_computation = 3, failed_machine = 4 };
 
 // An error is told although the output's reader has gone.
 void flush_before_error() {
@@ -34,13 +27,13 @@ void flush_before_error() {
     std::cout.flush();
 }
 
-int complain(Exit code, std::string_view message) {
+int complain(const api::Error& error) {
     flush_before_error();
     const bool styled = isatty(STDERR_FILENO) && std::getenv("NO_COLOR") == nullptr;
     tell("{} {}\n",
          fmt::styled("lobatto:", styled ? fmt::emphasis::bold | fmt::fg(fmt::terminal_color::red) : fmt::text_style()),
-         message);
-    return code;
+         error.what());
+    return error.exit_code();
 }
 
 // What was printed must have arrived: a full disk behind `> file` is an error, although every write was only buffered.
@@ -100,33 +93,19 @@ int main(int argc, char** argv) {
         "Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.", "lobatto");
     try {
         describe(program);
-        program.run(argc, argv);
-        flush_output();
-        return success;
+        api::guarded([&] { program.run(argc, argv); });
+        api::guarded(flush_output);
+        return 0;
     } catch (const ExitCode& end) {
         return end.code;
     } catch (const WrongArguments& error) {
-        return complain(wrong_input, error.message);
-    } catch (const InputError& error) {
+        return complain(api::InputError(error.message));
+    } catch (const api::InputError& error) {
         // Begins with file:line:column, as editors expect of a compiler.
         flush_before_error();
         tell("{}\n", error.what());
-        return wrong_input;
-    } catch (const ComputationError& error) {
-        return complain(failed_computation, error.what());
-    } catch (const MachineError& error) {
-        return complain(failed_machine, error.what());
-    } catch (const std::system_error& error) {
-        return complain(failed_machine, error.what());
-    } catch (const std::bad_alloc&) {
-        return complain(failed_machine, "out of memory");
-    } catch (const std::exception& error) {
-        return complain(
-            failed_machine,
-            fmt::format(
-                "internal error: {}\n"
-                "This is a mistake in Lobatto, not in your scene. Please report it with the command, the scene and "
-                "the output of `lobatto --version`.",
-                error.what()));
+        return error.exit_code();
+    } catch (const api::Error& error) {
+        return complain(error);
     }
 }

@@ -279,6 +279,7 @@ lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_setti
         for (size_t c = 0; c < columns; ++c) starts.columns[names[c]].assign(values[c], values[c] + count);
         api::SweepOptions options;
         static_cast<api::Settings&>(options) = api::settings_of(settings);
+        options.measure = false;  // as lobatto.h says
         sweep.value = api::sweep(api::scene_of(scene), starts, options);
     });
 }
@@ -301,6 +302,12 @@ const char* lobatto_sweep_status_text(const lobatto_sweep* sweep, int status) {
     return api::text(sweep->value && status >= 0
                          ? api::element(&sweep->value->statuses, static_cast<std::size_t>(status))
                          : nullptr);
+}
+size_t lobatto_sweep_warnings(const lobatto_sweep* sweep) {
+    return sweep->value ? sweep->value->warnings.size() : 0;
+}
+const char* lobatto_sweep_warning(const lobatto_sweep* sweep, size_t index) {
+    return api::text(sweep->value ? api::element(&sweep->value->warnings, index) : nullptr);
 }
 const double* lobatto_sweep_t(const lobatto_sweep* sweep) {
     return sweep->value ? api::data(sweep->value->t) : nullptr;

@@ -2,23 +2,20 @@
 // The cheapest method and step that keep a promise, for run() and compile(); and what is proved of a scene.
 #include <fmt/format.h>
 
-#include "analysis/proof/proof.hpp"
-#include "analysis/tradeoff/choice.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
-#include "generator/pipeline.hpp"
-#include "library/parts.hpp"
+#include "library/whole.hpp"
+#include "runtime/error.hpp"
 
 namespace lobatto::api {
 
 namespace {
 
+constexpr double least_budget = 1, most_budget = 86400;  // seconds
+
 Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
     Settings settings = given;
     const Candidate& candidate = choice.measurement.candidate;
     const int points = candidate.member.points;
-    settings.points.reset();
-    settings.stages.reset();
-    settings.splitting.reset();
     switch (candidate.member.family) {
         case Family::lobatto:
             settings.points = points;
@@ -38,29 +35,50 @@ Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
     return settings;
 }
 
-lobatto::Choice chosen(const lobatto::Scene& written, const lobatto::Scene& scene, const ChoiceRequest& request) {
-    try {
-        return choose(written, scene, request);
-    } catch (const Interrupted&) {
-        throw ComputationError(scene.path + ": the search was ended; nothing was chosen");
-    }
+// The method and its step are what is looked for.
+void refuse_method(const Settings& settings) {
+    const bool names_method = settings.points || settings.stages || settings.splitting || settings.tolerance ||
+                              !settings.arithmetic.empty() || !settings.numbers.empty() || !settings.step.empty();
+    if (names_method)
+        throw lobatto::InputError("tune chooses the method, its numbers and the step; leave them out of the settings");
 }
 
 }  // namespace
 
+void check_budget(double seconds, const std::string& written) {
+    if (!(seconds >= least_budget && seconds <= most_budget))
+        throw lobatto::InputError(fmt::format(
+            "--budget: {} is {} for one measurement, which needs a compiled kernel; give 1s to 24h, as in --budget 30s",
+            written, seconds > most_budget ? "too much" : "too little"));
+}
+
+ChangedScene measurable(const Scene& scene, const Settings& settings, const std::string& command) {
+    ChangedScene scenes{scene.parts().scene, scene.parts().scene};
+    refuse_jumps(scenes.written, command);
+    apply(overrides_of(settings), scenes.changed);
+    return scenes;
+}
+
+FoundChoice choice_for(const Scene& scene, const Settings& settings, const ChoiceRequest& request) {
+    if (!(request.error >= Run::least_error && request.error <= Run::largest_error))
+        throw lobatto::InputError(
+            fmt::format("an error of {:.3g} cannot be promised; it is relative to the amplitude of the motion, at most "
+                        "{} and at least {:.0e}",
+                        request.error, Run::largest_error, Run::least_error));
+    check_budget(request.seconds, fmt::format("{}s", request.seconds));
+    refuse_method(settings);
+    ChangedScene scenes = measurable(scene, settings, "lobatto tune");
+    try {
+        lobatto::Choice choice = choose(scenes.written, scenes.changed, request);
+        return {std::move(scenes.changed), std::move(choice)};
+    } catch (const lobatto::ComputationError& failure) {
+        throw lobatto::ComputationError(fmt::format("{}: {}", scene.path(), failure.what()));
+    }
+}
+
 Choice tune(const Scene& scene, double error, const Settings& settings, double budget,
             const std::function<bool(const std::string&)>& progress) {
     return in_algebra([&] {
-        if (!(error >= Run::least_error && error <= Run::largest_error))
-            throw InputError(
-                fmt::format("an error of {:.3g} cannot be promised; it is relative to the amplitude of the motion, at "
-                            "most {} and at "
-                            "least {:.0e}",
-                            error, Run::largest_error, Run::least_error));
-        const lobatto::Scene written = scene.parts().scene;
-        refuse_jumps(written, "tune");
-        lobatto::Scene changed = written;
-        apply(overrides_of(settings), changed);
         ChoiceRequest request;
         request.error = error;
         request.seconds = budget;
@@ -71,23 +89,27 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
             request.say = [&](const std::string& what) {
                 if (!progress(what)) is_interrupted = 1;
             };
-        const lobatto::Choice found = chosen(written, changed, request);
-        Choice choice;
-        choice.settings = settings_of(found, settings);
-        choice.method = found.measurement.candidate.member.method().name();
-        choice.step = found.step();
-        choice.until = found.until;
-        choice.predicted_error = found.measurement.error;
-        choice.seconds = found.measurement.seconds;
-        choice.complete = found.complete;
-        return choice;
+        try {
+            const lobatto::Choice found = choice_for(scene, settings, request).choice;
+            Choice choice;
+            choice.settings = settings_of(found, settings);
+            choice.method = found.measurement.candidate.member.method().name();
+            choice.step = found.step();
+            choice.until = found.until;
+            choice.predicted_error = found.measurement.error;
+            choice.seconds = found.measurement.seconds;
+            choice.complete = found.complete;
+            return choice;
+        } catch (const Interrupted&) {
+            throw ComputationError(scene.path() + ": the search was ended; nothing was chosen");
+        }
     });
 }
 
 std::vector<Claim> verify(const Scene& scene, const Settings& settings) {
     return in_algebra([&] {
         std::vector<Claim> claims;
-        for (const ProofRow& row : prove(scene.parts().scene, method_of(settings)).rows)
+        for (const ProofRow& row : proof_of(scene, settings).rows)
             claims.push_back({row.claim, row.measured, row.bound, row.holds, row.meaning});
         return claims;
     });

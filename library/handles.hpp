@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "library/include/lobatto/lobatto.h"
-#include "library/include/lobatto/lobatto.hpp"
+#include "library/parts.hpp"
 
 namespace lobatto::api {
 
@@ -71,9 +71,7 @@ inline Settings settings_of(const lobatto_settings* given) {
     if (given->every != 0) settings.every = given->every;
     for (const char* const* set = given->set; set != nullptr && *set != nullptr; ++set) {
         const std::string argument = *set;
-        const std::size_t equals = argument.find('=');
-        if (equals == std::string::npos) throw InputError("set: expected name=value, not '" + argument + "'");
-        settings.set.emplace_back(argument.substr(0, equals), argument.substr(equals + 1));
+        settings.set.push_back(guarded([&] { return named_value(argument); }));
     }
     return settings;
 }

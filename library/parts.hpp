@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What stands behind the classes of lobatto.hpp, and the way in and out: one thread derives at a time, and errors
-// become those of the library.
+// What stands behind the classes of lobatto.hpp, and the way in: one thread derives at a time.
 #pragma once
 
 #include <mutex>
-#include <new>
-#include <system_error>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/method_choice.hpp"
 #include "analysis/motion.hpp"
 #include "generator/mechanics/derivation.hpp"
-#include "library/include/lobatto/lobatto.hpp"
-#include "runtime/error.hpp"
+#include "library/errors.hpp"
 
 namespace lobatto::api {
 
@@ -35,20 +34,8 @@ struct Kernel::Parts {
 // Formulas are not made for several threads.
 std::recursive_mutex& algebra();
 
-// What the parts of the program throw, as what the library throws.
-[[noreturn]] void rethrow();
-
 template <class Work>
-auto guarded(Work&& work) {
-    try {
-        return work();
-    } catch (...) {
-        rethrow();
-    }
-}
-
-template <class Work>
-auto in_algebra(Work&& work) {
+decltype(auto) in_algebra(Work&& work) {
     return guarded([&] {
         const std::lock_guard lock(algebra());
         return work();
@@ -57,6 +44,10 @@ auto in_algebra(Work&& work) {
 
 MethodChoice method_of(const Settings& settings);
 Overrides overrides_of(const Settings& settings);
+// {"m", "2"} of "m=2", for Settings::set.
+std::pair<std::string, std::string> named_value(const std::string& argument);
+// InputError where values are set: `what` is of the scene with all its values as they are written.
+void refuse_values(const Settings& settings, const std::string& what);
 // The scene, by another method; values are set later, because one kernel serves all of them.
 lobatto::Scene with_method(const Scene& scene, const Settings& settings);
 
@@ -65,5 +56,7 @@ std::vector<Variable> coordinates_of(const lobatto::Scene& scene);
 std::vector<Variable> parameters_of(const lobatto::Scene& scene);
 std::vector<Variable> inputs_of(const lobatto::Scene& scene);
 std::vector<std::string> events_of(const lobatto::Scene& scene);
+// Among parameters, by name; InputError where there is none.
+std::size_t index_of(const std::vector<Variable>& parameters, const std::string& name);
 
 }  // namespace lobatto::api

@@ -2,11 +2,8 @@
 // A whole run, kept in memory and judged as `lobatto run` judges it.
 #include <fmt/format.h>
 
-#include <thread>
-
-#include "analysis/accuracy/judged_run.hpp"
 #include "analysis/columns.hpp"
-#include "library/parts.hpp"
+#include "library/opened_run.hpp"
 
 namespace lobatto::api {
 
@@ -14,23 +11,6 @@ namespace {
 
 void append(std::vector<double>& all, const double* first, std::size_t count) {
     all.insert(all.end(), first, first + count);
-}
-
-// The start of a run, its kernel, and what is to be kept of it.
-struct BegunRun {
-    PreparedRun prepared;
-    TrajectoryRequest request;
-    std::vector<double> velocity;
-};
-
-BegunRun begin_run(const Scene& scene, const RunOptions& options) {
-    BegunRun begun{prepare_run(with_method(scene, options), overrides_of(options)), {}, {}};
-    LoadedStepper<double> stepper(begun.prepared.plain);
-    begun.request = request_of(begun.prepared.scene, begun.prepared.steps.count, stepper);
-    add_digits(begun.request, begun.prepared.scene, begun.prepared.kernel);
-    begun.request.formulas = columns_of(begun.prepared.scene, begun.request, &algebra());
-    stepper.velocity(begun.request.time, begun.request.q, begun.request.p, begun.velocity);
-    return begun;
 }
 
 void keep(Trajectory& trajectory, const Records& records) {
@@ -57,11 +37,12 @@ void keep(Trajectory& trajectory, const EventRecords& records) {
     }
 }
 
-void finish(Trajectory& trajectory, const BegunRun& begun, const TrajectoryResult& result, const RunVerdict& verdict) {
-    trajectory.steps = begun.prepared.scene.clock ? result.chain_steps : result.steps_done;
+void finish(Trajectory& trajectory, const OpenedRun& run, const TrajectoryResult& result, const RunVerdict& verdict) {
+    trajectory.steps = run.scene().clock ? result.chain_steps : result.steps_done;
     trajectory.seconds = result.seconds;
     trajectory.interrupted = result.interrupted;
     if (result.stop >= 0) trajectory.stopped_by = trajectory.event_names[static_cast<std::size_t>(result.stop)];
+    trajectory.reaches_end = run.prepared().steps.reaches_end;
     trajectory.warnings = verdict.warnings;
     if (!verdict.error) return;
     trajectory.error = verdict.error->at_end;
@@ -69,52 +50,38 @@ void finish(Trajectory& trajectory, const BegunRun& begun, const TrajectoryResul
     trajectory.doubling = verdict.error->doubling;
 }
 
+Trajectory begun(const OpenedRun& run) {
+    Trajectory trajectory;
+    trajectory.coordinates = coordinates_of(run.scene());
+    trajectory.event_names = events_of(run.scene());
+    for (const auto& [name, unit] : names_beside(run.scene())) trajectory.column_names.push_back(name);
+    trajectory.method = run.scene().method.name();
+    trajectory.digest = run.prepared().source.digest;
+    trajectory.step = run.request().step;
+    return trajectory;
+}
+
 }  // namespace
 
 Trajectory run(const Scene& scene, const RunOptions& options) {
-    return guarded([&] {
-        BegunRun begun = in_algebra([&] { return begin_run(scene, options); });
-        const PreparedRun& prepared = begun.prepared;
-        Trajectory trajectory;
-        std::optional<RunObservers> observers;
-        in_algebra([&] {
-            trajectory.coordinates = coordinates_of(prepared.scene);
-            trajectory.event_names = events_of(prepared.scene);
-            for (const auto& [name, unit] : names_beside(prepared.scene)) trajectory.column_names.push_back(name);
-            observers.emplace(prepared, LoadedStepper<double>(prepared.plain), begun.request, begun.velocity,
-                              options.measure);
-        });
-        trajectory.method = prepared.scene.method.name();
-        trajectory.digest = prepared.source.digest;
-        trajectory.step = begun.request.step;
-
-        volatile int is_interrupted = 0;
-        TrajectoryRequest& request = begun.request;
-        request.interrupted = &is_interrupted;
-        request.sink = [&](const Records& records) {
-            keep(trajectory, records);
-            observers->observe(records);
+    OpenedRun run(scene, options);
+    Trajectory trajectory = in_algebra([&] { return begun(run); });
+    volatile int is_interrupted = 0;
+    OpenedRun::Listeners listeners;
+    listeners.states = [&](const Records& records) { keep(trajectory, records); };
+    listeners.events = [&](const EventRecords& records) { keep(trajectory, records); };
+    if (options.progress)
+        listeners.progress = [&](std::int64_t done) {
+            const double share = static_cast<double>(done) / static_cast<double>(run.request().steps);
+            if (!options.progress(share)) is_interrupted = 1;
         };
-        if (!trajectory.event_names.empty())
-            request.events = [&](const EventRecords& records) {
-                keep(trajectory, records);
-                observers->observe(records);
-            };
-        if (options.progress)
-            request.progress = [&](std::int64_t done) {
-                const double share = static_cast<double>(done) / static_cast<double>(request.steps);
-                if (!options.progress(share)) is_interrupted = 1;
-            };
-        if (observers->companion && std::thread::hardware_concurrency() > 1) observers->companion->start();
-        const TrajectoryResult result = integrate(prepared.kernel, request);
-        observers->watch.look_at_end(result);
-        const RunVerdict verdict =
-            in_algebra([&] { return verdict_of(prepared, request, result, *observers, options.beyond_horizon); });
-        finish(trajectory, begun, result, verdict);
-        if (!verdict.failure.empty())
-            throw RunFailure(fmt::format("{}: {}", prepared.scene.path, verdict.failure), std::move(trajectory));
-        return trajectory;
-    });
+    listeners.interrupted = &is_interrupted;
+    const TrajectoryResult& result = run.go(listeners);
+    const RunVerdict verdict = run.verdict();
+    finish(trajectory, run, result, verdict);
+    if (!verdict.failure.empty())
+        throw RunFailure(fmt::format("{}: {}", run.scene().path, verdict.failure), std::move(trajectory));
+    return trajectory;
 }
 
 }  // namespace lobatto::api

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Scenes of the library: read, described, emitted.
+// Scenes of the library: read, and changed by settings.
 #include "analysis/checked_scene.hpp"
-#include "analysis/kernel/support_text.hpp"
 #include "analysis/stability/json.hpp"
 #include "generator/describe/describe.hpp"
-#include "generator/mechanics/clock/clock.hpp"
-#include "generator/mechanics/constraints/constraints.hpp"
-#include "generator/mechanics/constraints/impacts.hpp"
-#include "generator/pipeline.hpp"
-#include "library/parts.hpp"
+#include "generator/formula/suggest.hpp"
+#include "library/whole.hpp"
 
 namespace lobatto::api {
 
@@ -21,34 +17,28 @@ std::recursive_mutex& algebra() {
     return mutex;
 }
 
-void rethrow() {
-    try {
-        throw;
-    } catch (const Error&) {
-        throw;
-    } catch (const lobatto::InputError& error) {
-        throw InputError(error.what());
-    } catch (const lobatto::ComputationError& error) {
-        throw ComputationError(error.what());
-    } catch (const lobatto::MachineError& error) {
-        throw MachineError(error.what());
-    } catch (const std::system_error& error) {
-        throw MachineError(error.what());
-    } catch (const std::bad_alloc&) {
-        throw MachineError("out of memory");
-    } catch (const std::exception& error) {
-        throw MachineError(std::string("internal error: ") + error.what() +
-                           "\nThis is a mistake in Lobatto, not in your scene. Please report it with the scene.");
-    }
-}
-
 MethodChoice method_of(const Settings& settings) {
-    const int named = settings.points.has_value() + settings.stages.has_value() + settings.splitting.has_value();
-    if (named > 1) throw InputError("points, stages and splitting name different methods; give one of them");
     MethodChoice choice{settings.points, settings.stages, settings.splitting, settings.tolerance, {}, {}};
     if (!settings.arithmetic.empty()) choice.arithmetic = settings.arithmetic;
     if (!settings.numbers.empty()) choice.numbers = settings.numbers;
     return choice;
+}
+
+std::pair<std::string, std::string> named_value(const std::string& argument) {
+    const std::size_t equals = argument.find('=');
+    if (equals == std::string::npos) Source("--set", argument).fail({1, 1}, "expected name=value, such as --set m=2");
+    return {argument.substr(0, equals), argument.substr(equals + 1)};
+}
+
+void refuse_values(const Settings& settings, const std::string& what) {
+    const char* const given = !settings.set.empty()     ? "set"
+                              : !settings.step.empty()  ? "step"
+                              : !settings.until.empty() ? "until"
+                              : settings.every          ? "every"
+                                                        : nullptr;
+    if (given != nullptr)
+        throw lobatto::InputError(what + " takes the scene's own values; leave out '" + given +
+                                  "', or write it into the scene");
 }
 
 Overrides overrides_of(const Settings& settings) {
@@ -98,6 +88,16 @@ std::vector<std::string> events_of(const lobatto::Scene& scene) {
     std::vector<std::string> texts;
     for (const Event& event : scene.reported()) texts.push_back(event.text);
     return texts;
+}
+
+std::size_t index_of(const std::vector<Variable>& parameters, const std::string& name) {
+    const auto found =
+        std::find_if(parameters.begin(), parameters.end(), [&](const Variable& one) { return one.name == name; });
+    if (found != parameters.end()) return static_cast<std::size_t>(found - parameters.begin());
+    std::vector<std::string> names;
+    for (const Variable& parameter : parameters) names.push_back(parameter.name);
+    throw InputError(
+        fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
 }
 
 namespace {
@@ -164,47 +164,33 @@ bool Scene::starts_with_momenta() const {
 }
 
 std::string Scene::derivation(const Settings& settings) const {
-    return in_algebra([&] { return text_of(describe(derive(with_method(*this, settings)))); });
+    return in_algebra([&] { return text_of(described(*this, settings)); });
 }
 std::string Scene::derivation_latex(const Settings& settings) const {
-    return in_algebra([&] { return latex_of(describe(derive(with_method(*this, settings)))); });
+    return in_algebra([&] { return latex_of(described(*this, settings)); });
 }
 std::string Scene::derivation_json(const Settings& settings) const {
-    return in_algebra([&] { return json_of(describe(derive(with_method(*this, settings)))); });
+    return in_algebra([&] { return json_of(described(*this, settings)); });
 }
 
 std::pair<std::string, std::string> Scene::emit(const Settings& settings) const {
     return in_algebra([&] {
-        const lobatto::Scene scene = with_method(*this, settings);
-        EmitOptions options{scene.method.numbers, {}};
-        options.support_text = [](const std::vector<std::string>& parts) { return support_text(parts); };
-        const KernelSource source = lobatto::emit(derive_kernel(scene), options);
+        const KernelSource source = emitted(*this, settings, {});
         return std::pair(source.name + ".hpp", source.header);
     });
 }
 std::pair<std::string, std::string> Scene::emit_plain(const Settings& settings) const {
     return in_algebra([&] {
-        const lobatto::Scene scene = with_method(*this, settings);
-        const PlainSource source = lobatto::emit_plain(scene, scene.method.numbers);
+        const PlainSource source = plainly_emitted(*this, settings);
         return std::pair(source.name + ".hpp", source.header);
     });
 }
 
 std::string Scene::check_json(const Settings& settings) const {
-    return in_algebra([&] { return json_of(check_scene(with_method(*this, settings))); });
+    return in_algebra([&] { return json_of(checked(*this, settings)); });
 }
 std::string Scene::stability_json(const Settings& settings) const {
-    return in_algebra([&] {
-        const lobatto::Scene scene = with_method(*this, settings);
-        refuse_clock(scene, "stability");
-        refuse_constraints(scene, "stability");
-        refuse_impacts(scene, "stability");
-        MethodChoice::require_double(scene, "stability");
-        if (scene.method.family == Family::splitting)
-            throw InputError(scene.path +
-                             ": what is exact of stability is of Lobatto and Gauss; choose points or stages");
-        return json_of(stability_report(scene, overrides_of(settings)));
-    });
+    return in_algebra([&] { return json_of(stability_of(*this, settings)); });
 }
 
 }  // namespace lobatto::api

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "analysis/kernel/derived_kernel.hpp"
-#include "generator/formula/suggest.hpp"
 #include "generator/mechanics/start.hpp"
 #include "library/parts.hpp"
 
@@ -332,25 +331,11 @@ std::vector<double> Stepper::tangent() const {
     });
 }
 
-namespace {
-
-std::size_t parameter_index(const Kernel& kernel, const std::string& name) {
-    const std::vector<Variable>& all = kernel.parameters();
-    const auto found = std::find_if(all.begin(), all.end(), [&](const Variable& one) { return one.name == name; });
-    if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
-    std::vector<std::string> names;
-    for (const Variable& parameter : all) names.push_back(parameter.name);
-    throw InputError(
-        fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
-}
-
-}  // namespace
-
 double Stepper::parameter(const std::string& name) const {
-    return guarded([&] { return parts_->parameters[parameter_index(parts_->kernel, name)]; });
+    return guarded([&] { return parts_->parameters[index_of(parts_->kernel.parameters(), name)]; });
 }
 void Stepper::set(const std::string& name, double value) {
-    guarded([&] { parts_->change(parameter_index(parts_->kernel, name), {value}); });
+    guarded([&] { parts_->change(index_of(parts_->kernel.parameters(), name), {value}); });
 }
 void Stepper::set_inputs(const double* values) {
     guarded([&] {

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Many trajectories of one scene, from starts in columns.
+// Many trajectories of one scene: opened for all who sweep, and computed from starts in columns.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
-#include "analysis/sweep/study.hpp"
-#include "library/parts.hpp"
+#include "generator/formula/source.hpp"
+#include "library/opened_sweep.hpp"
 
 namespace lobatto::api {
 
-namespace {
-
-// The columns, as a sweep takes them.
 StartsRequest request_of(const Starts& starts) {
     StartsRequest request;
     StartTable& table = request.table.emplace();
@@ -28,15 +25,44 @@ StartsRequest request_of(const Starts& starts) {
     return request;
 }
 
-std::unique_ptr<SweepStudy> begin_sweep(const Scene& scene, const Starts& starts, const SweepOptions& options) {
-    lobatto::Scene read =
-        options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);
-    method_of(options).apply(read);
-    StudyOptions study;
-    study.overrides = overrides_of(options);
-    study.threads = options.threads;
-    study.measures = options.measure;
-    return std::make_unique<SweepStudy>(std::move(read), request_of(starts), study, &algebra());
+namespace {
+
+constexpr double most_memory = 4e9;  // bytes of kept states
+
+// A name has one value or many.
+void refuse_both(const Settings& settings, const SweepStarts& starts) {
+    for (const SweepStarts::Column& varied : starts.columns())
+        for (const auto& [name, value] : settings.set)
+            if (name == varied.of.name)
+                throw lobatto::InputError(
+                    fmt::format("--set: '{}' is varied too; leave one of both out", varied.of.name));
+    using Role = VariedName::Role;
+    const bool names_member = settings.points || settings.stages || settings.splitting;
+    const auto refuse = [&](Role role, bool is_given, const std::string& option) {
+        if (is_given && starts.varies(role, 0))
+            throw lobatto::InputError(fmt::format("{}: it is varied too; leave one of both out", option));
+    };
+    refuse(Role::step, !settings.step.empty(), "--step");
+    refuse(Role::tolerance, settings.tolerance.has_value(), "--tolerance");
+    for (const Role role : {Role::points, Role::stages, Role::splitting})
+        refuse(role, names_member, "the method on the command line");
+}
+
+void refuse_too_much(const SweepStudy& study) {
+    const std::int64_t count = study.starts().count();
+    const double steps = study.steps_of(0, count);
+    if (steps > 9e18)
+        throw lobatto::InputError(
+            fmt::format("--vary: {} {} of {:.0f} steps are {:.3g} steps, too many to count; vary less, or make the end "
+                        "time smaller",
+                        count, count == 1 ? "trajectory" : "trajectories", steps / static_cast<double>(count), steps));
+    const SweepStudy::Setting& setting = study.first_setting();
+    const double memory = memory_of(*setting.kernel, setting.request);
+    if (memory > most_memory)
+        throw lobatto::InputError(fmt::format(
+            "--every: the states that trajectories keep while they wait for their turn would need {:.3g} GB of memory; "
+            "give a larger number of steps, or fewer --threads",
+            memory / 1e9));
 }
 
 // Of a trajectory whose states were kept each `kept_every`-th step: the start, each `every`-th state, the last one.
@@ -75,9 +101,27 @@ void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& t
 
 }  // namespace
 
+std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options) {
+    return in_algebra([&] {
+        lobatto::Scene read =
+            options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);
+        method_of(options).apply(read);
+        StudyOptions wish;
+        wish.overrides = overrides_of(options);
+        wish.steps = options.steps;
+        wish.threads = options.threads;
+        wish.measures = options.measure;
+        wish.beyond_horizon = options.beyond_horizon;
+        auto study = std::make_unique<SweepStudy>(std::move(read), starts, wish, &algebra());
+        refuse_both(options, study->starts());
+        refuse_too_much(*study);
+        return study;
+    });
+}
+
 Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options) {
     return guarded([&] {
-        const std::unique_ptr<SweepStudy> study = in_algebra([&] { return begin_sweep(scene, starts, options); });
+        const std::unique_ptr<SweepStudy> study = open_sweep(scene, request_of(starts), options);
         const lobatto::Scene& swept = study->scene();
         Sweep sweep;
         sweep.coordinates = in_algebra([&] { return coordinates_of(swept); });
@@ -101,6 +145,7 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
             keep(sweep, swept, trajectory, verdict.status);
         };
         sweep.interrupted = study->compute(0, count, sink, progress, &is_interrupted).interrupted;
+        sweep.warnings = in_algebra([&] { return study->end(); });
         return sweep;
     });
 }

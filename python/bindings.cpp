@@ -224,7 +224,7 @@ py::object states_of(lob::Sweep::States&& states, py::ssize_t n) {
 }
 
 py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vector<std::string>& keep, int threads,
-               bool measure, const py::object& progress, const py::kwargs& given) {
+               bool measure, bool beyond_horizon, const py::object& progress, const py::kwargs& given) {
     lob::Starts starts;
     for (const auto& [name, values] : columns) {
         const auto array = values.cast<Array>();
@@ -236,6 +236,7 @@ py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vect
     options.keep = keep;
     options.threads = threads;
     options.measure = measure;
+    options.beyond_horizon = beyond_horizon;
     options.progress = watched<double>(progress);
     lob::Sweep result = unlocked([&] { return lob::sweep(scene, starts, options); });
     const auto n = static_cast<py::ssize_t>(result.coordinates.size());
@@ -257,6 +258,7 @@ py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vect
     dict["error"] = result.error.empty() ? py::object(py::none()) : py::object(owned(std::move(result.error)));
     dict["kept"] = kept;
     dict["statuses"] = result.statuses;
+    dict["warnings"] = result.warnings;
     dict["_states"] = states_of(std::move(result.states), n);
     return dict;
 }
@@ -440,7 +442,7 @@ PYBIND11_MODULE(_lobatto, module) {
     add_stepper(module);
     module.def("run", &run, py::arg("scene"), py::arg("measure"), py::arg("beyond_horizon"), py::arg("progress"));
     module.def("sweep", &sweep, py::arg("scene"), py::arg("starts"), py::arg("keep"), py::arg("threads"),
-               py::arg("measure"), py::arg("progress"));
+               py::arg("measure"), py::arg("beyond_horizon"), py::arg("progress"));
     module.def("tune", &tune, py::arg("scene"), py::arg("error"), py::arg("budget"), py::arg("progress"));
     module.def("verify", [](const lob::Scene& scene, const py::kwargs& given) {
         const lob::Settings settings = settings_of(given);

@@ -18,7 +18,7 @@ namespace lobatto {
 
 namespace {
 
-constexpr long most_values = 10'000'000;  // of a name: they are kept
+constexpr long most_values = 10'000'000;  // of a name: those that were asked for are kept
 
 std::size_t place_of(std::int64_t index) {
     return static_cast<std::size_t>(index);
@@ -107,26 +107,26 @@ private:
                                      "more, or {}={:.6g}",
                                      axis_.given[0].to_double(), axis_.given[1].to_double(), axis_.of.name,
                                      axis_.given[0].to_double()));
-        axis_.values.resize(place_of(static_cast<std::int64_t>(nearest)));
-        for (std::int64_t i = 0; i < axis_.count(); ++i) axis_.values[place_of(i)] = axis_.exact(i).to_double();
+        axis_.count = static_cast<std::int64_t>(nearest);
     }
 
     void read_list(const std::vector<std::size_t>& list) {
-        for (std::size_t i = 0; i + 1 < list.size(); ++i) {
+        for (std::size_t i = 0; i + 1 < list.size(); ++i)
             axis_.given.push_back(number(part(list, i), "the value of " + axis_.of.name));
-            axis_.values.push_back(axis_.given.back().to_double());
-        }
+        axis_.count = std::ssize(axis_.given);
     }
 
     // Settings have values that a method can have.
     void check_settings(std::size_t begin) const {
         using Role = VariedName::Role;
         const Role role = axis_.of.role;
+        if (!axis_.of.is_setting()) return;
         const auto fail = [&](double value, const std::string& what) {
             source_.fail(text_of(argument_, begin).at.front(),
                          fmt::format("{} = {:.10g}; {}", axis_.of.name, value, what));
         };
-        for (const double value : axis_.values) {
+        for (std::int64_t i = 0; i < axis_.count; ++i) {
+            const double value = axis_.exact(i).to_double();
             const auto is_whole_in = [&](double least, double most) {
                 return value == std::round(value) && value >= least && value <= most;
             };
@@ -204,14 +204,36 @@ Axis read_axis(const Scene& scene, const std::string& argument) {
 GiNaC::numeric Axis::exact(std::int64_t i) const {
     if (spacing == Spacing::list) return given[place_of(i)];
     if (i == 0) return given[0];
-    if (i == count() - 1) return given[1];
+    if (i == count - 1) return given[1];
     if (spacing == Spacing::linear)
-        return given[0] + (given[1] - given[0]) * GiNaC::numeric(static_cast<long>(i), static_cast<long>(count() - 1));
+        return given[0] + (given[1] - given[0]) * GiNaC::numeric(static_cast<long>(i), static_cast<long>(count - 1));
     const double from = given[0].to_double(), to = given[1].to_double();
-    const long double share = static_cast<long double>(i) / static_cast<long double>(count() - 1);
+    const long double share = static_cast<long double>(i) / static_cast<long double>(count - 1);
     const auto logarithm = [](double x) { return std::log(static_cast<long double>(std::fabs(x))); };
     const long double size = std::exp((1 - share) * logarithm(from) + share * logarithm(to));
     return GiNaC::numeric(std::copysign(static_cast<double>(size), from));
+}
+
+AxisValues::AxisValues(Axis axis)
+    : axis_(std::move(axis)),
+      blocks_(place_of((axis_.count + block_size - 1) / block_size)),
+      ready_(std::make_unique<std::atomic<const double*>[]>(blocks_.size())) {}
+
+double AxisValues::operator()(std::int64_t i, std::recursive_mutex& algebra) const {
+    const std::size_t number = place_of(i / block_size);
+    const double* block = ready_[number].load(std::memory_order_acquire);
+    if (block == nullptr) {
+        const std::lock_guard lock(algebra);
+        if (blocks_[number] == nullptr) {
+            const std::int64_t first = i / block_size * block_size, last = std::min(first + block_size, axis_.count);
+            auto values = std::make_unique<double[]>(place_of(last - first));
+            for (std::int64_t k = first; k < last; ++k) values[place_of(k - first)] = axis_.exact(k).to_double();
+            blocks_[number] = std::move(values);
+            ready_[number].store(blocks_[number].get(), std::memory_order_release);
+        }
+        block = blocks_[number].get();
+    }
+    return block[i % block_size];
 }
 
 }  // namespace lobatto

@@ -4,8 +4,11 @@
 
 #include <ginac/ginac.h>
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -35,10 +38,25 @@ struct Axis {
     std::string written;  // its values as written: 0:3:1000
     Spacing spacing = Spacing::list;
     std::vector<GiNaC::numeric> given;
-    std::vector<double> values;
+    std::int64_t count = 0;
 
-    std::int64_t count() const { return std::ssize(values); }
     GiNaC::numeric exact(std::int64_t i) const;
+};
+
+// The values of an axis, rounded: computed a block at a time, when one of it is asked for. So each of the processes
+// that share a sweep computes those of its own trajectories, and no others.
+class AxisValues {
+public:
+    explicit AxisValues(Axis axis);
+    const Axis& axis() const { return axis_; }
+    // Thread-safe; `algebra` guards the exact values.
+    double operator()(std::int64_t i, std::recursive_mutex& algebra) const;
+
+private:
+    static constexpr std::int64_t block_size = 1024;
+    Axis axis_;
+    mutable std::vector<std::unique_ptr<double[]>> blocks_;
+    std::unique_ptr<std::atomic<const double*>[]> ready_;  // of them; null: not computed yet
 };
 
 // `argument` of --vary: NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=a,b,c. Throws InputError with the place in

@@ -68,22 +68,22 @@ void SweepStarts::add_axes(std::vector<Axis>& axes, bool zip, bool settings) {
         std::any_of(axes.begin(), axes.end(), [](const Axis& axis) { return axis.of.is_setting(); });
     if (zip && axes.size() < 2)
         throw InputError("--zip: lists that run together are two or more; give --vary twice, or leave --zip out");
-    const auto shortest_first = [](const Axis& a, const Axis& b) { return a.count() < b.count(); };
+    const auto shortest_first = [](const Axis& a, const Axis& b) { return a.count < b.count; };
     if (zip) {
         const auto [shortest, longest] = std::minmax_element(axes.begin(), axes.end(), shortest_first);
-        if (shortest->count() != longest->count())
+        if (shortest->count != longest->count)
             throw InputError(
                 fmt::format("--zip: lists that run together are equally long, but {} has {} values and {} has {}",
-                            shortest->of.name, shortest->count(), longest->of.name, longest->count()));
+                            shortest->of.name, shortest->count, longest->of.name, longest->count));
     }
     for (Axis& axis : axes) {
         if ((zip ? any_setting : axis.of.is_setting()) != settings) continue;
-        if (!zip || &axis == &axes.front()) dimensions_.push_back({axis.count()});
+        if (!zip || &axis == &axes.front()) dimensions_.push_back({axis.count});
         sources_.emplace_back("vary", axis.of.name + " = " + axis.written);
         Values values{dimensions_.size() - 1, std::nullopt, {}, std::nullopt};
         const VariedName name = axis.of;
         const std::string written = axis.written;
-        values.axis = std::move(axis);
+        values.axis.emplace(std::move(axis));
         add(name, written, std::move(values));
     }
     if (zip && settings == any_setting) sources_.emplace_back("zip", "lists run together");
@@ -124,7 +124,7 @@ void SweepStarts::add_draws(const StartsRequest& request) {
 void SweepStarts::add(const VariedName& name, const std::string& written, Values values) {
     for (const Column& other : columns_) {
         if (other.of.role == name.role && other.of.index == name.index)
-            varied_twice(values.axis ? name.name + "=" + values.axis->written : "", name.name);
+            varied_twice(values.axis ? name.name + "=" + values.axis->axis().written : "", name.name);
         if (is_family(other.of.role) && is_family(name.role))
             throw InputError(
                 fmt::format("--vary: {} and {} are of two families; vary one of both", other.of.name, name.name));
@@ -186,13 +186,14 @@ double SweepStarts::value(std::int64_t trajectory, std::size_t column) const {
     const Values& values = values_[column];
     // The same starts for each setting, so that settings can be compared.
     if (values.draw) return values.draw->value(seed_, trajectory % of_setting_);
-    const auto at = static_cast<std::size_t>(place(trajectory, column));
-    return values.axis ? values.axis->values[at] : values.listed[at];
+    const std::int64_t at = place(trajectory, column);
+    return values.axis ? (*values.axis)(at, *algebra_) : values.listed[static_cast<std::size_t>(at)];
 }
 
 GiNaC::numeric SweepStarts::exact(std::int64_t trajectory, std::size_t column) const {
     const Values& values = values_[column];
-    return values.axis ? values.axis->exact(place(trajectory, column)) : GiNaC::numeric(value(trajectory, column));
+    return values.axis ? values.axis->axis().exact(place(trajectory, column))
+                       : GiNaC::numeric(value(trajectory, column));
 }
 
 Scene SweepStarts::with_settings(Scene scene, std::int64_t trajectory) const {

@@ -71,7 +71,7 @@ private:
     // Where the values of a column come from: one of three.
     struct Values {
         std::size_t dimension = 0;
-        std::optional<Axis> axis;
+        std::optional<AxisValues> axis;
         std::vector<double> listed;
         std::optional<Draw> draw;
     };

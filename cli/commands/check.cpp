@@ -9,14 +9,15 @@
 #include <iostream>
 #include <thread>
 
-#include "analysis/checked_scene.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/describe/explain.hpp"
+#include "library/whole.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -95,11 +96,10 @@ void print(const Checked& checked) {
 }
 
 void check(const CheckCommand& options) {
-    Scene scene = read_scene(options.scene);
-    options.method.apply(scene);
+    const api::Scene scene(options.scene);
     Say say;
     say("deriving");
-    const Checked checked = check_scene(std::move(scene), options.general);
+    const Checked checked = api::checked(scene, settings_of(options.method), options.general);
     say.clear();
     if (options.json)
         std::cout << json_of(checked) << '\n';
@@ -122,10 +122,10 @@ void keep_checking(const CheckCommand& options) {
         const auto seen = state_of(options.scene);
         if (on_terminal) fmt::print(std::cout, "\033[2J\033[H");
         try {
-            check(options);
-        } catch (const InputError& error) {
+            api::guarded([&] { check(options); });
+        } catch (const api::InputError& error) {
             tell("{}\n", error.what());
-        } catch (const ComputationError& error) {
+        } catch (const api::ComputationError& error) {
             tell("lobatto: {}\n", error.what());
         }
         if (!std::cout.flush())

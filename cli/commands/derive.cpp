@@ -6,9 +6,9 @@
 
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
 #include "cli/print/say.hpp"
-#include "generator/describe/describe.hpp"
-#include "generator/pipeline.hpp"
+#include "library/whole.hpp"
 
 namespace lobatto {
 
@@ -22,11 +22,10 @@ struct DeriveCommand {
 };
 
 void derive_scene(const DeriveCommand& options) {
-    Scene scene = read_scene(options.scene);
-    options.method.apply(scene);
+    const api::Scene scene(options.scene);
     Say say;
     say("deriving");
-    const Description description = describe(derive(scene));
+    const Description description = api::described(scene, settings_of(options.method));
     say.clear();
     std::cout << (options.latex ? latex_of(description) : options.json ? json_of(description) : text_of(description));
 }

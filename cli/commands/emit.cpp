@@ -16,9 +16,10 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/say.hpp"
-#include "generator/pipeline.hpp"
+#include "library/whole.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
 
@@ -140,27 +141,23 @@ void write_plain(const PlainSource& source, const EmitCommand& options) {
 }
 
 void emit_scene(const EmitCommand& options) {
-    Scene scene = read_scene(options.scene);
-    options.method.apply(scene);
+    const api::Scene scene(options.scene);
+    const api::Settings settings = settings_of(options.method);
     if (options.ensemble && !options.standalone)
         throw InputError(
             "--ensemble: kernel.hpp carries ensembles anyway; leave --ensemble out, or add --standalone for one file");
     const bool printed = is_printed(options);
     if (options.plain) {
+        const PlainSource source = api::plainly_emitted(scene, settings);
         if (printed)
-            fmt::print(std::cout, "{}", emit_plain(scene, scene.method.numbers).header);
+            fmt::print(std::cout, "{}", source.header);
         else
-            write_plain(emit_plain(scene, scene.method.numbers), options);
+            write_plain(source, options);
         return;
     }
-    EmitOptions emit_options{scene.method.numbers, {}};
-    if (options.standalone)
-        emit_options.support_text = [&](const std::vector<std::string>& parts) {
-            return support_text(options.ensemble ? with_ensemble(parts) : parts);
-        };
     Say say;
     say("deriving");
-    const KernelSource source = emit(derive_kernel(scene, options.general), emit_options);
+    const KernelSource source = api::emitted(scene, settings, {options.general, options.standalone, options.ensemble});
     say.clear();
     if (printed) {
         fmt::print(std::cout, "{}", source.header);
@@ -191,7 +188,7 @@ void emit_scene(const EmitCommand& options) {
     if (!options.standalone && !options.no_support)
         fmt::print(std::cout, " and {}", (fs::path(options.folder) / "kernel.hpp").string());
     fmt::print(std::cout, "\n");
-    print_use(source, options, scene.method.numbers);
+    print_use(source, options, api::with_method(scene, settings).method.numbers);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "cli/print/progress.hpp"
 #include "cli/print/tell.hpp"
 #include "generator/pipeline.hpp"
+#include "library/parts.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -109,7 +110,7 @@ void gallery(const GalleryCommand& options) {
     for (const std::string& path : paths) {
         progress.show(&path - paths.data());
         try {
-            Scene scene = read_scene(path);
+            Scene scene = api::Scene(path).parts().scene;
             const Picture picture = picture_of_scene(scene);
             draw(options.folder, scene.name, picture.script, picture.width, picture.height);
             const std::string svg = scene.name + ".svg";
@@ -121,6 +122,8 @@ void gallery(const GalleryCommand& options) {
             page += fmt::format("\n## [{}]({})\n{}\n\n![{}]({})\n", scene.title,
                                 fs::relative(path, options.folder).generic_string(), picture.caption, scene.title, svg);
         } catch (const MachineError&) {
+            throw;
+        } catch (const api::MachineError&) {
             throw;
         } catch (const std::runtime_error& failure) {
             ++failed;

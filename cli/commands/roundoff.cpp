@@ -20,6 +20,7 @@
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constraints.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
+#include "library/parts.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -97,17 +98,17 @@ void print(const RoundoffResult& result) {
 }
 
 void roundoff(const RoundoffCommand& options) {
-    Scene scene = read_scene(options.scene);
+    const api::Settings settings = settings_of(options.method, options.overrides);
+    Scene scene = api::with_method(api::Scene(options.scene), settings);
     refuse_clock(scene, "lobatto roundoff");
     refuse_constraints(scene, "lobatto roundoff");
     refuse_impacts(scene, "lobatto roundoff");
-    options.method.apply(scene);
     MethodOption::require_double(scene, "roundoff");
     if (scene.method.family == Family::splitting)
         throw InputError(scene.path +
                          ": `lobatto roundoff` compares plain arithmetic with clean, which splitting methods "
                          "do not have; choose Lobatto (--points 8) or Gauss (--stages 4)");
-    apply(options.overrides, scene);
+    apply(api::overrides_of(settings), scene);
     scene.method.arithmetic = StepArithmetic::clean;
     scene.method.tolerance = 0;
     const std::string name = scene.method.name(), path = scene.path;

@@ -4,9 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
-#include <thread>
 
-#include "analysis/accuracy/judged_run.hpp"
 #include "analysis/columns.hpp"
 #include "analysis/exact_start.hpp"
 #include "analysis/tradeoff/candidate.hpp"
@@ -22,6 +20,7 @@
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "cli/table/trajectory_output.hpp"
+#include "library/opened_run.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/decimal.hpp"
 #include "runtime/measure/diagnostics.hpp"
@@ -249,28 +248,28 @@ private:
     std::optional<TrajectoryFile> events_;
 };
 
-// Takes the steps: records go to the files and the observers.
-TrajectoryResult integrate_into(Files& files, RunObservers& observers, const std::string& identity,
-                                const PreparedRun& run, TrajectoryRequest& request, bool quiet) {
-    request.sink = [&](const Records& records) {
-        files.write(records);
-        observers.observe(records);
-    };
-    if (!run.scene.reported().empty())
-        request.events = [&](const EventRecords& records) {
-            files.write(records);
-            observers.observe(records);
-        };
+// Takes the steps, into the files.
+const TrajectoryResult& go_into(Files& files, api::OpenedRun& run, const std::string& identity, bool quiet) {
+    api::OpenedRun::Listeners listeners;
+    listeners.states = [&](const Records& records) { files.write(records); };
+    listeners.events = [&](const EventRecords& records) { files.write(records); };
     if (files.keeps_checkpoints())
-        request.checkpoint = [&](const Halfway& halfway) { files.checkpoint(identity, halfway, observers); };
-    Progress progress(request.steps);
-    if (!quiet) request.progress = [&](std::int64_t done) { progress.show(done); };
+        listeners.checkpoint = [&](const Halfway& halfway) { files.checkpoint(identity, halfway, run.observers()); };
+    Progress progress(run.request().steps);
+    if (!quiet) listeners.progress = [&](std::int64_t done) { progress.show(done); };
     const Interruption interruption;
-    request.interrupted = interruption.flag();
-    TrajectoryResult result = integrate(run.kernel, request);
-    observers.watch.look_at_end(result);
+    listeners.interrupted = interruption.flag();
+    const TrajectoryResult& result = run.go(listeners);
     files.finish(result.interrupted);
     return result;
+}
+
+api::RunOptions wish_of(const RunOptions& options) {
+    api::RunOptions wish;
+    static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
+    wish.measure = !options.unmeasured;
+    wish.beyond_horizon = options.beyond_horizon;
+    return wish;
 }
 
 // Ends the command with the error that the run deserves, if any.
@@ -300,17 +299,15 @@ void run(const RunOptions& options) {
     const bool quiet = options.quiet || is_standard_output(options.output);
     if (options.json && is_standard_output(options.output))
         throw InputError("--json: standard output has the trajectory; name a file with -o");
-    Scene read = read_scene(options.scene);
-    options.method.apply(read);
+    const api::Scene read(options.scene);
     Say say;
     if (!quiet) say("deriving and compiling");
-    const PreparedRun run = prepare_run(std::move(read), options.overrides, options.general);
+    api::OpenedRun opened(read, wish_of(options), options.general);
     say.clear();
+    const PreparedRun& run = opened.prepared();
+    const TrajectoryRequest& request = opened.request();
+    const RunObservers& observers = opened.observers();
     const Scene& scene = run.scene;
-    LoadedStepper<double> stepper(run.plain);
-    TrajectoryRequest request = request_of(scene, run.steps.count, stepper);
-    add_digits(request, scene, run.kernel);
-    request.formulas = columns_of(scene, request);
     const std::string path = output_path(options.output, result_name(scene.path) + ".csv");
     const bool has_events = !scene.reported().empty();
     keep_scene(scene.path, path);
@@ -324,25 +321,18 @@ void run(const RunOptions& options) {
 
     const TrajectoryHeader header = header_of(scene, run.source, request);
     const std::string identity = identity_of(request, header, run.compiled.object);
-    std::vector<double> velocity;
-    stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
-    RunObservers observers(run, stepper, request, velocity, !options.unmeasured);
     std::optional<Checkpoint> from;
     if (options.resume) {
         from = checkpoint_of(path, identity, run.kernel, has_events ? 2 : 1, RunObservers::names);
-        if (from) {
-            observers.restore(from->observers);
-            request.from = &from->halfway;
-        }
+        if (from) opened.resume(from->halfway, from->observers);
         if (!quiet && !options.json)
             print_row("resumed", from ? fmt::format("at t = {:.6g}, after {} steps", from->halfway.result.time,
                                                     from->halfway.result.steps_done)
                                       : "nothing was left: from the start");
     }
     Files files(options, run, header, from);
-    if (observers.companion && std::thread::hardware_concurrency() > 1) observers.companion->start();
-    const TrajectoryResult result = integrate_into(files, observers, identity, run, request, quiet);
-    const RunVerdict verdict = verdict_of(run, request, result, observers, options.beyond_horizon);
+    const TrajectoryResult& result = go_into(files, opened, identity, quiet);
+    const RunVerdict verdict = opened.verdict();
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (options.json) {
         const bool is_exact = has_defect(run) && request.tolerance == 0 && result.steps_done > 0;

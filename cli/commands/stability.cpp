@@ -16,10 +16,8 @@
 #include "cli/print/drawing.hpp"
 #include "cli/print/stability_text.hpp"
 #include "generator/formula/source.hpp"
-#include "generator/mechanics/clock/clock.hpp"
-#include "generator/mechanics/constraints/constraints.hpp"
-#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/method/splitting_stability.hpp"
+#include "library/whole.hpp"
 
 namespace lobatto {
 
@@ -87,18 +85,8 @@ void show_members(const StabilityCommand& options) {
 
 void show_scene(const StabilityCommand& options) {
     const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart, *options.scene);
-    Scene scene = read_scene(*options.scene);
-    refuse_clock(scene, "lobatto stability");
-    refuse_constraints(scene, "lobatto stability");
-    refuse_impacts(scene, "lobatto stability");
-    options.method.apply(scene);
-    MethodOption::require_double(scene, "stability");
-    if (scene.method.family == Family::splitting)
-        throw InputError(
-            fmt::format("{}: what is exact here is of Lobatto and Gauss; choose one (--points 4), or ask for "
-                        "the limits of the method alone: lobatto stability --splitting {}",
-                        scene.path, scene.method.points));
-    const StabilityReport report = stability_report(std::move(scene), options.overrides);
+    const StabilityReport report =
+        api::stability_of(api::Scene(*options.scene), settings_of(options.method, options.overrides));
     if (!chart.empty())
         draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),
              stability_chart(report), 900, 640, "leave --chart out");

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "analysis/sweep/study.hpp"
 #include "analysis/sweep/tally.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
@@ -21,6 +20,7 @@
 #include "cli/ranks/crew.hpp"
 #include "cli/table/resumed_table.hpp"
 #include "cli/table/table_file.hpp"
+#include "library/opened_sweep.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/output.hpp"
@@ -28,8 +28,6 @@
 namespace lobatto {
 
 namespace {
-
-constexpr double most_memory = 4e9;  // bytes of kept states
 
 struct SweepOptions {
     std::string scene;
@@ -53,43 +51,6 @@ struct SweepOptions {
         return output.empty() ? TableFormat::csv : lobatto::table_format(output);
     }
 };
-
-// A name has one value or many.
-void refuse_both(const SweepOptions& options, const SweepStarts& starts) {
-    const auto name_of = [](const std::string& argument) { return argument.substr(0, argument.find('=')); };
-    for (const SweepStarts::Column& varied : starts.columns())
-        for (const std::string& set : options.overrides.set)
-            if (name_of(set) == varied.of.name)
-                throw InputError(fmt::format("--set: '{}' is varied too; leave one of both out", varied.of.name));
-    using Role = VariedName::Role;
-    const MethodOption& method = options.method;
-    const bool names_member = method.points || method.stages || method.splitting;
-    const auto refuse = [&](Role role, bool is_given, const std::string& option) {
-        if (is_given && starts.varies(role, 0))
-            throw InputError(fmt::format("{}: it is varied too; leave one of both out", option));
-    };
-    refuse(Role::step, !options.overrides.step.empty(), "--step");
-    refuse(Role::tolerance, method.tolerance.has_value(), "--tolerance");
-    for (const Role role : {Role::points, Role::stages, Role::splitting})
-        refuse(role, names_member, "the method on the command line");
-}
-
-void refuse_too_much(const SweepStudy& study) {
-    const std::int64_t count = study.starts().count();
-    const double steps = study.steps_of(0, count);
-    if (steps > 9e18)
-        throw InputError(
-            fmt::format("--vary: {} of {:.0f} steps are {:.3g} steps, too many to count; vary less, or make the end "
-                        "time smaller",
-                        counted(count, "trajectory", "trajectories"), steps / static_cast<double>(count), steps));
-    const SweepStudy::Setting& setting = study.first_setting();
-    const double memory = memory_of(*setting.kernel, setting.request);
-    if (memory > most_memory)
-        throw InputError(fmt::format(
-            "--every: the states that trajectories keep while they wait for their turn would need {:.3g} GB of memory; "
-            "give a larger number of steps, or fewer --threads",
-            memory / 1e9));
-}
 
 TableHead head_of(const SweepStudy& study) {
     const Scene& scene = study.scene();
@@ -128,15 +89,14 @@ TableHead head_of(const SweepStudy& study) {
 }
 
 std::unique_ptr<SweepStudy> study_of(const SweepOptions& options, int threads) {
-    Scene scene = read_scene(options.scene, options.keep);
-    options.method.apply(scene);
-    StudyOptions study;
-    study.overrides = options.overrides;
-    study.steps = options.steps;
-    study.threads = threads;
-    study.measures = !options.unmeasured;
-    study.beyond_horizon = options.beyond_horizon;
-    return std::make_unique<SweepStudy>(std::move(scene), options.starts.request(), study);
+    api::SweepOptions wish;
+    static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
+    wish.keep = options.keep;
+    wish.steps = options.steps;
+    wish.threads = threads;
+    wish.measure = !options.unmeasured;
+    wish.beyond_horizon = options.beyond_horizon;
+    return api::open_sweep(api::Scene(options.scene), options.starts.request(), wish);
 }
 
 // The table, and what is said of what goes into it.
@@ -211,9 +171,7 @@ StudyTimes compute(SweepStudy& study, CrewLeader* crew, Results& results, std::i
     times = study.compute(
         first, last,
         [&](const EnsembleTrajectory& trajectory, const Verdict& verdict, const EnsembleRequest& request) {
-            block.figures.clear();
-            block.states.clear();
-            block.cells.clear();
+            block.clear();
             block.add(study, trajectory, verdict, request);
             results.take(block, columns, n);
         },
@@ -239,8 +197,6 @@ void sweep(const SweepOptions& options) {
     if (!quiet) say("deriving and compiling");
     const std::unique_ptr<SweepStudy> study = study_of(options, threads);
     say.clear();
-    refuse_both(options, study->starts());
-    refuse_too_much(*study);
     if (options.json && is_stream) throw InputError("--json: standard output has the table; name a file with -o");
     if (options.resume && is_stream)
         throw InputError("--resume: standard output is not read back; name a file with -o");

@@ -15,8 +15,7 @@
 #include "cli/tradeoff/page.hpp"
 #include "cli/tradeoff/pictures.hpp"
 #include "cli/tradeoff/report.hpp"
-#include "generator/mechanics/constraints/impacts.hpp"
-#include "generator/scene/scene.hpp"
+#include "library/whole.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -38,10 +37,8 @@ void write(const std::string& path, const std::string& text) {
 
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
-    const Scene written = read_scene(options.scene);
-    refuse_jumps(written, "lobatto tradeoff");
-    Scene scene = written;
-    apply(options.overrides, scene);
+    const auto [written, scene] =
+        api::measurable(api::Scene(options.scene), settings_of({}, options.overrides), "lobatto tradeoff");
     end_of(scene);
     const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
 

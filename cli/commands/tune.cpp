@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "analysis/tradeoff/choice.hpp"
 #include "analysis/tradeoff/method_text.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/budget.hpp"
@@ -15,9 +14,7 @@
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/mechanics/constraints/impacts.hpp"
-#include "generator/scene/scene.hpp"
-#include "runtime/error.hpp"
+#include "library/whole.hpp"
 
 namespace lobatto {
 
@@ -36,11 +33,6 @@ double error_of(const TuneOptions& options) {
     const double error = std::strtod(options.error.c_str(), &rest);
     if (rest == options.error.c_str() || *rest != '\0')
         throw InputError(fmt::format("--error: '{}' is not a number; write 1e-8", options.error));
-    if (!(error >= Run::least_error && error <= Run::largest_error))
-        throw InputError(
-            fmt::format("--error: {} cannot be promised; it is relative to the amplitude of the motion, at most {} and "
-                        "at least {:.0e}",
-                        options.error, Run::largest_error, Run::least_error));
     return error;
 }
 
@@ -62,10 +54,7 @@ void print(const Choice& choice, const Scene& scene, double error) {
 
 void tune(const TuneOptions& options) {
     const double error = error_of(options);
-    const Scene written = read_scene(options.scene);
-    refuse_jumps(written, "lobatto tune");
-    Scene scene = written;
-    apply(options.overrides, scene);
+    const api::Scene scene(options.scene);
     const Interruption interruption;
     Say say(options.budget.seconds());
     ChoiceRequest request;
@@ -74,20 +63,18 @@ void tune(const TuneOptions& options) {
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
     try {
-        const Choice choice = choose(written, scene, request);
+        const auto [changed, choice] = api::choice_for(scene, settings_of({}, options.overrides), request);
         say.clear();
-        if (!options.json) print(choice, scene, error);
-        if (options.write) write_method(choice, scene, error, !options.overrides.until.empty());
+        if (!options.json) print(choice, changed, error);
+        if (options.write) write_method(choice, changed, error, !options.overrides.until.empty());
         if (options.json)
-            fmt::print("{}", json_of_choice(choice, scene, error, options.write));
+            fmt::print("{}", json_of_choice(choice, changed, error, options.write));
         else if (options.write)
-            fmt::print("\nwritten into {}\n", scene.path);
+            fmt::print("\nwritten into {}\n", scene.path());
     } catch (const Interrupted&) {
         say.clear();
         tell("lobatto: interrupted; nothing was chosen.\n");
         throw ExitCode{interrupted_exit};
-    } catch (const ComputationError& failure) {
-        throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
     }
 }
 

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 
-#include "analysis/proof/proof.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
+#include "cli/options/overrides.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/say.hpp"
+#include "library/whole.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -41,8 +42,8 @@ void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
 
 void verify(const VerifyOptions& options) {
     Say say;
-    const Proof proof = prove(read_scene(options.scene), options.method,
-                              [&](const std::string& what, double done) { say(what, done); });
+    const Proof proof = api::proof_of(api::Scene(options.scene), settings_of(options.method),
+                                      [&](const std::string& what, double done) { say(what, done); });
     say.clear();
     if (options.json) {
         fmt::print("{}", json_of_proof(options.scene, proof));

@@ -18,6 +18,7 @@
 #include "cli/print/tell.hpp"
 #include "cli/view/motion.hpp"
 #include "cli/view/video.hpp"
+#include "library/parts.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -81,16 +82,6 @@ Beside beside_of(const std::string& text) {
     return beside;
 }
 
-// InputError where there is no such member of the family.
-void check_size(const MethodChoice& method) {
-    const std::optional<Method> member = method.member();
-    if (!member) return;
-    const std::vector<int>& sizes = sizes_of(member->family);
-    if (std::find(sizes.begin(), sizes.end(), member->points) == sizes.end())
-        throw InputError(fmt::format("--beside: there is no method {} with {}; there are {}", word_of(member->family),
-                                     member->points, fmt::join(sizes, ", ")));
-}
-
 std::vector<Viewed> motions_of(const ViewCommand& options) {
     const std::size_t count = options.scenes.size() * (1 + options.beside.size());
     if (count > most_motions)
@@ -103,8 +94,7 @@ std::vector<Viewed> motions_of(const ViewCommand& options) {
         if (done >= steps) progress.reset();
     };
     for (const std::string& path : options.scenes) {
-        Scene scene = read_scene(path);
-        options.method.apply(scene);
+        const Scene scene = api::with_method(api::Scene(path), settings_of(options.method));
         MethodOption::require_double(scene, "view");
         const std::string label =
             options.scenes.size() > 1 || options.beside.empty() ? scene.title : scene.method.name();
@@ -112,9 +102,12 @@ std::vector<Viewed> motions_of(const ViewCommand& options) {
         all.push_back(viewed_motion(scene, options.overrides, label, numbers_on_page / count, show_progress));
         for (const std::string& text : options.beside) {
             const Beside beside = beside_of(text);
-            check_size(beside.method);
             Scene other = scene;
-            beside.method.apply(other);
+            try {
+                beside.method.apply(other);
+            } catch (const InputError& error) {
+                throw InputError(std::string("--beside: ") + error.what());
+            }
             Overrides overrides = options.overrides;
             if (!beside.step.empty()) overrides.step = beside.step;
             progress.reset();

@@ -7,14 +7,9 @@
 #include <cstdlib>
 
 #include "generator/formula/source.hpp"
+#include "library/whole.hpp"
 
 namespace lobatto {
-
-namespace {
-
-constexpr double least = 1, most = 86400;
-
-}  // namespace
 
 void BudgetOption::add_to(Command& command) {
     command.option("--budget", text, "Time it may take, as in 30s or 5min").shown_as("TIME").show_default();
@@ -30,10 +25,7 @@ double BudgetOption::seconds() const {
     const double seconds = value * factor;
     if (unit == text.c_str() || std::isnan(seconds))
         throw InputError(fmt::format("--budget: '{}' is not a time; write 30s, 5min or 1h", text));
-    if (!(seconds >= least && seconds <= most))
-        throw InputError(fmt::format(
-            "--budget: {} is {} for one measurement, which needs a compiled kernel; give 1s to 24h, as in --budget 30s",
-            text, seconds < least ? "too little" : "too much"));
+    api::check_budget(seconds, text);
     return seconds;
 }
 

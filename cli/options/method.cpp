@@ -29,13 +29,8 @@ void MethodOption::add_to(Command& command) {
         .excludes(gauss);
     command.option("--tolerance", tolerance, "Stop the iteration of a step at increments this small, relative")
         .shown_as("EPSILON")
-        .checked_by([](const std::string& text) {
-            const double value = std::strtod(text.c_str(), nullptr);
-            return value > 0 && value <= 1e-3 ? ""
-                                              : "the tolerance is " + text +
-                                                    "; it must be above 0 and at most 0.001; leave it out to iterate "
-                                                    "to rounding";
-        });
+        .checked_by(
+            [](const std::string& text) { return tolerance_complaint(std::strtod(text.c_str(), nullptr), text); });
     command.option("--arithmetic", arithmetic, "Plain, or clean: rounding errors grow like a random walk only (slower)")
         .shown_as("KIND")
         .one_of(std::vector<std::string>{"plain", "clean"});

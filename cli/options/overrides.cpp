@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "cli/options/overrides.hpp"
 
+#include "library/parts.hpp"
+
 namespace lobatto {
 
 void add_set_option(Command& command, Overrides& overrides) {
@@ -16,6 +18,21 @@ Option add_step_option(Command& command, Overrides& overrides) {
 
 Option add_until_option(Command& command, Overrides& overrides) {
     return command.option("--until", overrides.until, "End time; may use the scene's parameters").shown_as("TIME");
+}
+
+api::Settings settings_of(const MethodChoice& method, const Overrides& overrides) {
+    api::Settings settings{method.points,
+                           method.stages,
+                           method.splitting,
+                           method.tolerance,
+                           method.arithmetic.value_or(""),
+                           method.numbers.value_or(""),
+                           {},
+                           overrides.step,
+                           overrides.until,
+                           overrides.every};
+    for (const std::string& argument : overrides.set) settings.set.push_back(api::named_value(argument));
+    return settings;
 }
 
 }  // namespace lobatto

@@ -9,6 +9,7 @@
 #include "analysis/kernel/kernel_of.hpp"
 #include "generator/paper/midpoint.hpp"
 #include "generator/pipeline.hpp"
+#include "library/parts.hpp"
 #include "runtime/error.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/measure/reference.hpp"
@@ -139,9 +140,11 @@ double exact_period(PaperSystem system) {
 }
 
 Kernel paper_kernel(PaperSystem system, int points, Precision precision, StepArithmetic arithmetic) {
-    const Source source(system == PaperSystem::oscillator ? "paper_oscillator.toml" : "paper_pendulum.toml",
-                        scene_text(system, points));
-    Scene scene = read_scene(source);
+    Scene scene =
+        api::Scene::from_text(scene_text(system, points),
+                              system == PaperSystem::oscillator ? "paper_oscillator.toml" : "paper_pendulum.toml")
+            .parts()
+            .scene;
     scene.method.arithmetic = arithmetic;
     return kernel_of(emit(derive(scene), {.precision = precision, .support_text = {}}), precision);
 }

@@ -11,7 +11,7 @@
 #include <map>
 #include <type_traits>
 
-#include "generator/formula/source.hpp"
+#include "library/errors.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -22,6 +22,7 @@ constexpr double range_seconds = 1;           // that a range should take
 constexpr std::int64_t first_range = 64;      // trajectories
 constexpr std::int64_t most_cells = 1 << 17;  // of the rows of a range
 constexpr int ahead = 2;                      // ranges that a process has at a time, so that it never waits
+constexpr int between_carrying = 256;         // trajectories
 constexpr int window = 8;                     // ranges for each process that may wait for an earlier one
 
 template <class T>
@@ -64,6 +65,8 @@ private:
 
 std::string packed(const SweepBlock& block) {
     std::string message = "R";
+    message.reserve(200 + sizeof(SweepFigures) * block.figures.size() + sizeof(double) * block.states.size() +
+                    sizeof(TableCell) * block.cells.size());
     pack(message, block.first);
     pack(message, block.last);
     pack(message, block.times);
@@ -85,12 +88,12 @@ SweepBlock unpacked(const std::string& message) {
     return block;
 }
 
-// What another process threw: the number of its exit code, then the text.
+// What another process threw: its exit code as a digit, then the text.
 [[noreturn]] void rethrow_of(int rank, const std::string& message) {
     const std::string text = fmt::format("process {}: {}", rank, message.substr(2));
-    if (message[1] == '2') throw InputError(text);
-    if (message[1] == '3') throw ComputationError(text);
-    throw MachineError(text);
+    const int exit_code = message[1] - '0';
+    if (exit_code == api::InputError("").exit_code()) throw api::InputError(text);
+    throw api::Error(text, exit_code);
 }
 
 std::pair<int, std::string> next_message(Ranks& ranks) {
@@ -110,6 +113,12 @@ struct Handing {
 };
 
 }  // namespace
+
+void SweepBlock::clear() {
+    figures.clear();
+    states.clear();
+    cells.clear();
+}
 
 void SweepBlock::add(const SweepStudy& study, const EnsembleTrajectory& trajectory, const Verdict& verdict,
                      const EnsembleRequest& request) {
@@ -219,26 +228,23 @@ std::vector<std::string> CrewLeader::end() {
 }
 
 void work_in_crew(Ranks& ranks, const std::function<std::unique_ptr<SweepStudy>()>& begin) {
-    const auto tell_error = [&](char kind, const std::exception& error) {
-        ranks.send(0, std::string("X") + kind + error.what());
-        while (next_message(ranks).second[0] != 'E') continue;
-        ranks.send(0, "D");
-    };
-    try {
+    const auto work = [&] {
         std::unique_ptr<SweepStudy> study;
+        SweepBlock block;
         while (true) {
             const std::string message = next_message(ranks).second;
             if (message[0] == 'B') {
                 study = begin();
             } else if (message[0] == 'W') {
                 Unpacker from(message);
-                SweepBlock block;
+                block.clear();
                 block.first = from.take<std::int64_t>();
                 block.last = from.take<std::int64_t>();
                 block.times = study->compute(
                     block.first, block.last,
                     [&](const EnsembleTrajectory& trajectory, const Verdict& verdict, const EnsembleRequest& request) {
                         block.add(*study, trajectory, verdict, request);
+                        if (trajectory.index % between_carrying == 0) ranks.carry();
                     },
                     {}, nullptr);
                 ranks.send(0, packed(block));
@@ -251,12 +257,13 @@ void work_in_crew(Ranks& ranks, const std::function<std::unique_ptr<SweepStudy>(
                 return;
             }
         }
-    } catch (const InputError& error) {
-        tell_error('2', error);
-    } catch (const ComputationError& error) {
-        tell_error('3', error);
-    } catch (const std::exception& error) {
-        tell_error('4', error);
+    };
+    try {
+        api::guarded(work);
+    } catch (const api::Error& error) {
+        ranks.send(0, fmt::format("X{}{}", error.exit_code(), error.what()));
+        while (next_message(ranks).second[0] != 'E') continue;
+        ranks.send(0, "D");
     }
 }
 

@@ -21,6 +21,7 @@ struct SweepBlock {
     std::vector<double> states;         // 2n each: q, p at the end
     std::vector<TableCell> cells;       // rows of all of them
 
+    void clear();  // what was computed; its memory stays
     void add(const SweepStudy& study, const EnsembleTrajectory& trajectory, const Verdict& verdict,
              const EnsembleRequest& request);
 };

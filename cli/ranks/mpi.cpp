@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <climits>
+#include <list>
 #include <thread>
 
 #include "cli/ranks/ranks.hpp"
@@ -16,8 +17,8 @@ namespace lobatto {
 
 namespace {
 
-// A wait costs a processor nothing: MPI's own would turn in a loop.
-constexpr std::chrono::microseconds moment{1000};
+// A wait costs a processor next to nothing: MPI's own would turn in a loop.
+constexpr std::chrono::microseconds shortest_moment{100}, longest_moment{10000};
 
 class MpiRanks : public Ranks {
 public:
@@ -31,7 +32,10 @@ public:
         MPI_Comm_size(here, &on_machine_);
         MPI_Comm_free(&here);
     }
-    ~MpiRanks() override { MPI_Finalize(); }
+    ~MpiRanks() override {
+        for (carry(); !on_its_way_.empty(); carry()) pause();
+        MPI_Finalize();
+    }
     MpiRanks(const MpiRanks&) = delete;
     MpiRanks& operator=(const MpiRanks&) = delete;
 
@@ -44,18 +48,31 @@ public:
         return bound < all ? bound : std::max(1, all / on_machine_);
     }
 
-    void send(int to, const std::string& message) override {
+    void send(int to, std::string message) override {
         if (message.size() > INT_MAX)
             throw MachineError(
                 "the rows of one trajectory are more than a message of MPI can hold; give a larger --every");
-        MPI_Send(message.data(), static_cast<int>(message.size()), MPI_BYTE, to, 0, MPI_COMM_WORLD);
+        Sent& sent = on_its_way_.emplace_back();
+        sent.message = std::move(message);
+        MPI_Isend(sent.message.data(), static_cast<int>(sent.message.size()), MPI_BYTE, to, 0, MPI_COMM_WORLD,
+                  &sent.request);
+    }
+
+    void carry() override {
+        on_its_way_.remove_if([](Sent& sent) {
+            int has_arrived = 0;
+            MPI_Test(&sent.request, &has_arrived, MPI_STATUS_IGNORE);
+            return has_arrived != 0;
+        });
     }
 
     std::optional<std::pair<int, std::string>> receive() override {
+        carry();
         int is_there = 0;
         MPI_Status status;
         MPI_Iprobe(MPI_ANY_SOURCE, 0, MPI_COMM_WORLD, &is_there, &status);
         if (is_there == 0) return std::nullopt;
+        moment_ = shortest_moment;
         int size = 0;
         MPI_Get_count(&status, MPI_BYTE, &size);
         std::string message(static_cast<std::size_t>(size), '\0');
@@ -63,9 +80,18 @@ public:
         return std::pair(status.MPI_SOURCE, std::move(message));
     }
 
-    void pause() override { std::this_thread::sleep_for(moment); }
+    void pause() override {
+        std::this_thread::sleep_for(moment_);
+        moment_ = std::min(2 * moment_, longest_moment);
+    }
 
 private:
+    struct Sent {
+        std::string message;
+        MPI_Request request = MPI_REQUEST_NULL;
+    };
+    std::list<Sent> on_its_way_;  // where a message lies does not change
+    std::chrono::microseconds moment_ = shortest_moment;
     int number_ = 0, count_ = 1, on_machine_ = 1;
 };
 

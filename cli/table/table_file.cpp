@@ -19,7 +19,9 @@ constexpr std::size_t block_bytes = 1 << 16;
 constexpr std::chrono::milliseconds block_time{100};
 
 void append_binary(std::string& block, TableCell cell) {
-    for (int byte = 0; byte < 8; ++byte) block += static_cast<char>(cell >> (8 * byte) & 0xff);
+    char bytes[8];
+    for (int byte = 0; byte < 8; ++byte) bytes[byte] = static_cast<char>(cell >> (8 * byte) & 0xff);
+    block.append(bytes, sizeof bytes);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ scene = lobatto.Scene(str(pathlib.Path(__file__).resolve().parents[2] / "scenes"
 angles = numpy.linspace(-3, 3, size)
 a, b = numpy.meshgrid(angles, angles, indexing="ij")
 first, second = (variable.name for variable in scene.coordinates)
-flips = lobatto.sweep(scene, {first: a, second: b}, until=20)
+flips = lobatto.sweep(scene, {first: a, second: b}, until=20, measure=False)
 times = numpy.where(flips.stop > 0, flips.t, numpy.nan).reshape(size, size)
 print(f"{int(numpy.isfinite(times).sum())} of {size * size} flip within 20; the first at t = {numpy.nanmin(times):.3f}")
 pyplot.imshow(times.T, origin="lower", extent=(-3, 3, -3, 3), cmap="magma_r")

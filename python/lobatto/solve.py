@@ -33,18 +33,22 @@ def run(scene, *, measure=True, beyond_horizon=False, progress=None, **settings)
     return Trajectory(scene, settings, values)
 
 
-def sweep(scene, starts, *, keep=(), threads=0, measure=False, progress=None, **settings):
+def sweep(scene, starts, *, keep=(), threads=0, measure=True, beyond_horizon=False, progress=None, **settings):
     """Runs a scene from many starts at once. Returns a Sweep.
 
     ``starts``: arrays by name, of one length or one number for all: positions "q", velocities "q'" or momenta "p_q",
     parameters. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states. ``every``: keep each
-    such state of all trajectories too; ``states(i)`` of the Sweep returns them.
+    such state of all trajectories too; ``states(i)`` of the Sweep returns them. ``measure``: errors by companions, which
+    take 3/2 of the sweep's time. ``beyond_horizon``: trajectories of which nothing is left are no failures.
     """
     columns = numpy.broadcast_arrays(*(numpy.atleast_1d(numpy.asarray(values, dtype=float)).ravel()
                                        for values in starts.values()))
     columns = dict(zip(starts, (numpy.ascontiguousarray(column) for column in columns)))
     scene = _scene(scene)
-    return Sweep(scene, _lobatto.sweep(scene, columns, list(keep), threads, measure, progress, **settings))
+    values = _lobatto.sweep(scene, columns, list(keep), threads, measure, beyond_horizon, progress, **settings)
+    for warning in values["warnings"]:
+        warnings.warn(warning, stacklevel=2)
+    return Sweep(scene, values)
 
 
 def tune(scene, error, *, budget=20, progress=None, **settings):

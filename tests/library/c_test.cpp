@@ -37,15 +37,17 @@ TEST_CASE("from C99 a scene is derived, checked, chosen for and proved, and what
              "stability: whole, file none\n{",
              "emit: whole, file pendulum.hpp\n// ",
              "plain: whole, file pendulum.hpp\n// ",
-             "splitting: status 2, " LOBATTO_SOURCE_DIR
-             "/scenes/pendulum.toml: what is exact of stability is of Lobatto and Gauss; choose points or stages\n",
+             "splitting: status 2, " LOBATTO_SOURCE_DIR "/scenes/pendulum.toml: what is exact here is of Lobatto and "
+             "Gauss; choose one (--points 4), or ask for the "
+             "limits of the method alone: lobatto stability --splitting 6\n",
              "two methods: status 2, points, stages and splitting name different methods; give one of them\n",
              "no scene: status 2, there is no scene: NULL was given\n",
              "chosen: ",
              "too much: status 2, an error of 0.9 cannot be promised",
              "proof: all hold\n",
              "no scene proved: status 2, there is no scene: NULL was given\n",
-             "stability knows no constraints yet; run, sweep, emit, derive, check, verify, tune and tradeoff do",
+             "lobatto stability knows no constraints yet; run, sweep, emit, derive, check, verify, tune and tradeoff "
+             "do",
          })
         CHECK_MESSAGE(ran.out.find(line) != std::string::npos, line);
 }

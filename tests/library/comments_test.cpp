@@ -57,7 +57,7 @@ const std::string include = "-I" LOBATTO_SOURCE_DIR "/library/include";
 TEST_CASE("the examples in the comments of lobatto.hpp compile without a warning, and do what they say" *
           doctest::test_suite("slow")) {
     const std::vector<std::string> examples = examples_of("lobatto.hpp");
-    REQUIRE(examples.size() == 7);
+    REQUIRE(examples.size() == 8);
     const std::string said =
         output_of("#include <cstdio>\n#include <fstream>\n#include <lobatto/lobatto.hpp>\n", examples,
                   {"g++", "-std=c++17", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-unused-variable", include}, ".cpp");

@@ -37,7 +37,7 @@ static void show_texts(const lobatto_scene* scene) {
     show("plain", lobatto_emit_plain(scene, NULL));
 
     lobatto_settings settings = {0};
-    settings.splitting = 4;
+    settings.splitting = 6;
     show_refusal("splitting", lobatto_stability_json(scene, &settings));
     settings.points = 4;
     show_refusal("two methods", lobatto_derivation(scene, &settings));

@@ -161,7 +161,8 @@ LOBATTO_C_API const char* lobatto_trajectory_warning(const lobatto_trajectory* t
 
 typedef struct lobatto_sweep lobatto_sweep;
 
-/* `columns` arrays of `count` numbers; names[c] is a position q, a velocity q' or momentum p_q, or a parameter.
+/* `columns` arrays of `count` numbers; names[c] is a position q, a velocity q' or momentum p_q, or a parameter. Errors
+ * are not measured.
  *
  *     const double q[] = {0.5, 1, 1.5}, omega[] = {6, 6, 7};
  *     const char *const names[] = {"q", "omega"};
@@ -179,6 +180,8 @@ LOBATTO_C_API const char* lobatto_sweep_message(const lobatto_sweep* sweep);
 LOBATTO_C_API size_t lobatto_sweep_count(const lobatto_sweep* sweep);
 LOBATTO_C_API const int* lobatto_sweep_statuses(const lobatto_sweep* sweep); /* of each; 0: it reached the end */
 LOBATTO_C_API const char* lobatto_sweep_status_text(const lobatto_sweep* sweep, int status);
+LOBATTO_C_API size_t lobatto_sweep_warnings(const lobatto_sweep* sweep);
+LOBATTO_C_API const char* lobatto_sweep_warning(const lobatto_sweep* sweep, size_t index);
 LOBATTO_C_API const double* lobatto_sweep_t(const lobatto_sweep* sweep);
 LOBATTO_C_API const double* lobatto_sweep_q(const lobatto_sweep* sweep);
 LOBATTO_C_API const double* lobatto_sweep_p(const lobatto_sweep* sweep);
@@ -219,7 +222,8 @@ LOBATTO_C_API const char* lobatto_text_file(const lobatto_text* text); /* "arm.h
 
 typedef struct lobatto_choice lobatto_choice;
 
-/* The cheapest method and step that keep an error to the end, relative to the amplitude. `budget`: seconds to search.
+/* The cheapest method and step that keep an error to the end, relative to the amplitude. The settings name no method
+ * and no step. `budget`: seconds to search, at least 1.
  *
  *     lobatto_settings settings = {0};
  *     settings.until = "2";

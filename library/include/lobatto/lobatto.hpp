@@ -71,6 +71,8 @@ struct Variable {
 };
 
 /// What stands in for the scene's own; what is empty is as the scene has it. The words are those of the command line.
+/// A call refuses those that have no meaning for it: what is derived, emitted, checked or proved takes a method and
+/// numbers alone.
 struct Settings {
     std::optional<int> points, stages, splitting;          ///< of Lobatto, Gauss, a splitting method; one at most
     std::optional<double> tolerance;                       ///< of the iteration of a step, relative
@@ -235,6 +237,7 @@ struct Trajectory {
     std::int64_t steps = 0;
     double seconds = 0;          ///< of processor time in the kernel
     std::string stopped_by;      ///< the stop that ended it; "" when it went to its end
+    bool reaches_end = true;     ///< else the end is no multiple of the step: it ended at the last one before
     bool interrupted = false;    ///< by `progress`
     std::string method, digest;  ///< of the kernel
     double step = 0;
@@ -281,9 +284,11 @@ struct Starts {
 };
 
 struct SweepOptions : Settings {
-    std::vector<std::string> keep;  ///< "first(b = pi)", "max(H)": instead of the last states
-    int threads = 0;                ///< 0: as many as the machine runs
-    bool measure = false;           ///< errors by companions, which take 3/2 of the sweep's time
+    std::vector<std::string> keep;      ///< "first(b = pi)", "max(H)": instead of the last states
+    std::optional<std::int64_t> steps;  ///< instead of an end time
+    int threads = 0;                    ///< 0: as many as the machine runs
+    bool measure = true;                ///< errors by companions, which take 3/2 of the sweep's time
+    bool beyond_horizon = false;        ///< trajectories of which nothing is left are no failures
     std::function<bool(double)> progress;
 };
 
@@ -308,6 +313,7 @@ struct Sweep {
     std::vector<std::string> statuses;  ///< in words, by number
     States states;
     bool interrupted = false;
+    std::vector<std::string> warnings;
 };
 /// All of them at once, on all processors.
 ///
@@ -324,6 +330,42 @@ struct Sweep {
 ///
 LOBATTO_API Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options = {});
 
+/// Many trajectories of one scene that the caller takes forward together, side by side in vector registers, on the
+/// thread that calls. What is done with all of them at once, to an end that is known, sweep() does on all processors.
+///
+///     lob::Ensemble ensemble(scene, {3, {{"q", {0.5, 1, 1.5}}}});
+///     const double stiffer[] = {7, 7, 8};
+///     while (ensemble.t() < 1) {
+///         ensemble.advance(5);
+///         ensemble.set("omega", stiffer);
+///     }
+///     std::printf("q = %g, %g, %g\n", ensemble.q()[0], ensemble.q()[1], ensemble.q()[2]);
+///
+class LOBATTO_API Ensemble {
+public:
+    Ensemble(const Scene& scene, const Starts& starts, const Settings& settings = {});
+    Ensemble(Ensemble&&) noexcept;
+    Ensemble& operator=(Ensemble&&) noexcept;
+    ~Ensemble();
+
+    std::size_t count() const;
+    std::size_t coordinates() const;
+    double step_size() const;
+    double t() const;  ///< of all that go on
+
+    /// A trajectory whose step fails stays where it was, and the others go on.
+    void advance(std::int64_t steps);
+    const std::vector<int>& status() const;  ///< 0: it goes on; else as in Sweep
+    const double* q() const;                 ///< count x n; the same place for as long as the ensemble lives
+    const double* p() const;
+    /// A parameter or an input, a value for each trajectory, from the next step on.
+    void set(const std::string& name, const double* values);
+
+private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
+
 // --- Choosing --------------------------------------------------------------------------------------------------------
 
 struct Choice {
@@ -334,7 +376,8 @@ struct Choice {
     double seconds = 0;          ///< what the motion costs with it
     bool complete = false;       ///< no member that was not tried can be expected to win
 };
-/// The cheapest member of the family, and its step, that keep an error to the end. `budget`: seconds to search.
+/// The cheapest member of the family, and its step, that keep an error to the end. `settings` name no method and no
+/// step; `lobatto tune` tries clocks too. `budget`: seconds to search, at least 1.
 /// `progress`: told what is being done; false ends the search, which then throws ComputationError.
 ///
 ///     lob::Settings settings;

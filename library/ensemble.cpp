@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Many trajectories that the caller takes forward together.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "library/opened_sweep.hpp"
+#include "runtime/run/ensemble/side_by_side.hpp"
+
+namespace lobatto::api {
+
+namespace {
+
+// As many as go side by side, with their parameters; those that are left over repeat the last.
+struct Lanes {
+    std::unique_ptr<Trajectories> trajectories;
+    std::size_t first, count;  // of the ensemble
+    std::vector<double> parameters, q, p;
+    std::vector<std::int32_t> status;
+    std::vector<std::int64_t> steps_done, iterations;
+};
+
+std::unique_ptr<SweepStudy> study_of(const Scene& scene, const Starts& starts, const Settings& settings) {
+    SweepOptions options;
+    static_cast<Settings&>(options) = settings;
+    options.measure = false;
+    options.threads = 1;  // the caller's
+    auto parts = std::make_shared<Scene::Parts>(scene.parts());
+    lobatto::Scene& read = parts->scene;
+    read.outputs.kept.clear();  // which is of whole motions
+    if (starts.count == 0)
+        throw InputError(read.path + ": an ensemble has one trajectory at least; there are 0 starts");
+    if (read.clock || !read.run.stops.empty())
+        throw InputError(
+            fmt::format("{}: the trajectories of an ensemble are all at one time, but the scene has {}; leave it out, "
+                        "or take sweep()",
+                        read.path, read.clock ? "a clock" : "stops"));
+    if (in_algebra([&] { return with_method(scene, settings); }).method.numbers != Precision::double_)
+        throw InputError(read.path + ": ensembles are computed in double; leave `numbers` out, or take sweep()");
+    return open_sweep(Scene(parts), request_of(starts), options);
+}
+
+}  // namespace
+
+struct Ensemble::Parts {
+    std::unique_ptr<SweepStudy> study;
+    std::vector<Variable> parameters;  // as the scene has them
+    std::vector<double> step;
+    std::int64_t steps = 0;  // taken
+    std::vector<Lanes> lanes;
+    std::vector<double> q, p;
+    std::vector<int> status;
+
+    Parts(const Scene& scene, const Starts& starts, const Settings& settings)
+        : study(study_of(scene, starts, settings)),
+          parameters(in_algebra([&] { return parameters_of(study->scene()); })),
+          step{request().step},
+          q(starts.count * n()),
+          p(starts.count * n()),
+          status(starts.count) {
+        LoadedStepper<double> stepper(kernel());
+        EnsembleStart start;
+        const auto width = static_cast<std::size_t>(std::max(kernel()->lanes, 1));
+        for (std::size_t first = 0; first < starts.count; first += width) {
+            Lanes& side_by_side = lanes.emplace_back();
+            if (kernel()->lanes > 0)
+                side_by_side.trajectories = std::make_unique<LaneTrajectories>(kernel());
+            else
+                side_by_side.trajectories = std::make_unique<SingleTrajectory>(kernel(), request());
+            side_by_side.first = first;
+            side_by_side.count = std::min(width, starts.count - first);
+            side_by_side.status.resize(width);
+            side_by_side.steps_done.resize(width);
+            side_by_side.iterations.resize(width);
+            for (std::size_t lane = 0; lane < width; ++lane) {
+                if (lane < side_by_side.count) begin(first + lane, stepper, start);
+                const auto put = [](const std::vector<double>& from, std::vector<double>& to) {
+                    to.insert(to.end(), from.begin(), from.end());
+                };
+                put(start.parameters, side_by_side.parameters);
+                put(start.q, side_by_side.q);
+                put(start.rate, side_by_side.p);
+            }
+            restart(side_by_side);
+        }
+    }
+
+    const lobatto::Kernel& kernel() const { return *study->first_setting().kernel; }
+    const EnsembleRequest& request() const { return study->first_setting().request; }
+    std::size_t n() const { return study->scene().coordinates.size(); }
+    double time() const { return request().time + static_cast<double>(steps) * step[0]; }
+
+    // A start with its momenta; those that have none are not numbers.
+    void begin(std::size_t index, LoadedStepper<double>& stepper, EnsembleStart& start) const {
+        study->starts().start(static_cast<std::int64_t>(index), start);
+        if (!request().from_velocities) return;
+        if (stepper.prepare(start.parameters, step[0]) == LOBATTO_OK)
+            start.rate = stepper.momentum(request().time, start.q, start.rate);
+        else
+            std::fill(start.rate.begin(), start.rate.end(), std::nan(""));
+    }
+
+    void restart(Lanes& side_by_side) {
+        std::fill(side_by_side.status.begin(), side_by_side.status.end(), LOBATTO_OK);
+        side_by_side.trajectories->prepare(side_by_side.parameters, step, side_by_side.status.data());
+        side_by_side.trajectories->start(time(), side_by_side.q, side_by_side.p, side_by_side.status.data());
+        hand_out(side_by_side);
+    }
+    // One that has failed before stays as it was.
+    void hand_out(const Lanes& side_by_side) {
+        for (std::size_t lane = 0; lane < side_by_side.count; ++lane) {
+            const std::size_t index = side_by_side.first + lane;
+            if (status[index] != 0) continue;
+            status[index] = side_by_side.status[lane];
+            const auto copy = [&](const std::vector<double>& from, std::vector<double>& to) {
+                std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(lane * n()), n(),
+                            to.begin() + static_cast<std::ptrdiff_t>(index * n()));
+            };
+            copy(side_by_side.q, q);
+            copy(side_by_side.p, p);
+        }
+    }
+
+    void advance(std::int64_t count) {
+        for (Lanes& side_by_side : lanes) {
+            const auto goes_on = [](std::int32_t one) { return one == LOBATTO_OK; };
+            if (std::none_of(side_by_side.status.begin(), side_by_side.status.end(), goes_on)) continue;
+            side_by_side.trajectories->advance(request(), count, side_by_side.status.data(),
+                                               side_by_side.steps_done.data(), side_by_side.iterations.data());
+            side_by_side.trajectories->state(side_by_side.q, side_by_side.p);
+            hand_out(side_by_side);
+        }
+        steps += count;
+    }
+
+    void set(std::size_t parameter, const double* values) {
+        for (Lanes& side_by_side : lanes) {
+            const std::size_t all = side_by_side.parameters.size() / side_by_side.status.size();
+            for (std::size_t lane = 0; lane < side_by_side.status.size(); ++lane)
+                side_by_side.parameters[lane * all + parameter] =
+                    values[side_by_side.first + std::min(lane, side_by_side.count - 1)];
+            restart(side_by_side);
+        }
+    }
+};
+
+Ensemble::Ensemble(const Scene& scene, const Starts& starts, const Settings& settings)
+    : parts_(guarded([&] { return std::make_unique<Parts>(scene, starts, settings); })) {}
+Ensemble::Ensemble(Ensemble&&) noexcept = default;
+Ensemble& Ensemble::operator=(Ensemble&&) noexcept = default;
+Ensemble::~Ensemble() = default;
+
+std::size_t Ensemble::count() const {
+    return parts_->status.size();
+}
+std::size_t Ensemble::coordinates() const {
+    return parts_->n();
+}
+double Ensemble::step_size() const {
+    return parts_->step[0];
+}
+double Ensemble::t() const {
+    return parts_->time();
+}
+const double* Ensemble::q() const {
+    return parts_->q.data();
+}
+const double* Ensemble::p() const {
+    return parts_->p.data();
+}
+const std::vector<int>& Ensemble::status() const {
+    return parts_->status;
+}
+
+void Ensemble::advance(std::int64_t steps) {
+    guarded([&] {
+        if (steps < 0) throw InputError(fmt::format("advance: {} is no number of steps", steps));
+        parts_->advance(steps);
+    });
+}
+
+void Ensemble::set(const std::string& name, const double* values) {
+    guarded([&] { parts_->set(index_of(parts_->parameters, name), values); });
+}
+
+}  // namespace lobatto::api

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "library/whole.hpp"
+
+#include <fmt/format.h>
+
+#include "analysis/kernel/support_text.hpp"
+#include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/constraints/constraints.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
+
+namespace lobatto::api {
+
+Checked checked(const Scene& scene, const Settings& settings, bool general) {
+    refuse_values(settings, "check");
+    return check_scene(with_method(scene, settings), general);
+}
+
+Description described(const Scene& scene, const Settings& settings) {
+    refuse_values(settings, "derive");
+    return describe(derive(with_method(scene, settings)));
+}
+
+KernelSource emitted(const Scene& scene, const Settings& settings, const EmitWish& wish) {
+    refuse_values(settings, "emit");
+    const lobatto::Scene changed = with_method(scene, settings);
+    EmitOptions options{changed.method.numbers, {}};
+    if (wish.standalone)
+        options.support_text = [&](const std::vector<std::string>& parts) {
+            return support_text(wish.ensemble ? with_ensemble(parts) : parts);
+        };
+    return lobatto::emit(derive_kernel(changed, wish.general), options);
+}
+
+PlainSource plainly_emitted(const Scene& scene, const Settings& settings) {
+    refuse_values(settings, "emit");
+    const lobatto::Scene changed = with_method(scene, settings);
+    return lobatto::emit_plain(changed, changed.method.numbers);
+}
+
+StabilityReport stability_of(const Scene& scene, const Settings& settings) {
+    const lobatto::Scene changed = with_method(scene, settings);
+    refuse_clock(changed, "lobatto stability");
+    refuse_constraints(changed, "lobatto stability");
+    refuse_impacts(changed, "lobatto stability");
+    MethodChoice::require_double(changed, "stability");
+    if (changed.method.family == Family::splitting)
+        throw lobatto::InputError(fmt::format(
+            "{}: what is exact here is of Lobatto and Gauss; choose one (--points 4), or ask for the limits of the "
+            "method alone: lobatto stability --splitting {}",
+            changed.path, changed.method.points));
+    return stability_report(changed, overrides_of(settings));
+}
+
+Proof proof_of(const Scene& scene, const Settings& settings, const Heard& say) {
+    refuse_values(settings, "verify");
+    return prove(
+        scene.parts().scene, method_of(settings), say ? say : [](const std::string&, double) {});
+}
+
+}  // namespace lobatto::api

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What is found, written, chosen and proved of a scene, with all that is known of it: lobatto.hpp hands out what is
+// worth a promise, the command line prints the rest too. Both come here, so there is one way.
+//
+// These throw what the parts of the program throw; callers stand in in_algebra() or guarded() (parts.hpp).
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "analysis/checked_scene.hpp"
+#include "analysis/proof/proof.hpp"
+#include "analysis/stability/report.hpp"
+#include "analysis/tradeoff/choice.hpp"
+#include "generator/describe/describe.hpp"
+#include "generator/pipeline.hpp"
+#include "library/parts.hpp"
+
+namespace lobatto::api {
+
+// `general`: with no shortcut.
+Checked checked(const Scene& scene, const Settings& settings, bool general = false);
+Description described(const Scene& scene, const Settings& settings);
+
+struct EmitWish {
+    bool general = false;
+    bool standalone = true;  // carries kernel.hpp inside
+    bool ensemble = false;   // that with lobatto::Ensemble
+};
+KernelSource emitted(const Scene& scene, const Settings& settings, const EmitWish& wish);
+PlainSource plainly_emitted(const Scene& scene, const Settings& settings);
+
+StabilityReport stability_of(const Scene& scene, const Settings& settings);
+
+// `say` hears what is being checked, and about which part of all work is behind.
+using Heard = std::function<void(const std::string&, double)>;
+Proof proof_of(const Scene& scene, const Settings& settings, const Heard& say = {});
+
+// A scene as it is written, and with the values of settings.
+struct ChangedScene {
+    lobatto::Scene written, changed;
+};
+// For what measures a scene: `command` says that walls have no place there.
+ChangedScene measurable(const Scene& scene, const Settings& settings, const std::string& command);
+// Seconds that measuring may take: InputError where they are no time. `written`: as errors show it.
+void check_budget(double seconds, const std::string& written);
+
+// The cheapest method and step that keep `request.error` in `request.seconds`; Interrupted where that ended it.
+struct FoundChoice {
+    lobatto::Scene scene;  // with the values of the settings
+    lobatto::Choice choice;
+};
+FoundChoice choice_for(const Scene& scene, const Settings& settings, const ChoiceRequest& request);
+
+}  // namespace lobatto::api
