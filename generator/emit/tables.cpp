@@ -92,6 +92,10 @@ std::string general_shapes(const Derivation& d) {
     text += places("mass", mass);
     line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
          d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
+    const bool hamiltonian = d.structure.hamiltonian().has_value();
+    line(text, fmt::format("bool hamiltonian = {}", hamiltonian),
+         hamiltonian ? "velocities and forces are formulas of positions and momenta"
+                     : "velocities of momenta are solved for");
     const auto slopes = places_of(d.system.constraint_q);
     line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
     line(text, fmt::format("int constraint_entries = {}", slopes.size()),

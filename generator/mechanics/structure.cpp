@@ -304,6 +304,14 @@ private:
                                size * size));
         describe_groups();
         if (cyclic.empty() && !constrained) repetition();
+        velocities_of_momenta();
+    }
+
+    void velocities_of_momenta() {
+        if (scene_.quaternions.empty() || result_.looped) return;
+        auto [hamiltonian, reason] = find_hamiltonian(scene_, system_);
+        find("velocities of momenta", hamiltonian.has_value(), reason);
+        general_.hamiltonian = std::move(hamiltonian);
     }
 
     void elimination() {

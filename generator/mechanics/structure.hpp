@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "generator/mechanics/elements.hpp"
+#include "generator/mechanics/hamiltonian.hpp"
 #include "generator/mechanics/system.hpp"
 #include "generator/method/quadrature.hpp"
 
@@ -71,6 +72,7 @@ struct SeparableForm : ConstantMassForm {
 struct GeneralForm {
     bool full = false;  // asked for: nothing is looked for, matrices are full
     Routhian routhian;
+    std::optional<Hamiltonian> hamiltonian;  // iterations take velocities and forces of momenta (D62)
 };
 enum class Form { linear_map, separable, general };  // in the order of Structure's variant
 
@@ -87,6 +89,7 @@ struct Structure {
     const ConstantMassForm& constant_mass() const;
     const SeparableForm& separable() const { return std::get<SeparableForm>(of_form); }
     const Routhian& routhian() const { return std::get<GeneralForm>(of_form).routhian; }
+    const std::optional<Hamiltonian>& hamiltonian() const { return std::get<GeneralForm>(of_form).hamiltonian; }
     // A linear map is taken as a separable step.
     void iterate();
     // Of any form: false where the form has no such thing.

@@ -23,7 +23,9 @@
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
 //   multiplier_terms(k, q, velocity, r, s) what multipliers follow from; `constant_mass` that M is constant and forces
-//   hold no velocity. `angles`: how many sines and cosines `stage` takes as a last argument (base/angles.hpp).
+//   hold no velocity. `hamiltonian` that velocity(k, q, p, velocity) and force(k, q, velocity, p, F) are formulas,
+//   which take the place of `stage`. `angles`: how many sines and cosines `stage` takes as a last argument
+//   (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 
@@ -71,7 +73,9 @@ struct Formulas {
     LOBATTO_WITH_TIME(slopes)
     LOBATTO_WITH_TIME(stage)
     LOBATTO_WITH_TIME(legendre)
-    LOBATTO_WITH_TIME(momentum)  // of Form::general
+    LOBATTO_WITH_TIME(momentum)  // of Form::general, as the next two
+    LOBATTO_WITH_TIME(velocity)
+    LOBATTO_WITH_TIME(force)
     LOBATTO_WITH_TIME(event)
     LOBATTO_WITH_TIME(impact)
     LOBATTO_WITH_TIME(reset)
