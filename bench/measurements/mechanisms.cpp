@@ -92,7 +92,7 @@ std::vector<Best> best_for(const Contest& contest, const Contestant& contestant,
         const Scene scene = bare_scene(contestant.scene, points);
         const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
         double error_before = 0, seconds_before = 0;
-        for (double step = contest.longest_step; step > contest.longest_step / 300; step /= std::sqrt(2)) {
+        for (double step = contest.longest_step; step > contest.longest_step / 600; step /= std::sqrt(2)) {
             const auto steps = static_cast<std::int64_t>(std::ceil(contest.until / step));
             const std::optional<Measured> measured = measure(scene, kernel, steps, contest.until, contestant, 7);
             const double error = measured ? apart(measured->place, exact) : 0;
@@ -179,13 +179,13 @@ int main() {
          4},
         {"Lagrange's top to t = 50: body, Euler's angles",
          50,
-         0.8,
+         1.6,
          {"rigid_top", axis_of_quaternion},
          {"lagrange_top", axis_of_angles},
          2},
         {"top with three moments to t = 20: body, Euler's angles",
          20,
-         0.4,
+         0.8,
          {three_moments_body, axis_of_quaternion},
          {three_moments_angles, axis_of_angles},
          2},

@@ -249,6 +249,13 @@ private:
         compare(claim, force_, machine_.get("Lq", n_), force_size_);
         machine_.run("legendre");
         compare(claim, p_, machine_.get("p", n_), p_size_);
+        if (derivation_.structure.hamiltonian()) {
+            machine_.set("p", p_);
+            machine_.run("velocity");
+            compare(claim, values_of(system_.v), machine_.get("velocity", n_));
+            machine_.run("force");
+            compare(claim, force_, machine_.get("F", n_), force_size_);
+        }
         std::vector<ex> mass;
         for (const auto& [place, value] : system_.momentum_v.entries())
             mass.push_back(system_.momentum[static_cast<std::size_t>(place.first)].diff(

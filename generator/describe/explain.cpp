@@ -15,8 +15,6 @@ namespace {
 
 using GiNaC::ex;
 
-constexpr int most_iterated = 16;  // coordinates of the general form: `most_full` of base/contract.hpp
-
 bool holds_any(const SparseMatrix& matrix, const std::vector<GiNaC::symbol>& symbols) {
     return std::any_of(matrix.entries().begin(), matrix.entries().end(), [&](const auto& entry) {
         return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return entry.second.has(s); });

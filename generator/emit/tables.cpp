@@ -94,6 +94,10 @@ std::string general_shapes(const Derivation& d) {
          d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
     line(text, fmt::format("bool scaled_mass = {}", d.structure.scaled_mass()),
          d.structure.scaled_mass() ? "M is one function times a constant matrix" : "masses change in different ways");
+    const bool hamiltonian = d.structure.hamiltonian().has_value();
+    line(text, fmt::format("bool hamiltonian = {}", hamiltonian),
+         hamiltonian ? "velocities and forces are formulas of positions and momenta"
+                     : "velocities of momenta are solved for");
     const auto slopes = places_of(d.system.constraint_q);
     line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
     line(text, fmt::format("int constraint_entries = {}", slopes.size()),

@@ -19,6 +19,7 @@ public:
         node();
         velocities_as_inputs();
         mechanics();
+        if (d_.structure.hamiltonian()) hamiltonian(*d_.structure.hamiltonian());
         events();
         return std::move(p_);
     }
@@ -64,7 +65,8 @@ private:
         for (std::size_t k = 0; k < n_; ++k) slopes.outputs.push_back({at("Lq", k), force[k]});
         stage.outputs = slopes.outputs;
         p_.programs.push_back(std::move(slopes));
-        program("momentum", "p", momentum);
+        const auto& bodies = d_.structure.hamiltonian();
+        program("momentum", "p", bodies ? momentum_of(*bodies) : momentum);
         for (std::size_t k = 0; k < n_; ++k) legendre.outputs.push_back({at("p", k), momentum[k]});
         std::size_t e = 0;
         for (const auto& [place, value] : d_.system.momentum_v.entries()) {
@@ -76,11 +78,88 @@ private:
             ++e;
         }
         p_.programs.push_back(std::move(legendre));
-        p_.programs.push_back(std::move(stage));
+        if (!bodies) p_.programs.push_back(std::move(stage));
         constraints();
         if (d_.scene.clock) p_.programs.push_back({"clock", {{"", convert(d_.scene.clock->rate), Effect::give_back}}});
         if (d_.scene.outputs.energy || d_.scene.clock)
             p_.programs.push_back({"energy", {{"", energy(), Effect::give_back}}});
+    }
+
+    // Of vectors x in the coordinates, one for each k: (q e_k) . x for quaternions, x for others.
+    Ids along_bodies(const Hamiltonian& bodies, const Ids& x) {
+        Ids result = x;
+        for (const auto& places : bodies.quaternions)
+            for (std::size_t k = 0; k < 4; ++k) {
+                Ids terms;
+                for (std::size_t j = 0; j < 4; ++j)
+                    terms.push_back(signed_product(quaternion_product[k][j], places, q_, x[places[j]]));
+                result[places[k]] = g().add(terms);
+            }
+        return result;
+    }
+    // The transpose: sum_k (q e_k)_j x_k.
+    Ids across_bodies(const Hamiltonian& bodies, const Ids& x) {
+        Ids result = x;
+        for (const auto& places : bodies.quaternions)
+            for (std::size_t j = 0; j < 4; ++j) {
+                Ids terms;
+                for (std::size_t k = 0; k < 4; ++k)
+                    terms.push_back(signed_product(quaternion_product[k][j], places, q_, x[places[k]]));
+                result[places[j]] = g().add(terms);
+            }
+        return result;
+    }
+    Id signed_product(const Signed& part, const std::array<std::size_t, 4>& places, const Ids& q, Id x) {
+        const Id product = g().multiply({q[places[part.place]], x});
+        return part.sign > 0 ? product : g().negate(product);
+    }
+    Ids times(const SparseMatrix& matrix, const Ids& x) {
+        std::vector<Ids> terms(n_);
+        for (const auto& [place, value] : matrix.entries())
+            terms[static_cast<std::size_t>(place.first)].push_back(
+                g().multiply({convert(value), x[static_cast<std::size_t>(place.second)]}));
+        Ids result;
+        for (const Ids& row : terms) result.push_back(g().add(row));
+        return result;
+    }
+
+    // Each part of a quaternion by n.
+    Ids by_length(const Hamiltonian& bodies, Ids x) {
+        for (const auto& places : bodies.quaternions) {
+            Ids squares;
+            for (const std::size_t place : places) squares.push_back(g().power(q_[place], 2));
+            const Id inverse = g().power(g().add(squares), -1);
+            for (const std::size_t place : places) x[place] = g().multiply({inverse, x[place]});
+        }
+        return x;
+    }
+    // w = B^T q' / n
+    Ids quasi_velocities(const Hamiltonian& bodies) { return by_length(bodies, along_bodies(bodies, velocity_)); }
+
+    // (D62) p = B J w / n.
+    Ids momentum_of(const Hamiltonian& bodies) {
+        return by_length(bodies, across_bodies(bodies, times(bodies.mass, quasi_velocities(bodies))));
+    }
+
+    // (D62) q' = B N B^T p, and F = -dH/dq: of a quaternion sum_k w_k p e_k, the first part negative.
+    void hamiltonian(const Hamiltonian& bodies) {
+        Program prepare{"prepare", {}};
+        for (const ex& pivot : bodies.pivots)
+            if (const Id id = convert(pivot); !g().is_constant(id)) prepare.outputs.push_back({"pivot", id});
+        p_.programs.push_back(std::move(prepare));
+        Ids p, force;
+        for (std::size_t k = 0; k < n_; ++k) p.push_back(in("p", k));
+        program("velocity", "velocity", across_bodies(bodies, times(bodies.inverse, along_bodies(bodies, p))));
+        const Ids w = quasi_velocities(bodies);
+        for (const ex& at_rest : bodies.force) force.push_back(convert(at_rest));
+        for (const auto& places : bodies.quaternions)
+            for (std::size_t j = 0; j < 4; ++j) {
+                Ids terms{force[places[j]], g().negate(g().multiply({p[places[j]], w[places[0]]}))};
+                for (std::size_t k = 1; k < 4; ++k)
+                    terms.push_back(signed_product(quaternion_product[k][j], places, p, w[places[k]]));
+                force[places[j]] = g().add(terms);
+            }
+        program("force", "F", force);
     }
 
     // (D44) phi, dphi/dt and G.

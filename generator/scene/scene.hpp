@@ -4,6 +4,7 @@
 
 #include <ginac/ginac.h>
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -180,6 +181,8 @@ struct Scene {
     // run-time parameters. For pictures.
     std::vector<std::pair<GiNaC::ex, GiNaC::ex>> places;
     std::vector<DrawnBody> bodies;
+    // Positions that together turn a body, a quaternion of any length (D53).
+    std::vector<std::array<GiNaC::symbol, 4>> quaternions;
     std::vector<MovingFigure> figures;        // empty: what the coordinates tell (cli/view/figures.hpp)
     std::vector<Plot> plots;                  // likewise
     std::vector<GiNaC::ex> initial_position;  // in parameters

@@ -62,8 +62,15 @@ concept GeneralFormulas = requires(const typename K::Coefficients& k, Time... t,
     K::legendre(k, t..., in, in, out, out);
     K::slopes(k, t..., in, in, out, out);
 }
-&&(!K::any_number || requires(const typename K::Coefficients& k, Time... t, const typename K::real* in,
-                              typename K::real* out) { K::stage(k, t..., in, in, out, out, out); }) &&
+&&(!K::any_number || K::hamiltonian ||
+   requires(const typename K::Coefficients& k, Time... t, const typename K::real* in, typename K::real* out) {
+       K::stage(k, t..., in, in, out, out, out);
+   }) &&
+    (!K::hamiltonian ||
+     requires(const typename K::Coefficients& k, Time... t, const typename K::real* in, typename K::real* out) {
+         K::velocity(k, t..., in, in, out);
+         K::force(k, t..., in, in, in, out);
+     }) &&
     (!K::has_energy ||
      requires(const typename K::Coefficients& k, Time... t, const typename K::real* in) {
          { K::energy(k, t..., in, in) } -> std::convertible_to<typename K::real>;

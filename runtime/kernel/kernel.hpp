@@ -25,6 +25,7 @@
 #include "iteration/galerkin.hpp"
 #include "iteration/galerkin_equations.hpp"
 #include "iteration/galerkin_newton.hpp"
+#include "iteration/hamilton.hpp"
 #include "iteration/neighbours.hpp"
 #include "iteration/newton.hpp"
 #include "iteration/node_mass.hpp"

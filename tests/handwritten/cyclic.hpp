@@ -23,7 +23,7 @@ struct HandwrittenPlane : HandwrittenKernel, Tables {
     static constexpr int entry_row[5] = {0, 1, 1, 2, 2};
     static constexpr int entry_column[5] = {0, 1, 2, 1, 2};
     static constexpr int mass_entries = 2, mass_row[2] = {0, 1}, mass_column[2] = {0, 1};
-    static constexpr bool constant_mass = false;
+    static constexpr bool constant_mass = false, hamiltonian = false;
     static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
 };
 

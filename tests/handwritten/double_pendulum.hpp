@@ -30,7 +30,7 @@ struct HandwrittenDoublePendulum : HandwrittenKernel, Tables {
     static constexpr int entry_row[16] = {0, 0, 1, 1, 0, 0, 1, 1, 2, 3, 2, 3, 2, 3, 2, 3};
     static constexpr int entry_column[16] = {0, 1, 0, 1, 2, 3, 2, 3, 0, 0, 1, 1, 2, 3, 3, 2};
     static constexpr int mass_entries = 4;
-    static constexpr bool constant_mass = false;
+    static constexpr bool constant_mass = false, hamiltonian = false;
     static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
     static constexpr int mass_row[4] = {0, 0, 1, 1}, mass_column[4] = {0, 1, 0, 1};
 

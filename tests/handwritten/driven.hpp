@@ -38,7 +38,7 @@ struct HandwrittenDrivenGeneral : HandwrittenDriven<number, Tables> {
     static constexpr int active = 1, cyclic = 0, active_index[1] = {0}, cyclic_index[1] = {0};
     static constexpr int entries = 3, entry_row[3] = {0, 1, 1}, entry_column[3] = {0, 1, 0};
     static constexpr int mass_entries = 1, mass_row[1] = {0}, mass_column[1] = {0};
-    static constexpr bool constant_mass = false;
+    static constexpr bool constant_mass = false, hamiltonian = false;
     static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
 
     static void slope(const Coefficients& k, real time, const real* z, real* g) {

@@ -306,6 +306,7 @@ private:
                                size * size));
         describe_groups();
         if (cyclic.empty() && !constrained) repetition();
+        velocities_of_momenta();
         if (!constrained && !result_.looped && !result_.linear) masses();
     }
 
@@ -316,13 +317,20 @@ private:
             std::all_of(entries.begin(), entries.end(), [](const auto& e) { return e.first.first == e.first.second; });
         general_.scaled_mass = has_scaled_mass(scene_, system_);
         general_.light_mass = general_.scaled_mass && diagonal;
-        if (n_ == 1) return;
+        if (n_ == 1 || general_.hamiltonian) return;
         find("scaled mass matrix", general_.scaled_mass,
              general_.scaled_mass ? "all masses change alike: M is one function times a constant matrix, so an "
                                     "iteration divides by that function and solves nothing"
              : diagonal           ? "each mass changes in its own way; no two velocities are multiplied, so an "
                                     "iteration divides by each"
                                   : "the masses change in different ways, so an iteration factors M at every node");
+    }
+
+    void velocities_of_momenta() {
+        if (scene_.quaternions.empty() || result_.looped) return;
+        auto [hamiltonian, reason] = find_hamiltonian(scene_, system_);
+        find("velocities of momenta", hamiltonian.has_value(), reason);
+        general_.hamiltonian = std::move(hamiltonian);
     }
 
     void elimination() {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "generator/mechanics/repeated/elements.hpp"
+#include "generator/mechanics/structure/hamiltonian.hpp"
 #include "generator/mechanics/system/system.hpp"
 #include "generator/method/quadrature.hpp"
 
@@ -72,6 +73,7 @@ struct GeneralForm {
     bool scaled_mass = false;  // M = m(q, v, t) M0 with a constant M0 (scaled_mass.hpp)
     bool light_mass = false;   // and M0 is diagonal
     Routhian routhian;
+    std::optional<Hamiltonian> hamiltonian;  // iterations take velocities and forces of momenta (D62)
 };
 enum class Form { linear_map, separable, general };  // in the order of Structure's variant
 
@@ -88,6 +90,7 @@ struct Structure {
     const ConstantMassForm& constant_mass() const;
     const SeparableForm& separable() const { return std::get<SeparableForm>(of_form); }
     const Routhian& routhian() const { return std::get<GeneralForm>(of_form).routhian; }
+    const std::optional<Hamiltonian>& hamiltonian() const { return std::get<GeneralForm>(of_form).hamiltonian; }
     // A linear map is taken as a separable step.
     void iterate();
     // Of any form: false where the form has no such thing.

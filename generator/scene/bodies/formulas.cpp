@@ -34,6 +34,31 @@ void SystemReader::Bodies::read() {
     }
 }
 
+// 0, 1 or -1 where the expression is that whatever the parameters: at the scene's values, and at others.
+ex SystemReader::Bodies::plain(const ex& expression) const {
+    if (GiNaC::is_a<GiNaC::numeric>(expression)) return expression;
+    std::vector<GiNaC::exmap> points{reader_.parameter_values_};
+    for (int point = 1; point <= 2; ++point) {
+        GiNaC::exmap elsewhere;
+        for (const auto& [symbol, value] : reader_.parameter_values_) {
+            const long k = static_cast<long>(elsewhere.size());
+            elsewhere[symbol] = value * GiNaC::numeric(7 * point + k + 1, 7 * point + k) +
+                                GiNaC::numeric(point + 1, 11 * point + 3 * k + 7);
+        }
+        points.push_back(elsewhere);
+    }
+    try {
+        for (const int number : {0, 1, -1}) {
+            const auto is_number = [&](const GiNaC::exmap& point) {
+                return real_value(expression - number, point).is_zero();  // a sum that cancels is exactly 0
+            };
+            if (std::all_of(points.begin(), points.end(), is_number)) return number;
+        }
+    } catch (const NoValue&) {
+    }
+    return expression;
+}
+
 ex SystemReader::Bodies::formula(const Entry& entry, const std::string& owner, bool positive) {
     GiNaC::numeric value = 0;
     const std::string what = fmt::format("the {} of {}", entry.key, owner);
@@ -61,6 +86,7 @@ std::vector<ex> SystemReader::Bodies::components(const Entry* entry, const std::
 }
 
 void SystemReader::Bodies::read_body(Line& line) {
+    line.body.plain = [this](const ex& expression) { return plain(expression); };
     line.body.mass = formula(line.table.get("mass", "for example mass = 1"), line.body.name, true);
     line.body.inertia = read_inertia(*line.table.find("inertia"), line.body.name);
     if (line.joint) refuse_velocities(line);

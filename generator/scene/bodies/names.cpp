@@ -133,6 +133,8 @@ void SystemReader::Bodies::declare_coordinates(Line& line) {
     for (std::size_t k = 0; !line.joint && k < (body.plane ? 2 : 3); ++k)
         add_coordinates(line.place, body.name, axis_names[k], body.at);
     add_coordinates(line.turn, body.name, body.plane ? "angle" : "q", body.at, body.plane ? 1 : 4);
+    const std::vector<GiNaC::symbol>& q = line.turn.q;
+    if (!body.plane) reader_.scene_.quaternions.push_back({q[0], q[1], q[2], q[3]});
 }
 
 void SystemReader::Bodies::add_coordinates(Symbols& symbols, const std::string& owner, const std::string& part,

@@ -64,6 +64,7 @@ private:
     void declare_quantity(const std::string& name, const std::vector<std::string>& indices,
                           const std::vector<long>& sizes);
 
+    ex plain(const ex& expression) const;
     ex formula(const Entry& entry, const std::string& owner, bool positive = false);
     std::vector<ex> components(const Entry* entry, const std::string& owner, std::size_t count, const ex& otherwise);
     void read_body(Line& line);

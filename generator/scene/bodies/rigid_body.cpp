@@ -43,6 +43,10 @@ Vector unit(std::size_t k) {
     return result;
 }
 
+Vector plain(const RigidBody& body, const Vector& a) {
+    return {body.plain(a[0]), body.plain(a[1]), body.plain(a[2])};
+}
+
 ex square(const Quaternion& q) {
     return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
 }
@@ -85,10 +89,11 @@ Matrix rotation_about(const Vector& axis, const ex& angle) {
 
 // A point of space as drawn, and a direction, in the frame of a body; of the ground: space.
 Vector point_in(const RigidBody* body, const Vector& point) {
-    return body == nullptr ? point : transposed(body->drawn_rotation) * (point - body->drawn_place);
+    if (body == nullptr) return point;
+    return plain(*body, transposed(body->drawn_rotation) * (point - body->drawn_place));
 }
 Vector direction_in(const RigidBody* body, const Vector& direction) {
-    return body == nullptr ? direction : transposed(body->drawn_rotation) * direction;
+    return body == nullptr ? direction : plain(*body, transposed(body->drawn_rotation) * direction);
 }
 // And back, as the body moves.
 Vector point_of(const RigidBody* body, const Vector& point) {
@@ -117,12 +122,15 @@ Relative relative(const RigidBody& body, const RigidBody* parent, const Vector& 
         const ex angle = body.drawn_angle - (parent == nullptr ? ex(0) : parent->drawn_angle) + turned;
         return {rotation_in_plane(angle), angle, {}};
     }
-    const Matrix in_space = turned.is_zero() ? body.drawn_rotation : rotation_about(axis, turned) * body.drawn_rotation;
+    Matrix rotation =
+        parent == nullptr ? body.drawn_rotation : transposed(parent->drawn_rotation) * body.drawn_rotation;
+    for (Vector& row : rotation) row = plain(body, row);
+    if (!turned.is_zero()) rotation = rotation_about(direction_in(parent, axis), turned) * rotation;
     const ex c = cos(turned / 2), s = sin(turned / 2);
     const Quaternion orientation = product({c, axis[0] * s, axis[1] * s, axis[2] * s}, body.drawn_orientation);
-    if (parent == nullptr) return {in_space, 0, orientation};
+    if (parent == nullptr) return {rotation, 0, orientation};
     const Quaternion& d = parent->drawn_orientation;
-    return {transposed(parent->drawn_rotation) * in_space, 0, product({d[0], -d[1], -d[2], -d[3]}, orientation)};
+    return {rotation, 0, product({d[0], -d[1], -d[2], -d[3]}, orientation)};
 }
 
 // R and omega of (D55), without the joint's own turn.

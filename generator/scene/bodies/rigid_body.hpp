@@ -5,6 +5,7 @@
 #include <ginac/ginac.h>
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -38,6 +39,8 @@ struct RigidBody {
     GiNaC::ex drawn_angle = 0;  // in a plane
     Matrix drawn_rotation = {};
     Quaternion drawn_orientation = {1, 0, 0, 0};  // of length 1
+    // 0, 1 and -1 where a formula has this value whatever the parameters.
+    std::function<GiNaC::ex(const GiNaC::ex&)> plain = [](const GiNaC::ex& formula) { return formula; };
 
     // As it moves: x and R lead from its frame to space, v is that of its centre.
     Vector x = {};

@@ -24,7 +24,9 @@
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
 //   multiplier_terms(k, q, velocity, r, s) what multipliers follow from; `constant_mass` that M is constant and forces
 //   hold no velocity, `scaled_mass` that M is a function times a constant matrix: then `stage` gives one over the first
-//   entry of M in place of M. `angles`: how many sines and cosines `stage` takes as a last argument (base/angles.hpp).
+//   entry of M in place of M. `hamiltonian` that velocity(k, q, p, velocity) and force(k, q, velocity, p, F) are
+//   formulas, which take the place of `stage`. `angles`: how many sines and cosines `stage` takes as a last argument
+//   (base/angles.hpp).
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 
@@ -72,7 +74,9 @@ struct Formulas {
     LOBATTO_WITH_TIME(slopes)
     LOBATTO_WITH_TIME(stage)
     LOBATTO_WITH_TIME(legendre)
-    LOBATTO_WITH_TIME(momentum)  // of Form::general
+    LOBATTO_WITH_TIME(momentum)  // of Form::general, as the next two
+    LOBATTO_WITH_TIME(velocity)
+    LOBATTO_WITH_TIME(force)
     LOBATTO_WITH_TIME(event)
     LOBATTO_WITH_TIME(impact)
     LOBATTO_WITH_TIME(reset)

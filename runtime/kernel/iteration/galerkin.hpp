@@ -8,7 +8,8 @@
 //     V_i = 0 q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j
 // An iteration takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps
 // the last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every
-// iteration. Angles are taken from those at the start of the step (base/angles.hpp).
+// iteration. Angles are taken from those at the start of the step (base/angles.hpp). Where velocities are formulas of
+// positions and momenta, iteration/hamilton.hpp takes the place of this.
 #ifndef LOBATTO_KERNEL_GALERKIN_HPP
 #define LOBATTO_KERNEL_GALERKIN_HPP
 
@@ -19,6 +20,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "convergence.hpp"
+#include "hamilton.hpp"
 #include "node_mass.hpp"
 #include "stage_map.hpp"
 
@@ -43,6 +45,8 @@ inline const MomentumIntegration<K> momentum_integration<K, true>{};  // MPFR is
 
 template <class K, class T>
 struct GalerkinFixedPoint {
+    using Kernel = K;
+    using Number = T;
     using real = typename K::real;
     static constexpr int n = K::coordinates, r = K::nodes;
     using Layout = NodeLayout<real, T, r - 1, node_lanes<real>>;  // r nodes
@@ -60,13 +64,15 @@ struct GalerkinFixedPoint {
     }
 
     struct Arrays {
-        V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[parts * mass_room];
-        T flat[n * parts * width], flat_v[n * parts * width], inverse_scale[n];
+        V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[K::hamiltonian ? 1 : parts * mass_room];
+        V P[K::hamiltonian ? parts * n : 1];
+        T flat[n * parts * width], flat_v[n * parts * width], inverse_scale[n], middle[K::hamiltonian ? n : 1];
         AngleTable<V, parts, K::angles> near;
     };
 
     V position_map[r][parts], momentum_map[r][parts];  // h A and h A', a column for each node
     V weight[parts], legendre[parts];                  // h b and pi; zero in lanes to spare
+    V on_legendre[parts];                              // b pi / sum b pi^2; likewise
     V ahead[r][parts], node_time[parts];
     real h{};
     real tolerance{};             // of increments, relative; 0: to rounding
@@ -82,6 +88,8 @@ struct GalerkinFixedPoint {
 
     void prepare(real step) {
         h = step;
+        real square = real(0);
+        for (int i = 0; i < r; ++i) square += K::b[i] * K::legendre_polynomial[i] * K::legendre_polynomial[i];
         for (int i = 0; i < parts * width; ++i) {
             const bool is_node = i < r;
             const int node = is_node ? i : r - 1;
@@ -93,6 +101,7 @@ struct GalerkinFixedPoint {
             put(node_time, i, h * K::c[node]);
             put(weight, i, is_node ? h * K::b[node] : real(0));
             put(legendre, i, K::legendre_polynomial[node]);
+            put(on_legendre, i, is_node && has_kappa() ? K::b[node] * K::legendre_polynomial[node] / square : real(0));
         }
     }
 
@@ -128,6 +137,7 @@ struct GalerkinFixedPoint {
     }
 
 private:
+    friend HamiltonIteration<GalerkinFixedPoint>;
     static void put(V* values, int i, real x) {
         if constexpr (in_lanes)
             set_lane(values[i / width], i % width, x);
@@ -195,6 +205,7 @@ private:
             kappa_now[c] = kappa[c];
         }
         if constexpr (K::angles > 0) prepare_angles(k, time, q, a);
+        if constexpr (K::hamiltonian) HamiltonIteration<GalerkinFixedPoint>::begin(*this, k, time, q, a);
         // Velocities are kept, positions are made of them: more rounding, and ratios that tell less.
         const Convergence<T, 1, Pace<4, 90, 32>> rule{T(real(2) * least)};
         ActiveMask solved = active & !active;
@@ -243,6 +254,18 @@ private:
     // One iteration; the largest change of a velocity, relative.
     template <class Given, class Time>
     LOBATTO_INLINE T iterate(const Given& k, const Time& time, const T* q, const T* p, T* kappa_now, Arrays& a) {
+        if constexpr (K::hamiltonian) {
+            const T lost = HamiltonIteration<GalerkinFixedPoint>::velocities(*this, k, time, p, kappa_now, a);
+            return maximum(lost, move(q, a));
+        } else {
+            velocities(k, time, p, kappa_now, a);
+            return move(q, a);
+        }
+    }
+
+    // The new velocities, in place of Lv.
+    template <class Given, class Time>
+    LOBATTO_INLINE void velocities(const Given& k, const Time& time, const T* p, T* kappa_now, Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) {
             V packed[Mass::given];
@@ -279,6 +302,10 @@ private:
             correct(kappa_now, a);
         else if constexpr (has_kappa())
             correct_each(kappa_now, a);
+    }
+
+    // With the new velocities to new positions; the largest change of a velocity, relative.
+    LOBATTO_INLINE T move(const T* q, Arrays& a) const {
         V worst = V(real(0));
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {

@@ -283,6 +283,10 @@ private:
 
     // With the multipliers that the momentum would need to keep the constraints.
     Status velocity(real time, const real* position, const real* momentum, real* v, real* mu) const {
+        if constexpr (K::hamiltonian) {
+            Formulas<K>::velocity(coefficients, time, position, momentum, v);
+            return is_finite(not_finite_part(v, n)) ? Status::ok : Status::not_finite;
+        }
         const auto of_last_step = [this](real* guess) {
             real position_there[n];
             if (has_history) polynomial(real(1), position_there, guess);

@@ -85,6 +85,37 @@ TEST_CASE("a body brings coordinates, their start and its kinetic energy") {
     CHECK(scene.lagrangian_text == "T(top) + -g*top.z(0, 0, 2)");
 }
 
+TEST_CASE("a lever that vanishes whatever the parameters is left out, one that only the scene makes 0 is not") {
+    const std::string joint =
+        "[joints]\ntip = { type = \"ball\", bodies = [\"ground\", \"top\"], point = [0, 0, 0] }\n";
+    const auto lagrangian_of = [&](const std::string& place, const std::string& turn) {
+        const Scene scene = scene_of(
+            "lagrangian = \"-top.z\"\n[parameters]\nl = 1\nd = 0\n[bodies]\ntop = { mass = 2, "
+            "inertia = [1, 2, 2.5], position = " +
+            place + ", orientation = " + turn + " }\n" + joint);
+        GiNaC::exmap symbols;  // the same for all scenes
+        static const std::vector<GiNaC::symbol> common{
+            GiNaC::symbol("a"), GiNaC::symbol("b"), GiNaC::symbol("c"), GiNaC::symbol("d"), GiNaC::symbol("e"),
+            GiNaC::symbol("f"), GiNaC::symbol("g"), GiNaC::symbol("h"), GiNaC::symbol("l"), GiNaC::symbol("m")};
+        for (std::size_t k = 0; k < 4; ++k) {
+            symbols[scene.coordinates[k].position] = common[k];
+            symbols[scene.coordinates[k].velocity] = common[4 + k];
+        }
+        for (std::size_t k = 0; k < 2; ++k) symbols[scene.parameters[k].symbol] = common[8 + k];
+        return ex(scene.lagrangian.subs(symbols));
+    };
+    const auto holds = [](const ex& lagrangian, const std::string& name) {
+        for (auto part = lagrangian.preorder_begin(); part != lagrangian.preorder_end(); ++part)
+            if (GiNaC::is_a<GiNaC::symbol>(*part) && GiNaC::ex_to<GiNaC::symbol>(*part).get_name() == name) return true;
+        return false;
+    };
+    const std::string lying = "[\"cos(pi/4)\", \"sin(pi/4)\", 0, 0]", upright = "[1, 0, 0, 0]";
+    CHECK((lagrangian_of("[0, -1, 0]", lying) - lagrangian_of("[0, 0, 1]", upright)).is_zero());
+    const ex leaning = lagrangian_of("[0, \"-sin(l)\", \"cos(l)\"]", "[\"cos(l/2)\", \"sin(l/2)\", 0, 0]");
+    CHECK((leaning - lagrangian_of("[0, 0, 1]", upright)).is_zero());
+    CHECK(holds(lagrangian_of("[d, 0, 1]", upright), "m"));  // d
+}
+
 TEST_CASE("names of bodies stand in formulas, those of bodies on joints too") {
     const Scene scene = scene_of(
         "lagrangian = \"-arm.y - far.y(1, 0) + 0*far.x'*far.omega + 0*far.R[1,2]'\"\n[bodies]\n" + arm +
