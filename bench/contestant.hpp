@@ -36,6 +36,7 @@ struct Contestant {
     // Seconds from formulas to a loaded program, nothing cached; where `prepare` does not tell them.
     std::function<double()> cold_start = {};
     double coarsest = 1e-3, finest = 1e-16, ratio = std::sqrt(10);  // of tolerances, and from one to the next
+    double fewest_steps = 0;  // where the scan of steps begins; 0: where the problem says
 };
 
 using Contestants = std::vector<Contestant>;

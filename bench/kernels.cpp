@@ -107,20 +107,6 @@ const std::vector<double>& tolerances_of(const Problem& problem) {
 // `steps` steps of h of each trajectory.
 using Run = std::function<Effort(double h, std::int64_t steps, std::vector<Trajectory>& trajectories)>;
 
-// A kernel takes momenta, a trajectory has velocities: p times masses, or divided by them.
-template <class Operation>
-void change_momenta(const std::vector<double>& masses, std::vector<Trajectory>& trajectories, const Operation& change) {
-    for (Trajectory& trajectory : trajectories)
-        for (std::size_t k = 0; k < masses.size(); ++k) trajectory.p[k] = change(trajectory.p[k], masses[k]);
-}
-std::vector<double> masses_of(const Problem& problem) {
-    return with_type_of(problem, [](auto type) {
-        std::vector<double> masses;
-        for (int k = 0; k < decltype(type)::coordinates; ++k) masses.push_back(type.mass(k));
-        return masses;
-    });
-}
-
 Run run_of(const Problem& problem, const Kernel& kernel, double tolerance) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
     const auto run = [stepper, tolerance](double h, std::int64_t steps,
@@ -172,6 +158,7 @@ Contestant contestant_of(const Problem& problem, Method method, double tolerance
         const double h = problem.until / setting;
         const auto steps = static_cast<std::int64_t>(setting);
         if (h > longest) {
+            if (!problem.clocks.empty()) return {};  // no time to prove it: steps with a clock are there
             const auto [place, is_new] = proven->try_emplace(steps, false);
             if (is_new) place->second = endures(problem, run, steps, trajectories.front());
             if (!place->second) return {};
@@ -180,7 +167,7 @@ Contestant contestant_of(const Problem& problem, Method method, double tolerance
     };
     const std::string name = method.name() + (tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
     Contestant contestant{name, method.order(), true, true, Ladder::steps, race};
-    contestant.cold_start = [&problem, method, together] { return cold_start_seconds(problem, method, together); };
+    contestant.cold_start = [&problem, method, together] { return cold_start_seconds(problem, method, together, ""); };
     return contestant;
 }
 
@@ -191,17 +178,26 @@ Kernel kernel_for(const KernelSource& source, std::int64_t together) {
 
 }  // namespace
 
-KernelSource source_of(const Problem& problem, Method method) {
-    Scene scene = read_scene(scene_path(problem));
+std::vector<double> masses_of(const Problem& problem) {
+    return with_type_of(problem, [](auto type) {
+        std::vector<double> masses;
+        for (int k = 0; k < decltype(type)::coordinates; ++k) masses.push_back(type.mass(k));
+        return masses;
+    });
+}
+
+KernelSource source_of(const Problem& problem, Method method, const std::string& clock) {
+    const Source file = Source::read(scene_path(problem));
+    const std::string with_clock = clock.empty() ? "" : fmt::format("\n[method]\nclock = \"{}\"\n", clock);
+    Scene scene = read_scene(Source(file.path(), file.content() + with_clock));
     scene.method = method;
     return emit(derive(scene));
 }
 
-Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together) {
-    const bool separable = derive(read_scene(scene_path(problem))).system.separable;
-    const std::vector<Method> methods = methods_in_race(problem, few, separable);
+std::vector<Kernel> kernels_of(const Problem& problem, const std::vector<Method>& methods, std::int64_t together,
+                               const std::string& clock) {
     std::vector<KernelSource> sources;
-    for (const Method& method : methods) sources.push_back(source_of(problem, method));
+    for (const Method& method : methods) sources.push_back(source_of(problem, method, clock));
     // Compilers side by side; the generator itself is for one thread.
     std::atomic<std::size_t> next = 0;
     std::vector<std::future<void>> workers;
@@ -211,17 +207,24 @@ Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t to
                 compile(translation_of(sources[j], Precision::double_, together));
         }));
     for (std::future<void>& worker : workers) worker.get();
+    std::vector<Kernel> kernels;
+    for (const KernelSource& source : sources) kernels.push_back(kernel_for(source, together));
+    return kernels;
+}
+
+Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together) {
+    const bool separable = derive(read_scene(scene_path(problem))).system.separable;
+    const std::vector<Method> methods = methods_in_race(problem, few, separable);
+    const std::vector<Kernel> kernels = kernels_of(problem, methods, together, "");
     Contestants contestants;
-    for (std::size_t i = 0; i < methods.size(); ++i) {
-        const Kernel kernel = kernel_for(sources[i], together);
+    for (std::size_t i = 0; i < methods.size(); ++i)
         for (const double tolerance : tolerances_of(problem))
             if (tolerance == 0 || methods[i].family != Family::splitting)
-                contestants.push_back(contestant_of(problem, methods[i], tolerance, kernel, together));
-    }
+                contestants.push_back(contestant_of(problem, methods[i], tolerance, kernels[i], together));
     return contestants;
 }
 
-double cold_start_seconds(const Problem& problem, Method method, std::int64_t together) {
+double cold_start_seconds(const Problem& problem, Method method, std::int64_t together, const std::string& clock) {
     const char* const variable = "LOBATTO_CACHE_DIR";
     const char* const before = std::getenv(variable);
     const std::string saved = before == nullptr ? "" : before;
@@ -231,7 +234,7 @@ double cold_start_seconds(const Problem& problem, Method method, std::int64_t to
         if (mkdtemp(folder.data()) == nullptr) throw MachineError("cannot create a folder in the temporary folder");
         setenv(variable, folder.c_str(), 1);
         const auto start = std::chrono::steady_clock::now();
-        kernel_for(source_of(problem, method), together);
+        kernel_for(source_of(problem, method, clock), together);
         best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
         std::filesystem::remove_all(folder);
     }

@@ -20,6 +20,7 @@ Problem eccentric(const std::string& name, double eccentricity, double revolutio
     problem.reference = Reference::closed;
     problem.positions_only = true;
     problem.revolutions = revolutions;
+    problem.clocks = {"auto"};
     return problem;
 }
 
@@ -68,10 +69,12 @@ const std::vector<Problem>& problems() {
              2.04, Reference::quadruple_for_one, 1}};
         Problem p6 = eccentric("P6", 0.9, 100);
         p6.longest_step = 0.1;
-        p6.frequency = 31.6;  // of the circle at pericentre
+        p6.frequency = 31.6;          // of the circle at pericentre
+        p6.fewest_chain_steps = 400;  // 4 a revolution: 2.1 radians of that circle, below every limit of stability
         Problem p7 = eccentric("P7", 0.99, 10);
         p7.longest_step = 0.01;
         p7.frequency = 1000;
+        p7.fewest_chain_steps = 60;
         p7.spread = 1e-5;  // 5e-3 would escape
         const std::vector<double> corners = {1, 3, -2, -1, 1, -1};
         Problem p8{"P8",
@@ -86,10 +89,18 @@ const std::vector<Problem>& problems() {
                    Reference::quadruple,
                    0.1};
         p8.positions_only = true;
+        p8.clocks = {"auto"};
+        p8.fewest_chain_steps = 30;
         Problem p8b = p8;
         p8b.name = "P8b";
         p8b.title = "Pythagorean, to 20";
         p8b.until = 20;
+        p8b.fewest_chain_steps = 60;
+        Problem p8c = p8;
+        p8c.name = "P8c";
+        p8c.title = "Pythagorean, to 40";
+        p8c.until = 40;
+        p8c.fewest_chain_steps = 120;
         // Two stars, e = 0.6, at apocentre, and a third one around them.
         Problem p9{"P9",
                    "hierarchical triple",
@@ -105,7 +116,9 @@ const std::vector<Problem>& problems() {
         p9.positions_only = true;
         p9.revolutions = 10'000;
         p9.most_steps = 5'000'000;
-        for (Problem& problem : {std::ref(p6), std::ref(p7), std::ref(p8), std::ref(p8b), std::ref(p9)})
+        p9.clocks = {"auto"};
+        p9.fewest_chain_steps = 40'000;
+        for (Problem& problem : {std::ref(p6), std::ref(p7), std::ref(p8), std::ref(p8b), std::ref(p8c), std::ref(p9)})
             list.push_back(problem);
         return list;
     }();

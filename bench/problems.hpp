@@ -214,11 +214,13 @@ struct Problem {
     double longest_step;  // where the scan of steps begins
     double frequency;     // the highest of small motions: our steps stay within the linear stability limit
     Reference reference = Reference::quadruple_for_one;
-    double reference_step = 0;    // where there is a pace, times the pace
-    double spread = 1e-3;         // how far the starts of an ensemble lie apart
-    bool positions_only = false;  // are compared, because velocities are large where bodies are close
-    double revolutions = 0;       // in T; where steps are counted by revolution
-    long most_steps = 200'000;    // of an adaptive method, whose solution has escaped to infinity else
+    double reference_step = 0;             // where there is a pace, times the pace
+    double spread = 1e-3;                  // how far the starts of an ensemble lie apart
+    bool positions_only = false;           // are compared, because velocities are large where bodies are close
+    double revolutions = 0;                // in T; where steps are counted by revolution
+    long most_steps = 200'000;             // of an adaptive method, whose solution has escaped to infinity else
+    std::vector<std::string> clocks = {};  // of our steps that follow the motion
+    double fewest_chain_steps = 0;         // of them, where their scan begins
 };
 const std::vector<Problem>& problems();
 

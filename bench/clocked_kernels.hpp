@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Our contestants whose steps follow the motion: kernels of the scenes of bench/scenes/ with a clock.
+#pragma once
+
+#include "bench/contestant.hpp"
+
+namespace lobatto::bench {
+
+// Of several methods and tolerances with each clock of the problem; none where it has no clock. An ensemble's
+// trajectories go one after another. `few`: of some methods.
+Contestants clocked_contestants(const Problem& problem, bool few);
+
+}  // namespace lobatto::bench
