@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -236,6 +237,64 @@ TEST_CASE("no two headers define a type of the same name: the linker would mix t
             }
         }
     CHECK(home.size() > 200);
+}
+
+namespace {
+
+// The functions that begin in the first column of a file, as "name(types of its parameters)".
+std::set<std::string> signatures(const fs::path& file, bool only_anonymous) {
+    static const std::regex declaration(R"(^[\w:<>,&*\[\] ]+[ &*](\w+)\((.*)\)[^()]*[;{]$)"),
+        name(R"([ &*]\w+(?: = .*)?$)");
+    std::set<std::string> result;
+    std::smatch match;
+    bool is_anonymous = false;
+    std::string joined;
+    for (const std::string& line : lines(file)) {
+        if (line == "namespace {") is_anonymous = true;
+        if (line == "}  // namespace") is_anonymous = false;
+        const bool continues = !joined.empty() && line.starts_with(' ');
+        if (!continues && (line.empty() || std::isalpha(static_cast<unsigned char>(line[0])) == 0)) continue;
+        joined = continues ? joined + ' ' + line.substr(line.find_first_not_of(' ')) : line;
+        if (!joined.ends_with(';') && !joined.ends_with('{')) continue;
+        if (joined.size() < 1000 && is_anonymous == only_anonymous && std::regex_match(joined, match, declaration)) {
+            std::string types, parameter;
+            int depth = 0;
+            for (const char c : match[2].str() + ',') {
+                depth += (c == '<' || c == '(') - (c == '>' || c == ')');
+                if (c == ',' && depth == 0) {
+                    types += std::regex_replace(parameter, name, "") + ';';
+                    parameter.clear();
+                } else if (c != ' ' || !parameter.empty()) {
+                    parameter += c;
+                }
+            }
+            result.insert(match[1].str() + '(' + types + ')');
+        }
+        joined.clear();
+    }
+    return result;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "no function of one file hides one of a header: in a folder that is one translation unit it would be called") {
+    std::map<std::string, std::string> declared;
+    for (const char* half : {"generator", "runtime", "analysis", "library", "cli"})
+        for (const fs::path& file : sources(half))
+            if (file.extension() == ".hpp" && file.string().find("runtime/kernel/") == std::string::npos)
+                for (const std::string& one : signatures(file, false)) declared.emplace(one, fs::relative(file, tree));
+    CHECK(declared.contains("print_row(const std::string&;const std::string&;)"));
+    CHECK(declared.size() > 500);
+    for (const char* half : {"generator", "runtime", "analysis", "library", "cli"})
+        for (const fs::path& file : sources(half))
+            if (file.extension() == ".cpp")
+                for (const std::string& one : signatures(file, true)) {
+                    const auto header = declared.find(one);
+                    if (header == declared.end()) continue;
+                    FAIL_CHECK(one << " of " << fs::relative(file, tree).string() << " hides that of "
+                                   << header->second);
+                }
 }
 
 TEST_CASE("every source file begins with its licence: MIT in what users ship, GPL elsewhere") {

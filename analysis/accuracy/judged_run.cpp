@@ -64,9 +64,9 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
             row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
             observers.domains.text(observers.parameters, row.data()));
     }
-    const std::string departure = observers.energy.departure(run.derivation, run.plain, request);
+    const std::string departure = observers.energy.departure(run.outline, run.plain, request);
     if (run.scene.clock || run.scene.is_cut()) return departure;
-    return departure.empty() ? linear_departure(run.derivation, run.scene, run.plain, request, result) : departure;
+    return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
 
 // Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
@@ -144,7 +144,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
     if (verdict.error && departure.empty()) verdict.warnings = warnings_of(*verdict.error, scene.run.error);
     if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
         for (const std::string& warning :
-             StepJudge::warnings(observers.judge.judge(run.derivation, run.plain, request, result)))
+             StepJudge::warnings(observers.judge.judge(run.outline, run.plain, request, result)))
             verdict.warnings.push_back(warning);
     verdict.failure = failure_of(run, request, result, observers, departure);
     return verdict;

@@ -22,7 +22,7 @@ namespace lobatto {
 // A scene, ready to run: its kernel compiled, its start in numbers.
 struct PreparedRun {
     Scene scene;
-    Outline derivation;
+    Outline outline;
     bool derived_from_cache;
     KernelSource source;
     Compiled compiled;
@@ -45,13 +45,13 @@ public:
     // `measures`: whether a companion runs beside it.
     RunObservers(const PreparedRun& run, const LoadedStepper<double>& stepper, const TrajectoryRequest& request,
                  const std::vector<double>& velocity, bool measures)
-        : watch(run.scene, run.derivation.closed_solution, stepper, velocity),
+        : watch(run.scene, run.outline.closed_solution, stepper, velocity),
           judge(run.scene),
-          energy(run.derivation, run.plain),
-          domains(run.scene, run.derivation.system),
+          energy(run.outline, run.plain),
+          domains(run.scene, run.outline.system),
           parameters(request.parameters),
           counts(1 + run.scene.reported().size(), 0) {
-        if (measures) companion.emplace(run.derivation, run.kernel, request);
+        if (measures) companion.emplace(run.outline, run.kernel, request);
     }
 
     void observe(const Records& records) {

@@ -92,7 +92,7 @@ void StepJudge::restore(const std::vector<double>& saved) {
     }
 }
 
-StepJudge::Judgement StepJudge::judge(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request,
+StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
                                       const TrajectoryResult& result) const {
     Judgement judgement;
     LoadedStepper<double> stepper(kernel);
@@ -127,7 +127,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& derivation, const Kernel& k
         const double time = state.row[0] + request.step / 2;
         look_at(time, within, stepper.momentum(time, within, velocity));
     }
-    judgement.limit = stability_limit(derivation.quadrature, judgement.radians);
+    judgement.limit = stability_limit(outline.quadrature, judgement.radians);
 
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     const std::vector<bool> moves = moving(least_, most_);

@@ -35,7 +35,7 @@ public:
         };
         std::optional<Unresolved> unresolved;  // the first such step that was found
     };
-    Judgement judge(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request,
+    Judgement judge(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
     // One warning a string.
     static std::vector<std::string> warnings(const Judgement& judgement);

@@ -88,8 +88,9 @@ ProofRow not_promised(const std::string& claim, const std::string& why) {
 }
 
 // The states at each hundredth step of a short run, as far as it goes.
-std::vector<std::pair<std::vector<double>, std::vector<double>>> states_along(const Kernel& kernel,
-                                                                              const Start<double>& start) {
+using States = std::vector<std::pair<std::vector<double>, std::vector<double>>>;
+
+States states_along(const Kernel& kernel, const Start<double>& start) {
     std::vector<std::pair<std::vector<double>, std::vector<double>>> states;
     TrajectoryRequest request;
     request.parameters = start.parameters;
@@ -315,31 +316,58 @@ void symplecticity_on_constraints(std::vector<ProofRow>& rows, const Kernel& exa
     }));
 }
 
+// A clock is another Lagrangian, whose steps are equal.
+Scene scene_to_prove(const Scene& written, const MethodChoice& method) {
+    Scene scene = in_clock_time(written);
+    scene.clock.reset();
+    method.apply(scene);
+    if (written.clock && scene.method.numbers != Precision::double_)
+        scene.source.fail(written.clock->at,
+                          "with a clock `lobatto verify` proves steps in double, but numbers are \"" +
+                              precision_name(scene.method.numbers) + "\"; remove the clock, or give --numbers double");
+    scene.outputs.energy = true;
+    scene.outputs.tangent = scene.coordinates.size() <= tangent_limit;
+    return scene;
+}
+
+// What is proved of steps is proved between impacts; the sides of switches are those of the start.
+Derivation without_walls(Derivation derivation) {
+    derivation.scene.impacts.clear();
+    derivation.scene.run.stops.clear();
+    derivation.scene.switches.clear();
+    return derivation;
+}
+
+// `unkept_by`: what lets the motion lose its energy; "" where it keeps it.
+void energies(std::vector<ProofRow>& rows, const Kernel& kernel, const Kernel& exact_kernel, const Start<double>& start,
+              const States& states, const std::string& unkept_by) {
+    const std::string claim = "H in double against quadruple";
+    const double defect = energy_defect(kernel, exact_kernel, start.parameters, start.step, states);
+    if (std::isnan(defect))
+        rows.push_back({claim, "energy too large", "not judged", true, ""});
+    else
+        rows.push_back(at_most(claim, defect, 1e-10,
+                               "terms of the energy cancel and take its digits with them; write the potential without "
+                               "differences of nearly equal terms"));
+    if (!unkept_by.empty())
+        rows.push_back(not_promised("bounded energy error", unkept_by));
+    else
+        energy(rows, kernel, start);
+}
+
 }  // namespace
 
 Proof prove(const Scene& written, const MethodChoice& method,
             const std::function<void(const std::string&, double)>& say) {
     say("deriving and compiling", 0);
-    Scene scene = in_clock_time(written);  // a clock is another Lagrangian, whose steps are equal
-    scene.clock.reset();
-    method.apply(scene);
+    const Scene scene = scene_to_prove(written, method);
     const Precision numbers = scene.method.numbers;
-    if (written.clock && numbers != Precision::double_)
-        scene.source.fail(written.clock->at,
-                          "with a clock `lobatto verify` proves steps in double, but numbers are \"" +
-                              precision_name(numbers) + "\"; remove the clock, or give --numbers double");
-    const bool with_tangent = scene.coordinates.size() <= tangent_limit;
-    scene.outputs.energy = true;
-    scene.outputs.tangent = with_tangent;
+    const bool with_tangent = scene.outputs.tangent;
     const ExactStart exact_start(scene);
     const GiNaC::numeric step = scene.evaluate(scene.run.step, "the step");
     if (!step.is_positive())
         throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
-    const Derivation with_walls = derive(scene);
-    Derivation derivation = with_walls;
-    derivation.scene.impacts.clear();  // what is proved of steps is proved between impacts
-    derivation.scene.run.stops.clear();
-    derivation.scene.switches.clear();  // their sides are those of the start
+    const Derivation with_walls = derive(scene), derivation = without_walls(with_walls);
     EmitOptions emit_options;
     const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
     emit_options.precision = Precision::quadruple;
@@ -385,18 +413,7 @@ Proof prove(const Scene& written, const MethodChoice& method,
     }));
     say("checking momenta and energy over long runs", 0.97);
     momenta(rows, kernel, start, scene);
-    const std::string energy_claim = "H in double against quadruple";
-    const double defect = energy_defect(kernel, exact_kernel, start.parameters, start.step, states);
-    if (std::isnan(defect))
-        rows.push_back({energy_claim, "energy too large", "not judged", true, ""});
-    else
-        rows.push_back(at_most(energy_claim, defect, 1e-10,
-                               "terms of the energy cancel and take its digits with them; write the potential without "
-                               "differences of nearly equal terms"));
-    if (forced || !derivation.system.autonomous)
-        rows.push_back(not_promised("bounded energy error", forced ? "forces" : "time"));
-    else
-        energy(rows, kernel, start);
+    energies(rows, kernel, exact_kernel, start, states, forced ? "forces" : derivation.system.autonomous ? "" : "time");
 
     if (numbers != Precision::double_ && numbers != Precision::quadruple) {
         say("compiling and checking numbers in " + precision_name(numbers), 0.98);

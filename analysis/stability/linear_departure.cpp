@@ -24,18 +24,18 @@ double floor_of(std::size_t n) {
 
 }  // namespace
 
-std::string linear_departure(const Outline& derivation, const Scene& scene, const Kernel& kernel,
+std::string linear_departure(const Outline& outline, const Scene& scene, const Kernel& kernel,
                              const TrajectoryRequest& request, const TrajectoryResult& result) {
     const std::size_t n = scene.coordinates.size();
-    const bool energy_tells = derivation.conserves_energy();
+    const bool energy_tells = outline.conserves_energy();
     LoadedStepper<double> stepper(kernel);
-    if (!derivation.system.linear || energy_tells || n > most_coordinates ||
+    if (!outline.system.linear || energy_tells || n > most_coordinates ||
         stepper.prepare(request.parameters, request.step) != LOBATTO_OK)
         return "";
     const double too_large = std::log(times_too_large) / static_cast<double>(result.steps_done);  // a step
     const auto measured = measured_rate(stepper, request.step, steps_measured);
     if (!measured || *measured - floor_of(n) < too_large) return "";
-    const System system = build_system(derivation.scene);
+    const System system = build_system(outline.scene);
     Linearisation linearisation(scene, system);
     const Eigen::VectorXd origin = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n));
     const double own = std::fmax(0, std::fabs(request.step) * linearisation.at(request.time, origin, origin).rate());
@@ -47,10 +47,10 @@ std::string linear_departure(const Outline& derivation, const Scene& scene, cons
         "h = {:.6g}; `lobatto stability{}` tells the limits.",
         std::ceil(std::log(times_too_large) / excess), result.time, list_text(result.q), list_text(result.p),
         std::exp(*measured), std::exp(own),
-        derivation.quadrature.method.family == Family::gauss ? "so long for this motion that rounding swamps it"
+        outline.quadrature.method.family == Family::gauss ? "so long for this motion that rounding swamps it"
                                                              : "beyond the stability of the method",
         request.step / 2,
-        derivation.quadrature.is_explicit() ? fmt::format(" --splitting {}", derivation.quadrature.method.points) : "");
+        outline.quadrature.is_explicit() ? fmt::format(" --splitting {}", outline.quadrature.method.points) : "");
 }
 
 }  // namespace lobatto

@@ -5,15 +5,15 @@
 
 namespace lobatto {
 
-Judges::Judges(const Scene& scene, const Outline& derivation, const KernelSource& plain, const Kernel& plain_kernel,
+Judges::Judges(const Scene& scene, const Outline& outline, const KernelSource& plain, const Kernel& plain_kernel,
                const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost,
                std::recursive_mutex& algebra)
     : request_(request),
-      watch_(derivation, plain, plain_kernel, request),
-      domains_(scene, derivation.system),
+      watch_(outline, plain, plain_kernel, request),
+      domains_(scene, outline.system),
       accepts_lost_(accepts_lost),
       algebra_(algebra) {
-    if (measures) companion_.emplace(derivation, kernel, plain_kernel, request);
+    if (measures) companion_.emplace(outline, kernel, plain_kernel, request);
 }
 
 Verdict Judges::judge(const EnsembleTrajectory& trajectory) {

@@ -45,7 +45,7 @@ class Judges {
 public:
     // What is handed over outlives it. `plain`, `plain_kernel`: in double. `measures`: errors, by companions;
     // `accepts_lost`: trajectories of which nothing is left are no failures.
-    Judges(const Scene& scene, const Outline& derivation, const KernelSource& plain, const Kernel& plain_kernel,
+    Judges(const Scene& scene, const Outline& outline, const KernelSource& plain, const Kernel& plain_kernel,
            const Kernel& kernel, const EnsembleRequest& request, bool measures, bool accepts_lost,
            std::recursive_mutex& algebra);
 

@@ -135,7 +135,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
                 : std::make_shared<const KernelSource>(derived_in(Precision::double_, derived.derivation.get()).source);
         known.outline = std::make_shared<const Outline>(std::move(derived.outline));
     }
-    setting->derivation = known.outline;
+    setting->outline = known.outline;
     setting->source = known.source;
     setting->plain_source = known.plain;
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
@@ -186,7 +186,7 @@ void SweepStudy::enter(std::int64_t number) {
     judges_.reset();
     current_ = prepare(number);
     const Setting& setting = *current_;
-    judges_.emplace(setting.scene, *setting.derivation, *setting.plain_source, *setting.plain, *setting.kernel,
+    judges_.emplace(setting.scene, *setting.outline, *setting.plain_source, *setting.plain, *setting.kernel,
                     setting.request, options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon,
                     *algebra_);
 }

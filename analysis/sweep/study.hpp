@@ -52,7 +52,7 @@ public:
         std::int64_t number = -1;
         Scene scene;
         Steps steps;
-        std::shared_ptr<const Outline> derivation;
+        std::shared_ptr<const Outline> outline;
         std::shared_ptr<const KernelSource> source;
         std::optional<Kernel> kernel;
         std::optional<Kernel> plain;  // in double

@@ -188,12 +188,8 @@ void measure(const Example& example, const std::string& kept, bool draws, Tables
     tables.pictures += fmt::format("![{0}](choosing/{0}.svg)\n", example.scene);
 }
 
-std::string page(const Tables& tables) {
-    std::string dashes;
-    for (std::size_t i = 0; i < std::size(long_steps); ++i) dashes += "---|";
-    const std::string head = "| scene | 1e-3 | 1e-6 | 1e-9 | 1e-12 |\n|---|---|---|---|---|\n";
-    return fmt::format(
-        R"(# Choosing a method
+constexpr const char* page_text =
+    R"(# Choosing a method
 
 Nobody has to: `lobatto tune SCENE --error 1e-8` chooses, and `lobatto tradeoff SCENE` shows the whole trade on your machine. This page says what they find. Its
 tables and pictures are written by a command, which takes some ten minutes, measures on the machine it runs on, and goes on where it was when it is called again:
@@ -286,17 +282,22 @@ The Pythagorean problem to t = 10 takes 0.2 ms for 1e-9 with a clock, 11 ms in e
 1e-9 is below the rounding of plain arithmetic; `tune` takes clean arithmetic then, in equal steps. A clock computes in
 double.
 
-With constraints the family is Lobatto's: `rod_double_pendulum` takes 9 points and 27 steps a unit of time for 1e-9 to
+With constraints the family is Lobatto's: `rod_double_pendulum` takes 9 points and 27 steps per unit of time for 1e-9 to
 t = 50. Positions and momenta count in the error, as ever; where walls throw the motion back, positions alone.
 
 ## The error of a run
 
 `lobatto run` measures its error, by a second run beside it: [how, and how well](errors.md).
-)",
-        fmt::arg("head", head), fmt::arg("winners", tables.winners), fmt::arg("pictures", tables.pictures),
-        fmt::arg("long_steps", fmt::join(long_steps, " | ")), fmt::arg("dashes", dashes),
-        fmt::arg("stiff", tables.stiff), fmt::arg("high", tables.high), fmt::arg("gauss", tables.gauss),
-        fmt::arg("types", tables.types));
+)";
+
+std::string page(const Tables& tables) {
+    std::string dashes;
+    for (std::size_t i = 0; i < std::size(long_steps); ++i) dashes += "---|";
+    const std::string head = "| scene | 1e-3 | 1e-6 | 1e-9 | 1e-12 |\n|---|---|---|---|---|\n";
+    return fmt::format(page_text, fmt::arg("head", head), fmt::arg("winners", tables.winners),
+                       fmt::arg("pictures", tables.pictures), fmt::arg("long_steps", fmt::join(long_steps, " | ")),
+                       fmt::arg("dashes", dashes), fmt::arg("stiff", tables.stiff), fmt::arg("high", tables.high),
+                       fmt::arg("gauss", tables.gauss), fmt::arg("types", tables.types));
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ struct CheckCommand {
 };
 
 // A label and a text, the text broken at blanks.
-void print_row(const std::string& label, const std::string& text) {
+void print_finding(const std::string& label, const std::string& text) {
     constexpr std::size_t left = 28, width = 82;
     std::string line;
     std::string head = label;
@@ -55,44 +55,44 @@ void print_findings(const std::string& heading, const std::vector<Finding>& find
     if (std::none_of(findings.begin(), findings.end(), [&](const Finding& f) { return f.holds == holds; })) return;
     fmt::print(std::cout, "\n{}\n", heading);
     for (const Finding& finding : findings)
-        if (finding.holds == holds) print_row(finding.name, finding.reason);
+        if (finding.holds == holds) print_finding(finding.name, finding.reason);
 }
 
 void print(const Checked& checked) {
     const Derivation& derivation = checked.derivation;
     const Scene& scene = derivation.scene;
     fmt::print(std::cout, "{} ({})\n\n", scene.title, scene.path);
-    print_row("Lagrangian", scene.lagrangian_text.size() <= 400
+    print_finding("Lagrangian", scene.lagrangian_text.size() <= 400
                                 ? scene.lagrangian_text
                                 : fmt::format("a formula of {} characters", scene.lagrangian_text.size()));
-    print_row("its kind", kind_of(derivation));
+    print_finding("its kind", kind_of(derivation));
     print_findings("Found, and put to use", derivation.findings, true);
     print_findings("Looked for, not found", derivation.findings, false);
 
     fmt::print(std::cout, "\nA step of {} (order {})\n", scene.method.name(), scene.method.order());
-    print_row("its form", form_of(derivation));
+    print_finding("its form", form_of(derivation));
     const auto compared = [](long here, long without) {
         return here == without ? std::string() : fmt::format("; {} without what was found", without);
     };
     const int unknowns = unknowns_of(derivation);
-    print_row("unknowns",
+    print_finding("unknowns",
               (unknowns == 0 ? "none" : std::to_string(unknowns)) + compared(unknowns, unknowns_of(checked.without)));
-    if (const std::string solver = solver_text(derivation); !solver.empty()) print_row("solved", solver);
+    if (const std::string solver = solver_text(derivation); !solver.empty()) print_finding("solved", solver);
     const long elimination = elimination_of(derivation);
     if (!derivation.structure.is_explicit())
-        print_row("elimination", fmt::format("some {} multiplications{}", elimination,
+        print_finding("elimination", fmt::format("some {} multiplications{}", elimination,
                                              compared(elimination, elimination_of(checked.without))));
 
     fmt::print(std::cout, "\nThe kernel\n");
     for (const CheckedOutput& output : checked.outputs)
-        print_row(output.name, !output.asked ? "not asked for, left out"
+        print_finding(output.name, !output.asked ? "not asked for, left out"
                                : output.operations == 0
                                    ? output.text
                                    : fmt::format("{}: {} operations", output.text, output.operations));
     // One function serves all points of a step.
-    print_row("operations", fmt::format("{} in all its formulas, each counted once{}", checked.operations,
+    print_finding("operations", fmt::format("{} in all its formulas, each counted once{}", checked.operations,
                                         compared(checked.operations, checked.operations_without)));
-    print_row("derived and written in", fmt::format("{:.2f} s", checked.seconds));
+    print_finding("derived and written in", fmt::format("{:.2f} s", checked.seconds));
 }
 
 void check(const CheckCommand& options) {

@@ -125,7 +125,7 @@ std::string origin_text(const PreparedRun& run) {
 
 // Of the first step, its equations solved to rounding.
 bool has_defect(const PreparedRun& run) {
-    return run.kernel.table().has_tangent != 0 && !run.derivation.system.has_forces();
+    return run.kernel.table().has_tangent != 0 && !run.outline.system.has_forces();
 }
 
 std::string defect_text(const PreparedRun& run) {
@@ -135,7 +135,6 @@ std::string defect_text(const PreparedRun& run) {
 
 void print_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                  const Watch& watch) {
-    const Outline& derivation = run.derivation;
     const Scene& scene = run.scene;
     const bool clocked = scene.clock.has_value();
     const std::string of_all =
@@ -147,7 +146,7 @@ void print_table(const PreparedRun& run, const TrajectoryRequest& request, const
     const lobatto_kernel& kernel = run.kernel.table();
     print_row("time per step", duration(result.seconds / static_cast<double>(steps)));
     print_row("iterations", iterations_text(kernel, result, steps));
-    const bool conserves = derivation.conserves_energy();
+    const bool conserves = run.outline.conserves_energy();
     if (scene.outputs.energy) {
         const double H0 = std::fabs(result.energy_start);
         const bool relative = conserves && H0 > result.energy_error_largest;

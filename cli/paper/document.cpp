@@ -9,7 +9,6 @@
 
 namespace lobatto {
 
-using paper::Finding;
 using paper::Verdict;
 
 namespace {
@@ -27,12 +26,12 @@ std::string code(const std::string& text) {
     return "`" + cell(text) + "`";
 }
 
-std::ptrdiff_t count(const std::vector<Finding>& findings, Verdict verdict) {
+std::ptrdiff_t count(const std::vector<paper::Finding>& findings, Verdict verdict) {
     return std::count_if(findings.begin(), findings.end(),
-                         [=](const Finding& finding) { return finding.verdict == verdict; });
+                         [=](const paper::Finding& finding) { return finding.verdict == verdict; });
 }
 
-std::string counts(const std::vector<Finding>& findings) {
+std::string counts(const std::vector<paper::Finding>& findings) {
     std::string text;
     for (Verdict verdict : verdicts)
         text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count(findings, verdict), name(verdict));
@@ -40,7 +39,7 @@ std::string counts(const std::vector<Finding>& findings) {
 }
 
 // The verdict with what belongs to it.
-std::string verdict_cell(const Finding& finding) {
+std::string verdict_cell(const paper::Finding& finding) {
     std::string text = "**" + name(finding.verdict) + "**";
     if (finding.verdict == Verdict::up_to_factor) text += " " + code(finding.mended);
     if (finding.verdict == Verdict::misprint) text += ", see above";
@@ -60,7 +59,7 @@ std::string order_text(const double (&errors)[3], int k) {
 
 }  // namespace
 
-std::string walk_document(const std::vector<Finding>& findings) {
+std::string walk_document(const std::vector<paper::Finding>& findings) {
     std::string text = fmt::format(
         "# The paper, formula by formula\n\n"
         "Written by `lobatto paper`. It reads F. Dubois and J. A. Rojas-Quintero, *A variational symplectic scheme "
@@ -78,7 +77,7 @@ std::string walk_document(const std::vector<Finding>& findings) {
         "reproduced; the misprints touch neither the scheme, nor its order, nor the published errors.\n\n## "
         "Misprints\n\n",
         findings.size(), counts(findings));
-    for (const Finding& finding : findings) {
+    for (const paper::Finding& finding : findings) {
         if (finding.verdict != Verdict::misprint) continue;
         text += fmt::format("**{}** (section {}): {}\n\n", finding.label, finding.section, finding.what);
         // A whole matrix is in the table below; the correction names its element.
@@ -89,7 +88,7 @@ std::string walk_document(const std::vector<Finding>& findings) {
         "## All statements\n\nUnnumbered formulas are named by the label before or after them. The paper's brackets, "
         "products and indices are written on one line: `q_{1−ξ}`, `V′_ξ`.\n";
     std::string section;
-    for (const Finding& finding : findings) {
+    for (const paper::Finding& finding : findings) {
         if (finding.section != section) {
             section = finding.section;
             text += fmt::format("\n### Section {}\n\n| where | printed | verdict | derived from |\n|---|---|---|---|\n",
@@ -135,15 +134,15 @@ std::string figure_document(const std::vector<Figure>& figures) {
     return text;
 }
 
-std::string walk_lines(const std::vector<Finding>& findings) {
+std::string walk_lines(const std::vector<paper::Finding>& findings) {
     std::size_t widest = 0;
     const auto width = [](const std::string& label) {  // code points
         return static_cast<std::size_t>(
             std::count_if(label.begin(), label.end(), [](char c) { return (c & 0xC0) != 0x80; }));
     };
-    for (const Finding& finding : findings) widest = std::max(widest, width(finding.label));
+    for (const paper::Finding& finding : findings) widest = std::max(widest, width(finding.label));
     std::string text;
-    for (const Finding& finding : findings) {
+    for (const paper::Finding& finding : findings) {
         text += fmt::format("§{} {}{}  {:<22}  {}\n", finding.section, finding.label,
                             std::string(widest - width(finding.label), ' '), name(finding.verdict), finding.what);
         if (finding.verdict == Verdict::misprint || finding.verdict == Verdict::inconsistent)

@@ -16,7 +16,7 @@ namespace lobatto {
 
 namespace {
 
-constexpr double omega = 2 * std::numbers::pi;
+constexpr double angular_frequency = 2 * std::numbers::pi;
 const char* const without_figures = "leave the figures out with --no-figures";
 constexpr double steps_of_growth[3] = {0.1, 0.05, 0.025};
 
@@ -36,15 +36,16 @@ std::string motion_data(PaperSystem system, double step, int steps, int fine) {
     for (int i = 0; i <= steps * fine; ++i) {
         const double t = step * i / fine;
         const PaperState exact = exact_state(system, t);
-        text +=
-            fmt::format("{:.6f},{:.6f},{:.6f}", t, static_cast<double>(exact.q), static_cast<double>(exact.p) / omega);
+        text += fmt::format("{:.6f},{:.6f},{:.6f}", t, static_cast<double>(exact.q),
+                            static_cast<double>(exact.p) / angular_frequency);
         for (const auto* states : {&lobatto, &simpson, &midpoint}) {
             if (i % fine != 0) {
                 text += ",,";
                 continue;
             }
             const PaperState& state = (*states)[static_cast<std::size_t>(i / fine)];
-            text += fmt::format(",{:.6f},{:.6f}", static_cast<double>(state.q), static_cast<double>(state.p) / omega);
+            text += fmt::format(",{:.6f},{:.6f}", static_cast<double>(state.q),
+                                static_cast<double>(state.p) / angular_frequency);
         }
         text += '\n';
     }
@@ -191,6 +192,24 @@ std::string curves_of(const std::string& name, int first_column, int first_style
 
 const char* const logarithmic = "set logscale xy\nset format y \"10^{%L}\"\n";
 
+// The axis of values: what they are, and from where to where.
+struct ValueAxis {
+    std::string label, range;
+};
+
+// Energy errors over the periods, above, and what rounding does, below.
+std::string growth_script(const std::string& name, const std::string& periods, const ValueAxis& above,
+                          const ValueAxis& below) {
+    return fmt::format(
+               "set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:{}]\n{}set format x "
+               "\"\"\nset ylabel \"{}\"\nset yrange [{}]\nplot {}\n",
+               periods, logarithmic, above.label, above.range, curves_of(name, 2, 2, true)) +
+           fmt::format(
+               "unset key\nset format x \"10^{{%L}}\"\nset xlabel \"periods\"\nset ylabel \"{}\"\nset yrange "
+               "[{}]\nplot {}, {}\nunset multiplot\n",
+               below.label, below.range, curves_of(name, 5, 2, false), curves_of(name, 11, 12, false));
+}
+
 }  // namespace
 
 std::vector<Figure> draw_figures(const std::string& folder,
@@ -225,14 +244,7 @@ std::vector<Figure> draw_figures(const std::string& folder,
     write_data(folder, "figure2", oscillator.data);
     draw_figure(
         folder, "figure2",
-        std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:1e5]\n") +
-            logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|\"\nset yrange [1e-9:1e-3]\n" + "plot " +
-            curves_of("figure2", 2, 2, true) + "\n" +
-            "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"max |H_d/H_d(0) − 1|\"\nset "
-            "yrange [1e-17:1e-8]\n" +
-            "plot " + curves_of("figure2", 5, 2, false) + ", " + curves_of("figure2", 11, 12, false) +
-            "\nunset multiplot\n",
-        700);
+        growth_script("figure2", "1e5", {"max |H − H(0)|", "1e-9:1e-3"}, {"max |H_d/H_d(0) − 1|", "1e-17:1e-8"}), 700);
 
     const double period = exact_period(PaperSystem::pendulum);
     figures.push_back({"figure3",
@@ -262,16 +274,10 @@ std::vector<Figure> draw_figures(const std::string& folder,
          "are of another kind or unit, which the text does not give: they do not fall with h, though "
          "they would if the first two were exchanged."});
     write_data(folder, "figure4", pendulum.data);
-    draw_figure(
-        folder, "figure4",
-        std::string("set multiplot layout 2,1 margins 0.12,0.97,0.11,0.92 spacing 0,0.06\nset xrange [1:5000]\n") +
-            logarithmic + "set format x \"\"\nset ylabel \"max |H − H(0)|/(mω^2)\"\nset yrange [1e-10:1e-4]\n" +
-            "plot " + curves_of("figure4", 2, 2, true) + "\n" +
-            "unset key\nset format x \"10^{%L}\"\nset xlabel \"periods\"\nset ylabel \"rounding of H/(mω^2)\"\nset "
-            "yrange [1e-18:1e-12]\n" +
-            "plot " + curves_of("figure4", 5, 2, false) + ", " + curves_of("figure4", 11, 12, false) +
-            "\nunset multiplot\n",
-        700);
+    draw_figure(folder, "figure4",
+                growth_script("figure4", "5000", {"max |H − H(0)|/(mω^2)", "1e-10:1e-4"},
+                              {"rounding of H/(mω^2)", "1e-18:1e-12"}),
+                700);
     return figures;
 }
 

@@ -26,7 +26,7 @@ Answer answer_of(const std::string& command) {
     return {{"format", 1}, {"command", command}};
 }
 
-std::string text_of(const Answer& answer) {
+std::string json_text(const Answer& answer) {
     return answer.dump(-1, ' ', false, Answer::error_handler_t::replace) + "\n";
 }
 
@@ -71,7 +71,7 @@ std::string json_of_run(const PreparedRun& run, const TrajectoryRequest& request
          {"seconds_per_step", steps > 0 ? number(result.seconds / static_cast<double>(steps)) : Answer(nullptr)},
          {"iterations", result.iterations},
          {"iterations_most", result.iterations_most},
-         {"conserves_energy", run.derivation.conserves_energy()},
+         {"conserves_energy", run.outline.conserves_energy()},
          {"energy_start", number(result.energy_start)},
          {"energy_error", scene.outputs.energy ? number(result.energy_error_largest) : Answer(nullptr)},
          {"energy_error_relative",
@@ -96,7 +96,7 @@ std::string json_of_run(const PreparedRun& run, const TrajectoryRequest& request
                         {"from_cache", run.compiled.from_cache}};
     answer["files"] = {{"trajectory", files.trajectory},
                        {"events", files.events.empty() ? Answer(nullptr) : Answer(files.events)}};
-    return text_of(answer);
+    return json_text(answer);
 }
 
 std::string json_of_proof(const std::string& scene, const Proof& proof) {
@@ -115,7 +115,7 @@ std::string json_of_proof(const std::string& scene, const Proof& proof) {
         answer["convergence"].push_back({{"step", number(row.step)},
                                          {"error", number(row.error)},
                                          {"order", row.order > 0 ? number(row.order) : Answer(nullptr)}});
-    return text_of(answer);
+    return json_text(answer);
 }
 
 std::string json_of_choice(const Choice& choice, const Scene& scene, double error, bool is_written) {
@@ -134,7 +134,7 @@ std::string json_of_choice(const Choice& choice, const Scene& scene, double erro
                    {"complete", choice.complete},
                    {"seconds", number(choice.seconds)},
                    {"written", is_written}});
-    return text_of(answer);
+    return json_text(answer);
 }
 
 std::string json_of_roundoff(const RoundoffResult& result, const std::string& scene, const std::string& method,
@@ -162,7 +162,7 @@ std::string json_of_roundoff(const RoundoffResult& result, const std::string& sc
                         {"rows", rows}};
     }
     answer["table"] = result.plain.rows.empty() ? Answer(nullptr) : Answer(table);
-    return text_of(answer);
+    return json_text(answer);
 }
 
 std::string json_of_emitted(const std::string& scene, const std::vector<std::string>& files, const std::string& name,
@@ -177,7 +177,7 @@ std::string json_of_emitted(const std::string& scene, const std::vector<std::str
                                     {"divisions", pass.after.divisions},
                                     {"functions", pass.after.functions},
                                     {"disagreement", number(pass.disagreement)}});
-    return text_of(answer);
+    return json_text(answer);
 }
 
 std::string json_of_drawn(const std::string& command, const std::string& page, const std::vector<Drawn>& drawn) {
@@ -190,7 +190,7 @@ std::string json_of_drawn(const std::string& command, const std::string& page, c
                                    {"note", one.note},
                                    {"file", one.file.empty() ? Answer(nullptr) : Answer(one.file)},
                                    {"failure", one.failure.empty() ? Answer(nullptr) : Answer(one.failure)}});
-    return text_of(answer);
+    return json_text(answer);
 }
 
 }  // namespace lobatto

@@ -7,11 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 
-#include "cli/print/drawing.hpp"
 #include "generator/mechanics/algebra/sample.hpp"
 
 namespace lobatto {
@@ -22,24 +20,6 @@ constexpr std::size_t most_points = 7000;  // of a picture: some 100 kB
 constexpr std::size_t fewest_in_waterfall = 8, lines_in_waterfall = 48;
 constexpr double pi = std::numbers::pi;
 constexpr const char* colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444"};
-
-struct Point {
-    double x = 0, y = 0;
-};
-
-struct Curve {
-    std::vector<Point> points;
-    std::string colour;
-    double width = 0;   // 0: the thinner the longer
-    bool dot = false;   // marks its end
-    bool fill = false;  // white below: hides what lies behind
-};
-
-struct Axes {
-    std::string x, y;    // labels
-    bool equal = false;  // one unit is as long on both
-    bool y_is_time = false;
-};
 
 // The indices of the coordinates of a name: one, or the elements of an array.
 std::vector<int> indices_of(const Scene& scene, const std::string& name) {
@@ -57,137 +37,6 @@ std::string base_of(const Coordinate& coordinate) {
 
 std::string label_of(const Coordinate& coordinate, const std::string& name) {
     return coordinate.unit.empty() ? name : fmt::format("{} [{}]", name, coordinate.unit);
-}
-
-struct Range {
-    double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
-    void take(double value) {
-        low = std::min(low, value);
-        high = std::max(high, value);
-    }
-    double length() const { return high - low; }
-    void widen(double share) {
-        const double margin = length() > 0 ? share * length() : 1;
-        low -= margin;
-        high += margin;
-    }
-};
-
-// Fewest points of a polyline that leave it where it is, up to `tolerance` (Ramer, Douglas and Peucker).
-std::vector<Point> simplified(const std::vector<Point>& points, double tolerance) {
-    if (points.size() < 3) return points;
-    std::vector<bool> kept(points.size(), false);
-    kept.front() = kept.back() = true;
-    std::vector<std::pair<std::size_t, std::size_t>> open{{0, points.size() - 1}};
-    while (!open.empty()) {
-        const auto [first, last] = open.back();
-        open.pop_back();
-        const Point a = points[first], b = points[last];
-        const double length = std::hypot(b.x - a.x, b.y - a.y);
-        double farthest = tolerance;
-        std::size_t place = 0;
-        for (std::size_t i = first + 1; i < last; ++i) {
-            const Point c = points[i];
-            const double distance = length > 0
-                                        ? std::fabs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) / length
-                                        : std::hypot(c.x - a.x, c.y - a.y);
-            // A curve that turns back beyond its end is no straight line.
-            const double beyond =
-                length > 0 ? std::max(0.0, std::hypot(c.x - (a.x + b.x) / 2, c.y - (a.y + b.y) / 2) - length / 2) : 0;
-            if (std::max(distance, beyond) > farthest) {
-                farthest = std::max(distance, beyond);
-                place = i;
-            }
-        }
-        if (place == 0) continue;
-        kept[place] = true;
-        open.emplace_back(first, place);
-        open.emplace_back(place, last);
-    }
-    std::vector<Point> result;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (kept[i]) result.push_back(points[i]);
-    return result;
-}
-
-// Long curves cover themselves.
-double line_width(std::size_t points) {
-    return points > 3000 ? 0.8 : points > 1000 ? 1.2 : 1.8;
-}
-
-// The script, and the size of the page.
-Picture drawn(const Scene& scene, std::vector<Curve> curves, const Axes& axes, const std::string& caption) {
-    Range x, y;
-    for (const Curve& curve : curves)
-        for (const Point& point : curve.points) {
-            x.take(point.x);
-            y.take(point.y);
-        }
-    x.widen(axes.y_is_time ? 0 : 0.05);
-    y.widen(0.05);
-    constexpr double left = 90, right = 25, top = 45, bottom = 100;
-    double width = 560, height = 400;  // of the field
-    if (axes.equal) {
-        const double ratio = std::clamp(y.length() / x.length(), 0.2, 5.0);
-        width = std::min(560.0, 520 / ratio);
-        height = width * ratio;
-        if (width < 320) {  // the caption needs room
-            x.widen((320 / width - 1) / 2);
-            width = 320;
-        }
-    } else if (axes.y_is_time) {
-        height = 480;
-    }
-    const double per_x = width / x.length(), per_y = height / y.length();
-    for (Curve& curve : curves)
-        for (Point& point : curve.points) point = {(point.x - x.low) * per_x, (point.y - y.low) * per_y};
-    std::vector<std::vector<Point>> thinned;
-    std::size_t count = 0;
-    for (const Curve& curve : curves) {
-        thinned.push_back(simplified(curve.points, 0.12));  // pixels
-        count += thinned.back().size();
-    }
-
-    Picture picture{caption, "", static_cast<int>(width + left + right), static_cast<int>(height + top + bottom),
-                    count};
-    const double page_width = picture.width, page_height = picture.height;
-    std::string& script = picture.script;
-    for (std::size_t i = 0; i < curves.size(); ++i) {
-        script += fmt::format("$curve{} << END\n", i);
-        for (const Point& point : thinned[i])
-            script += fmt::format("{:.6g},{:.6g}\n", x.low + point.x / per_x, y.low + point.y / per_y);
-        script += "END\n";
-    }
-    script += fmt::format(
-        "unset key\nset lmargin at screen {:.6f}\nset rmargin at screen {:.6f}\nset bmargin at screen {:.6f}\nset "
-        "tmargin at screen {:.6f}\n",
-        left / page_width, 1 - right / page_width, bottom / page_height, 1 - top / page_height);
-    script += fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]\n", x.low, x.high, y.low, y.high);
-    script += fmt::format("set label 1 {} at screen {:.6f},{:.6f} left noenhanced font ',17' tc rgb '#222222'\n",
-                          gnuplot_text(scene.title), 20 / page_width, 1 - 22 / page_height);
-    script += fmt::format("set label 2 {} at screen {:.6f},{:.6f} left noenhanced font ',12' tc rgb '#666666'\n",
-                          gnuplot_text(caption), 20 / page_width, 16 / page_height);
-    const double middle_x = (left + width / 2) / page_width, middle_y = (bottom + height / 2) / page_height;
-    script += fmt::format("set label 3 {} at screen {:.6f},{:.6f} center noenhanced\n", gnuplot_text(axes.x), middle_x,
-                          44 / page_height);
-    script += fmt::format("set label 4 {} at screen {:.6f},{:.6f} center rotate by 90 noenhanced\n",
-                          gnuplot_text(axes.y), 22 / page_width, middle_y);
-    script += "set xtics autofreq\nset ytics autofreq\n";
-    std::string plot;
-    for (std::size_t i = 0; i < curves.size(); ++i) {
-        const Curve& curve = curves[i];
-        plot += i == 0 ? "plot " : ", \\\n  ";
-        if (curve.fill)
-            plot += fmt::format("$curve{0} using 1:2 with filledcurves y1={1:.6g} fc rgb '#ffffff', ", i, y.low);
-        plot += fmt::format("$curve{} using 1:2 with lines lw {:.3g} lc rgb '{}'", i,
-                            curve.width > 0 ? curve.width : line_width(count), curve.colour);
-    }
-    for (std::size_t i = 0; i < curves.size(); ++i)
-        if (curves[i].dot)
-            plot += fmt::format(", \\\n  $curve{} using 1:2 every ::{} with points pt 7 ps 0.8 lc rgb '{}'", i,
-                                thinned[i].size() - 1, curves[i].colour.substr(0, 7));
-    script += plot + "\n";
-    return picture;
 }
 
 std::string colour(std::size_t index) {
@@ -226,13 +75,14 @@ Picture phase(const Scene& scene, const MotionRows& states, const std::vector<Mo
     const Coordinate& q = scene.coordinates.front();
     const Axes axes{label_of(q, q.name), "momentum p_" + q.name};
     if (smaller.empty())
-        return drawn(scene, {curve(states, states.count(), colour(0), 0)}, axes,
-                     fmt::format("Momentum over position, from t = {:.4g} to t = {:.4g}.", states.time(0),
-                                 states.time(states.count() - 1)));
+        return picture_of(scene.title, {curve(states, states.count(), colour(0), 0)}, axes,
+                          fmt::format("Momentum over position, from t = {:.4g} to t = {:.4g}.", states.time(0),
+                                      states.time(states.count() - 1)));
     std::vector<Curve> curves;
     for (const MotionRows& one : smaller) curves.push_back(curve(one, one_turn(one), "#8fc1de", 1.4));
     curves.push_back(curve(states, one_turn(states), colour(1), 2.2));
-    return drawn(scene, curves, axes, "Momentum over position: the scene's motion (orange) and smaller ones.");
+    return picture_of(scene.title, curves, axes,
+                      "Momentum over position: the scene's motion (orange) and smaller ones.");
 }
 
 struct Bodies {
@@ -256,8 +106,8 @@ Picture path(const Scene& scene, const MotionRows& states) {
         Curve curve{{}, colour(0), 0, true};
         for (std::size_t i = 0; i < states.count(); ++i) curve.points.push_back({states.q(i, 0), states.q(i, 1)});
         const Coordinate &a = scene.coordinates[0], &b = scene.coordinates[1];
-        return drawn(scene, {curve}, {label_of(a, a.written), label_of(b, b.written), a.unit == b.unit},
-                     fmt::format("{} over {}, to t = {}.", b.written, a.written, span(states)));
+        return picture_of(scene.title, {curve}, {label_of(a, a.written), label_of(b, b.written), a.unit == b.unit},
+                          fmt::format("{} over {}, to t = {}.", b.written, a.written, span(states)));
     }
     // Bodies in space are seen along the direction in which they move least.
     std::array<std::pair<std::string, std::vector<int>>, 3> axes{
@@ -283,8 +133,9 @@ Picture path(const Scene& scene, const MotionRows& states) {
         curves.push_back(curve);
     }
     const Coordinate& first = scene.coordinates.front();
-    return drawn(scene, curves, {label_of(first, axes[0].first), label_of(first, axes[1].first), true},
-                 fmt::format("The {}{}, to t = {}.", curves.size() == 1 ? "orbit" : "orbits", along, span(states)));
+    return picture_of(
+        scene.title, curves, {label_of(first, axes[0].first), label_of(first, axes[1].first), true},
+        fmt::format("The {}{}, to t = {}.", curves.size() == 1 ? "orbit" : "orbits", along, span(states)));
 }
 
 // Rods from the origin to each body in turn at equal times, the older the paler, and the path of the last body; until
@@ -336,9 +187,9 @@ Picture strobe(const Scene& scene, const MotionRows& states) {
         curves.push_back(curve);
     }
     curves.push_back(trail);
-    return drawn(scene, curves, {"x", "y", true},
-                 fmt::format("{} pictures, to t = {:.3g}, and the path of the {} (orange).", rods, states.time(last),
-                             scene.places.size() == 1 ? "bob" : "last bob"));
+    return picture_of(scene.title, curves, {"x", "y", true},
+                      fmt::format("{} pictures, to t = {:.3g}, and the path of the {} (orange).", rods,
+                                  states.time(last), scene.places.size() == 1 ? "bob" : "last bob"));
 }
 
 Picture polar(const Scene& scene, const MotionRows& states) {
@@ -348,8 +199,8 @@ Picture polar(const Scene& scene, const MotionRows& states) {
         curve.points.push_back(
             {states.q(i, r) * std::sin(states.q(i, theta)), -states.q(i, r) * std::cos(states.q(i, theta))});
     const Coordinate& radius = scene.coordinates[static_cast<std::size_t>(r)];
-    return drawn(scene, {curve}, {label_of(radius, "r sin(theta)"), label_of(radius, "-r cos(theta)"), true},
-                 fmt::format("The path in the plane, to t = {}.", span(states)));
+    return picture_of(scene.title, {curve}, {label_of(radius, "r sin(theta)"), label_of(radius, "-r cos(theta)"), true},
+                      fmt::format("The path in the plane, to t = {}.", span(states)));
 }
 
 // Whether the potential energy is lower at theta = 0: then that is the lowest point.
@@ -401,8 +252,8 @@ Picture sphere(const Scene& scene, const MotionRows& states) {
     (front ? before : behind).back().dot = true;
     curves.insert(curves.end(), behind.begin(), behind.end());
     curves.insert(curves.end(), before.begin(), before.end());
-    return drawn(scene, curves, {"", "", true},
-                 fmt::format("The path on the sphere, to t = {}; paler behind it.", span(states)));
+    return picture_of(scene.title, curves, {"", "", true},
+                      fmt::format("The path on the sphere, to t = {}; paler behind it.", span(states)));
 }
 
 // The longest array.
@@ -447,7 +298,7 @@ Picture waterfall(const Scene& scene, const MotionRows& states) {
     const std::string name = base_of(scene.coordinates[static_cast<std::size_t>(array.front())]);
     Axes axes{"index i", "time t"};
     axes.y_is_time = true;
-    return drawn(scene, curves, axes, fmt::format("{}[i] at {} times, one above the other.", name, lines));
+    return picture_of(scene.title, curves, axes, fmt::format("{}[i] at {} times, one above the other.", name, lines));
 }
 
 Picture series(const Scene& scene, const MotionRows& states) {
@@ -464,7 +315,7 @@ Picture series(const Scene& scene, const MotionRows& states) {
         names += (k == 0 ? "" : ", ") + scene.coordinates[static_cast<std::size_t>(k)].written;
     }
     const std::string label = units.empty() ? "coordinates" : fmt::format("coordinates [{}]", fmt::join(units, ", "));
-    return drawn(scene, curves, {"time t", label}, names + " over time.");
+    return picture_of(scene.title, curves, {"time t", label}, names + " over time.");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/print/curves.hpp"
 #include "generator/mechanics/derivation.hpp"
 
 namespace lobatto {
@@ -20,13 +21,6 @@ struct MotionRows {
     double time(std::size_t row) const { return at(row, 0); }
     double q(std::size_t row, int k) const { return at(row, 1 + k); }
     double p(std::size_t row, int k) const { return at(row, 1 + n + k); }
-};
-
-struct Picture {
-    std::string caption;  // one line
-    std::string script;
-    int width = 0, height = 0;
-    std::size_t points = 0;
 };
 
 enum class Shape {

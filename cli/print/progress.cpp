@@ -12,7 +12,7 @@ namespace lobatto {
 
 namespace {
 
-std::string duration(double seconds) {
+std::string time_text(double seconds) {
     const long whole = std::lround(seconds);
     if (whole < 60) return fmt::format("{} s", whole);
     if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
@@ -36,7 +36,7 @@ void Progress::show(std::int64_t done) {
     const double fraction = static_cast<double>(done) / static_cast<double>(total_);
     const int filled = static_cast<int>(fraction * width);
     tell("\r\033[K[{:#<{}}{:.<{}}] {:3.0f} %, {} left", "", filled, "", width - filled, std::floor(fraction * 100),
-         duration(elapsed * (1 - fraction) / fraction));
+         time_text(elapsed * (1 - fraction) / fraction));
     std::fflush(stderr);
 }
 

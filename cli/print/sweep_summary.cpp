@@ -91,7 +91,7 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
     }
     const SettingTally none, &all = tally.settings().empty() ? none : tally.settings().back();
     if (scene.outputs.energy && all.energy_error.index >= 0) {
-        const bool conserves = study.first_setting().derivation->conserves_energy();
+        const bool conserves = study.first_setting().outline->conserves_energy();
         print_row(
             conserves ? "energy error" : "energy change",
             fmt::format("{:.2g} at most, of trajectory {}, {}{}", all.energy_error.value, all.energy_error.index,

@@ -13,7 +13,7 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::size_t rows_at_once = 4096;
+constexpr std::size_t rows_of_block = 4096;
 
 bool is_there(const std::string& path, std::size_t bytes) {
     std::error_code none;
@@ -49,7 +49,7 @@ public:
         std::vector<TableCell> block, waiting;  // rows of trajectory next_
         std::int64_t begin = reader_.head_bytes();
         kept_bytes = begin;
-        for (std::size_t count; (count = reader_.read(block, rows_at_once)) > 0;) {
+        for (std::size_t count; (count = reader_.read(block, rows_of_block)) > 0;) {
             for (std::size_t row = 0; row < count; ++row) {
                 const TableCell* const cells = block.data() + row * width;
                 const std::int64_t index = whole_in(cells[0]);

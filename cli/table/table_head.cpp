@@ -24,7 +24,7 @@ std::string shard_text(const Shard& shard) {
                        shard.compiled);
 }
 
-std::optional<Shard> shard_of(const std::string& text) {
+std::optional<Shard> shard_in(const std::string& text) {
     Shard shard;
     char slash = 0;
     std::string of, trajectories, compiled, kernel;
@@ -112,7 +112,7 @@ std::optional<TableHead> read_csv_head(const std::string& text, std::size_t& len
             if (colon == std::string::npos) return std::nullopt;
             const std::string what = line.substr(2, colon - 2), value = line.substr(colon + 2);
             if (what == "shard")
-                head.shard = shard_of(value);
+                head.shard = shard_in(value);
             else if (what == columns)
                 units = value;
             else if (what == "whole numbers")
@@ -157,7 +157,7 @@ std::optional<TableHead> read_json_head(const std::string& text) {
             else if (what == "kind")
                 head.kind = value.get<std::string>();
             else if (what == "shard")
-                head.shard = shard_of(value.get<std::string>());
+                head.shard = shard_in(value.get<std::string>());
             else if (what == "scene_text")
                 head.scene_text = value.get<std::string>();
             else if (what == "columns")

@@ -268,6 +268,13 @@ std::string wrapped(const std::string& line, const std::string& indent) {
     return text + rest + "\n";
 }
 
+std::string comment_safe(const std::string& text) {
+    std::string safe;
+    for (const char c : text) safe += static_cast<unsigned char>(c) < 32 || c == 127 ? ' ' : c;
+    while (!safe.empty() && (safe.back() == '\\' || safe.back() == ' ')) safe.pop_back();
+    return safe;
+}
+
 bool mentions(const std::string& text, const std::string& identifier) {
     const auto is_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
     for (std::size_t at = text.find(identifier); at != std::string::npos; at = text.find(identifier, at + 1)) {

@@ -44,6 +44,9 @@ private:
 // A line broken at spaces to at most 120 columns; continuation lines begin with `indent`. Ends with a newline.
 std::string wrapped(const std::string& line, const std::string& indent);
 
+// Text that may stand in a // comment: one line, printable.
+std::string comment_safe(const std::string& text);
+
 // Whether text contains the identifier as a whole word.
 bool mentions(const std::string& text, const std::string& identifier);
 

@@ -9,9 +9,11 @@
 #include <map>
 #include <set>
 
+#include "generator/emit/angles.hpp"
 #include "generator/emit/declarations.hpp"
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/looped.hpp"
+#include "generator/emit/measured.hpp"
 #include "generator/emit/support.hpp"
 #include "generator/emit/tables.hpp"
 #include "generator/formula/spline.hpp"
@@ -27,53 +29,6 @@ std::string digest_of(const std::string& text) {
     std::uint64_t hash = 14695981039346656037u;  // FNV-1a
     for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
     return fmt::format("{:016x}", hash);
-}
-
-// Text that may stand in a // comment: one line, printable.
-std::string comment_safe(const std::string& text) {
-    std::string safe;
-    for (const char c : text) safe += static_cast<unsigned char>(c) < 32 || c == 127 ? ' ' : c;
-    while (!safe.empty() && (safe.back() == '\\' || safe.back() == ' ')) safe.pop_back();
-    return safe;
-}
-
-// The pairs of sine and cosine that a program computes, of arguments that move with the coordinates, numbered. Not
-// those beside a quotient whose divisor moves with the same: in sin(r)/r both must come from the same digits of r.
-std::map<Id, int> angles_of(const Graph& graph, const Program& program) {
-    std::vector<Id> values;
-    for (const Output& output : program.outputs) values.push_back(output.value);
-    const auto moving_below = [&graph](Id id) {
-        std::set<Id> inputs;
-        for (const Id one : graph.topological({id}))
-            if (graph[one].op == Op::input && graph[one].phase > Phase::step_size && graph.input_of(one).code != "time")
-                inputs.insert(one);
-        return inputs;
-    };
-    const std::vector<Id> all = graph.topological(values);
-    std::set<Id> dividing;
-    for (const Id id : all) {
-        const Node& node = graph[id];
-        if ((node.op == Op::power && node.index < 0) || node.op == Op::raise || node.op == Op::log)
-            dividing.merge(moving_below(node.operands[0]));
-    }
-    std::map<Id, int> halves, angles;
-    for (const Id id : all) {
-        if (graph[id].op != Op::pair_sine && graph[id].op != Op::pair_cosine) continue;
-        const Id pair = graph[id].operands[0];
-        const std::set<Id> inputs = moving_below(pair);
-        const auto divides = [&dividing](Id input) { return dividing.contains(input); };
-        if (++halves[pair] == 2 && !inputs.empty() && std::none_of(inputs.begin(), inputs.end(), divides))
-            angles.emplace(pair, static_cast<int>(angles.size()));
-    }
-    return angles;
-}
-
-// Which splines occur in what a kernel computes.
-std::set<int> splines_of(const Programs& programs) {
-    std::set<int> numbers;
-    for (Id id = 0; id < programs.graph.size(); ++id)
-        if (programs.graph[id].op == Op::table) numbers.insert(programs.graph[id].index / 4);
-    return numbers;
 }
 
 class Emitter {
@@ -98,8 +53,9 @@ public:
         text += options_.support_text ? options_.support_text(support) : "#include \"kernel.hpp\"\n";
         text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
-                tables(d_, options_.precision) + measured() + (d_.structure.looped ? looped_.tables() : "") +
-                parameters() + coefficients() + prepare(name) + set_inputs();
+                tables(d_, options_.precision) + measured_values(p_, options_.precision) +
+                (d_.structure.looped ? looped_.tables() : "") + parameters() + coefficients() + prepare(name) +
+                set_inputs();
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -368,24 +324,6 @@ private:
                signature("Status", "set_inputs", {{"const Parameters&", "p"}, {"real", "h"}, {"Coefficients&", "k"}},
                          text) +
                text + "    }\n";
-    }
-
-    // The splines of the scene, in the order of their names.
-    std::string measured() const {
-        std::string text;
-        for (const int number : splines_of(p_)) {
-            const Spline& spline = spline_of(number);
-            std::vector<cln::cl_R> coefficients;
-            for (const auto& piece : spline.coefficients())
-                coefficients.insert(coefficients.end(), piece.begin(), piece.end());
-            text += fmt::format(
-                "\n    // Measured values, {}: knots x, and between them cubic polynomials in u - x[i] (D61).\n"
-                "    struct {} {{\n        static constexpr int points = {};\n",
-                comment_safe(spline.file()), spline_name(number), spline.x().size());
-            text += value_table("x", spline.x(), options_.precision) +
-                    value_table("c", coefficients, options_.precision) + "    };\n";
-        }
-        return text;
     }
 
     // How a function reaches a value that it does not compute.

@@ -434,49 +434,4 @@ std::string canonical_text(const GiNaC::ex& expression, Notation notation) {
     return formula(graph, graph.from(expression, inputs), notation);
 }
 
-std::string latex_name(const std::string& name) {
-    static const std::map<std::string, std::string> greek = [] {
-        std::map<std::string, std::string> names;
-        for (const char* letter :
-             {"alpha", "beta",  "gamma",  "delta", "epsilon", "zeta",  "eta", "theta", "iota", "kappa", "lambda",
-              "mu",    "nu",    "xi",     "rho",   "sigma",   "tau",   "phi", "chi",   "psi",  "omega", "Gamma",
-              "Delta", "Theta", "Lambda", "Xi",    "Pi",      "Sigma", "Phi", "Psi",   "Omega"})
-            names.emplace(letter, std::string("\\") + letter);
-        return names;
-    }();
-    std::string stem = name, subscript;
-    const bool velocity = !stem.empty() && stem.back() == '\'';
-    if (velocity) stem.pop_back();
-    if (const auto underscore = stem.find('_'); underscore != std::string::npos && underscore > 0) {
-        subscript = stem.substr(underscore + 1);
-        stem.erase(underscore);
-    } else {
-        std::size_t digits = stem.find_last_not_of("0123456789") + 1;
-        if (digits > 0) {
-            subscript = stem.substr(digits);
-            stem.erase(digits);
-        }
-    }
-    if (const auto letter = greek.find(stem); letter != greek.end())
-        stem = letter->second;
-    else if (stem.size() > 1)
-        stem = "\\mathrm{" + stem + "}";
-    if (velocity) stem = "\\dot{" + stem + "}";
-    // Subscripts of subscripts stand side by side: p_theta_left becomes p_{\theta,\mathrm{left}}.
-    std::string below;
-    for (std::size_t begin = 0; begin < subscript.size();) {
-        const std::size_t end = std::min(subscript.find('_', begin), subscript.size());
-        const std::string part = subscript.substr(begin, end - begin);
-        const auto letter = greek.find(part);
-        const bool is_word = part.find_first_of("0123456789") == std::string::npos && part.size() > 1;
-        if (!part.empty())
-            below += (below.empty() ? "" : ",") + (letter != greek.end() ? letter->second
-                                                   : is_word             ? "\\mathrm{" + part + "}"
-                                                                         : part);
-        begin = end + 1;
-    }
-    if (!below.empty()) stem += "_{" + below + "}";
-    return stem;
-}
-
 }  // namespace lobatto

@@ -113,7 +113,12 @@ private:
     std::string kinetic_text_;  // "T(top) + T(arm)"
 };
 
+constexpr std::size_t longest_unit = 40;
+
 // On one line, without comments.
 std::string collapsed(const std::string& formula);
+// A key with brackets, "x[i]", stands in quotes, which are not a part of it.
+Text text_of_key(const Entry& entry);
+GiNaC::exset symbols_of(const GiNaC::ex& expression);
 
 }  // namespace lobatto

@@ -95,136 +95,13 @@ struct ExportRefilled : NoEnsemble {
 #endif
 #endif
 
-// The functions of one trajectory, and those of E.
-template <class K, class E = NoEnsemble>
-struct Export {
+// Steps of a stepper S, their records and events, as a call asks for them.
+template <class K, class S, bool has_dense>
+struct Advance {
     using real = typename K::real;
-    // Beside lanes, which have functions of their own, a single trajectory takes steps and does no more.
-    static constexpr bool is_whole = E::lanes == 0;
-    static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
-    static constexpr int constraint_count = constraints_of<K>();
-    static constexpr int inputs = is_whole ? InputsOf<K>::count : 0;
-    static constexpr bool has_switches = is_whole && switches_of<K>() > 0;
-    static constexpr bool has_walls = has_switches || (is_whole && impacts_of<K>() > 0);
-    static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
-    using S = std::conditional_t<(event_count > 0), WatchedStepper<K>, Stepper<K>>;
+    static constexpr int n = K::coordinates;
 
-    static const S& of(const void* stepper) { return *static_cast<const S*>(stepper); }
-    static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
     static real* out(void* numbers) { return static_cast<real*>(numbers); }
-    static std::int32_t code(Status status) { return static_cast<std::int32_t>(status); }
-
-    static std::int32_t prepare(void* stepper, const void* parameters, const void* step) {
-        typename K::Parameters values;
-        for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
-        S* const fresh = new (stepper) S;
-        if (*in(step) == real(0)) return LOBATTO_TIME_STANDS_STILL;
-        if (!is_finite(*in(step))) return LOBATTO_NOT_FINITE;
-        if constexpr (event_count > 0) fresh->parameters = values;
-        return code(fresh->prepare(values, *in(step)));
-    }
-
-    static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
-        if constexpr (has_switches) take_sides(*static_cast<S*>(stepper), *in(time), in(q), in(p));
-        const Status status = static_cast<S*>(stepper)->start(*in(time), in(q), in(p));
-        if constexpr (has_walls) {
-            if (status == Status::ok) return code(side_of_walls(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
-        }
-        return code(status);
-    }
-    // The side of each switch where a state is; a velocity is that of the sides so far.
-    static void take_sides(S& stepper, real time, const real* q, const real* p) {
-        real velocity[n];
-        if (stepper.velocity(time, q, p, velocity) == Status::ok) take_sides_at(stepper, time, q, velocity);
-    }
-    static void take_sides_at(S& stepper, real time, const real* q, const real* velocity) {
-        real values[K::events];
-        Formulas<K>::event(stepper.coefficients, time, q, velocity, +values);
-        for (int i = 0; i < switches_of<K>(); ++i)
-            stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
-        stepper.prepare(stepper.parameters, stepper.step_size);
-    }
-    static std::int32_t take_inputs(void* stepper, const void* parameters) {
-        if constexpr (inputs > 0) {
-            S& here = *static_cast<S*>(stepper);
-            typename K::Parameters values;
-            for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
-            if constexpr (event_count > 0) {  // the sides of switches stay
-                for (int i = K::first_input; i < K::first_input + inputs; ++i)
-                    K::parameter(here.parameters, i) = K::parameter(values, i);
-                values = here.parameters;
-            }
-            Status status = set_inputs(here, values);
-            if constexpr (has_walls) {
-                if (status == Status::ok) status = look_around(here);
-            }
-            return code(status);
-        }
-        return LOBATTO_UNSUPPORTED;
-    }
-    static constexpr auto inputs_taken = inputs > 0 ? take_inputs : nullptr;
-    // After a change of formulas: the sides of switches, and of walls, where the motion is.
-    static Status look_around(S& stepper) {
-        const real time = stepper.time();
-        real q[n], p[n];
-        for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
-        stepper.momentum(p);
-        if constexpr (has_switches) {
-            take_sides(stepper, time, q, p);
-            const Status status = stepper.restart(q, p, stepper.steps);
-            if (status != Status::ok) return status;
-        }
-        return side_of_walls(stepper, time, q, p);
-    }
-    // What `use` makes of the stepper as it is at a state.
-    template <class Use>
-    static auto at_state(const void* stepper, const void* time, const void* q, const void* p, const Use& use) {
-        if constexpr (has_switches) {
-            S local = of(stepper);
-            take_sides(local, *in(time), in(q), in(p));
-            return use(local);
-        } else {
-            (void)time, (void)q, (void)p;
-            return use(of(stepper));
-        }
-    }
-    // Whether a state is where the motion may be.
-    static Status side_of_walls(S& stepper, real time, const real* q, const real* p) {
-        Walls<K> wall;
-        for (real& scale : stepper.wall_scale) scale = real(0);
-        const Status status = wall.look(stepper, time, q, p);
-        for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
-            if (wall.is_behind(w)) return Status::off_constraints;
-        return status;
-    }
-
-    static std::int32_t advance(void* stepper, lobatto_advance* call) {
-        call->steps_done = call->records_written = call->events_written = call->iterations = 0;
-        call->chain_steps = 0;
-        call->iterations_most = 0;
-        call->increment_largest = call->increment_failed = 0.0;
-        if ((call->dense > 0 && (!has_dense || call->record_every != 1)) ||
-            (call->events != nullptr && event_count == 0))
-            return call->status = LOBATTO_UNSUPPORTED;
-        if constexpr (sizeof(S) <= 4096) {
-            S local = of(stepper);  // a local copy: the optimiser may keep it in registers
-            const Status status = advance_in(local, *call);
-            *static_cast<S*>(stepper) = local;
-            return call->status = code(status);
-        } else {
-            return call->status = code(advance_in(*static_cast<S*>(stepper), *call));
-        }
-    }
-
-    static Status advance_in(S& stepper, lobatto_advance& call) {
-        if constexpr (event_count > 0) {
-            if (call.events != nullptr || has_walls) {
-                Watch<K> watch(stepper);
-                return take_steps(stepper, call, &watch);
-            }
-        }
-        return take_steps(stepper, call, static_cast<NoWatch*>(nullptr));
-    }
 
     struct NoWatch {};
     static void count(const S& stepper, lobatto_advance& call) {
@@ -347,6 +224,139 @@ struct Export {
         return Status::ok;
     }
     static real* next_row(lobatto_advance& call) { return out(call.records) + call.records_written++ * (1 + 2 * n); }
+};
+
+// The functions of one trajectory, and those of E.
+template <class K, class E = NoEnsemble>
+struct Export {
+    using real = typename K::real;
+    // Beside lanes, which have functions of their own, a single trajectory takes steps and does no more.
+    static constexpr bool is_whole = E::lanes == 0;
+    static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
+    static constexpr int constraint_count = constraints_of<K>();
+    static constexpr int inputs = is_whole ? InputsOf<K>::count : 0;
+    static constexpr bool has_switches = is_whole && switches_of<K>() > 0;
+    static constexpr bool has_walls = has_switches || (is_whole && impacts_of<K>() > 0);
+    static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
+    using S = std::conditional_t<(event_count > 0), WatchedStepper<K>, Stepper<K>>;
+    using Taken = Advance<K, S, has_dense>;
+
+    static const S& of(const void* stepper) { return *static_cast<const S*>(stepper); }
+    static const real* in(const void* numbers) { return static_cast<const real*>(numbers); }
+    static real* out(void* numbers) { return static_cast<real*>(numbers); }
+    static std::int32_t code(Status status) { return static_cast<std::int32_t>(status); }
+
+    static std::int32_t prepare(void* stepper, const void* parameters, const void* step) {
+        typename K::Parameters values;
+        for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
+        S* const fresh = new (stepper) S;
+        if (*in(step) == real(0)) return LOBATTO_TIME_STANDS_STILL;
+        if (!is_finite(*in(step))) return LOBATTO_NOT_FINITE;
+        if constexpr (event_count > 0) fresh->parameters = values;
+        return code(fresh->prepare(values, *in(step)));
+    }
+
+    static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
+        if constexpr (has_switches) take_sides(*static_cast<S*>(stepper), *in(time), in(q), in(p));
+        const Status status = static_cast<S*>(stepper)->start(*in(time), in(q), in(p));
+        if constexpr (has_walls) {
+            if (status == Status::ok) return code(side_of_walls(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
+        }
+        return code(status);
+    }
+    // The side of each switch where a state is; a velocity is that of the sides so far.
+    static void take_sides(S& stepper, real time, const real* q, const real* p) {
+        real velocity[n];
+        if (stepper.velocity(time, q, p, velocity) == Status::ok) take_sides_at(stepper, time, q, velocity);
+    }
+    static void take_sides_at(S& stepper, real time, const real* q, const real* velocity) {
+        real values[K::events];
+        Formulas<K>::event(stepper.coefficients, time, q, velocity, +values);
+        for (int i = 0; i < switches_of<K>(); ++i)
+            stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
+        stepper.prepare(stepper.parameters, stepper.step_size);
+    }
+    static std::int32_t take_inputs(void* stepper, const void* parameters) {
+        if constexpr (inputs > 0) {
+            S& here = *static_cast<S*>(stepper);
+            typename K::Parameters values;
+            for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
+            if constexpr (event_count > 0) {  // the sides of switches stay
+                for (int i = K::first_input; i < K::first_input + inputs; ++i)
+                    K::parameter(here.parameters, i) = K::parameter(values, i);
+                values = here.parameters;
+            }
+            Status status = set_inputs(here, values);
+            if constexpr (has_walls) {
+                if (status == Status::ok) status = look_around(here);
+            }
+            return code(status);
+        }
+        return LOBATTO_UNSUPPORTED;
+    }
+    static constexpr auto inputs_taken = inputs > 0 ? take_inputs : nullptr;
+    // After a change of formulas: the sides of switches, and of walls, where the motion is.
+    static Status look_around(S& stepper) {
+        const real time = stepper.time();
+        real q[n], p[n];
+        for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
+        stepper.momentum(p);
+        if constexpr (has_switches) {
+            take_sides(stepper, time, q, p);
+            const Status status = stepper.restart(q, p, stepper.steps);
+            if (status != Status::ok) return status;
+        }
+        return side_of_walls(stepper, time, q, p);
+    }
+    // What `use` makes of the stepper as it is at a state.
+    template <class Use>
+    static auto at_state(const void* stepper, const void* time, const void* q, const void* p, const Use& use) {
+        if constexpr (has_switches) {
+            S local = of(stepper);
+            take_sides(local, *in(time), in(q), in(p));
+            return use(local);
+        } else {
+            (void)time, (void)q, (void)p;
+            return use(of(stepper));
+        }
+    }
+    // Whether a state is where the motion may be.
+    static Status side_of_walls(S& stepper, real time, const real* q, const real* p) {
+        Walls<K> wall;
+        for (real& scale : stepper.wall_scale) scale = real(0);
+        const Status status = wall.look(stepper, time, q, p);
+        for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
+            if (wall.is_behind(w)) return Status::off_constraints;
+        return status;
+    }
+
+    static std::int32_t advance(void* stepper, lobatto_advance* call) {
+        call->steps_done = call->records_written = call->events_written = call->iterations = 0;
+        call->chain_steps = 0;
+        call->iterations_most = 0;
+        call->increment_largest = call->increment_failed = 0.0;
+        if ((call->dense > 0 && (!has_dense || call->record_every != 1)) ||
+            (call->events != nullptr && event_count == 0))
+            return call->status = LOBATTO_UNSUPPORTED;
+        if constexpr (sizeof(S) <= 4096) {
+            S local = of(stepper);  // a local copy: the optimiser may keep it in registers
+            const Status status = advance_in(local, *call);
+            *static_cast<S*>(stepper) = local;
+            return call->status = code(status);
+        } else {
+            return call->status = code(advance_in(*static_cast<S*>(stepper), *call));
+        }
+    }
+
+    static Status advance_in(S& stepper, lobatto_advance& call) {
+        if constexpr (event_count > 0) {
+            if (call.events != nullptr || has_walls) {
+                Watch<K> watch(stepper);
+                return Taken::take_steps(stepper, call, &watch);
+            }
+        }
+        return Taken::take_steps(stepper, call, static_cast<typename Taken::NoWatch*>(nullptr));
+    }
 
     static void state(const void* stepper, void* time, void* q, void* p) {
         if constexpr (is_clocked<K>()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The host's side of a run: how many steps to ask the kernel for at a time, and what to say when it stops.
+// The host's side of a run: how many steps to ask the kernel for at a time, and what to keep of them.
 #include "runtime/run/trajectory.hpp"
 #include "runtime/run/parts.hpp"
 #include "runtime/run/timing.hpp"
@@ -178,6 +178,29 @@ NumberStepper::Parts stop_at(const NumberStepper::Parts& events, std::size_t par
 constexpr int most_halvings = 14;    // of a step that could not be taken
 constexpr double same_place = 0.01;  // of the way
 
+// How many steps to ask for at a time.
+class Pace {
+public:
+    std::int64_t block() const { return block_; }
+    // The clock ticks coarsely against a short block: grow at most eightfold at a time.
+    void took(double seconds, std::int64_t steps) {
+        const double pace = block_seconds / std::max(seconds, block_seconds / 8);
+        block_ = std::max<std::int64_t>(1, std::llround(static_cast<double>(steps) * pace));
+    }
+
+private:
+    std::int64_t block_ = 256;
+};
+
+// Rows of records for one call of the kernel: whole steps.
+std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& request) {
+    const std::int64_t rows_of_step = 1 + request.dense;
+    const std::int64_t wanted = request.arrivals.keeps_chain ? rows_at_once : request.steps / request.every;
+    return std::clamp<std::int64_t>(wanted, kernel->clocked != 0 ? 2 : 1,
+                                    std::max<std::int64_t>(rows_at_once / rows_of_step, 1)) *
+           rows_of_step;
+}
+
 }  // namespace
 
 std::string list_text(const std::vector<double>& values) {
@@ -218,16 +241,12 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     }
     Checkpoints checkpoints(request);
 
-    const std::int64_t rows_of_step = 1 + request.dense;
-    const std::int64_t wanted = request.arrivals.keeps_chain ? rows_at_once : request.steps / request.every;
-    const std::int64_t rows = std::clamp<std::int64_t>(wanted, kernel->clocked != 0 ? 2 : 1,
-                                                       std::max<std::int64_t>(rows_at_once / rows_of_step, 1)) *
-                              rows_of_step;
+    const std::int64_t rows = records_of_call(kernel, request);
     const std::size_t columns = 1 + 2 * request.q.size();
     NumberStepper::Parts records, events, time;
-    const bool seeks_events = request.events && kernel->events > 0;
-    const std::int64_t event_rows = seeks_events ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
-    std::int64_t block = 256;
+    const std::int64_t event_rows =
+        request.events && kernel->events > 0 ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
+    Pace pace;
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
         result.interrupted = request.interrupted != nullptr && *request.interrupted != 0;
@@ -235,9 +254,8 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             checkpoints.at_once(stepper, result);
             break;
         }
-
         lobatto_advance call = call_for(request, rows, event_rows);
-        call.steps = std::min(block, request.steps - result.steps_done);
+        call.steps = std::min(pace.block(), request.steps - result.steps_done);
         const Clock::time_point start = Clock::now();
         const double processor_start = processor_seconds();
         result.status = stepper.advance(call, records, events);
@@ -262,9 +280,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             return result;
         }
 
-        // The clock ticks coarsely against a short block: grow at most eightfold at a time.
-        const double pace = block_seconds / std::max(seconds, block_seconds / 8);
-        block = std::max<std::int64_t>(1, std::llround(static_cast<double>(call.steps_done) * pace));
+        pace.took(seconds, call.steps_done);
         if (request.progress && seconds_since(last_progress) > progress_seconds) {
             last_progress = Clock::now();
             request.progress(result.steps_done);
@@ -304,97 +320,6 @@ double passing_step(const Kernel& kernel, const TrajectoryRequest& request, cons
         before = q;
     }
     return 0;
-}
-
-std::string explain_stop(const TrajectoryResult& result, const TrajectoryRequest& request, double passing,
-                         const std::string& more) {
-    const std::string smaller =
-        passing != 0 ? fmt::format("a smaller step, such as h = {:.6g}, with which the motion goes on there", passing)
-                     : fmt::format("a smaller step, such as h = {:.6g}", request.step / 2);
-    std::string why, advice;
-    switch (result.status) {
-        case LOBATTO_OK:
-        case LOBATTO_STOPPED:
-        case LOBATTO_STATUSES:
-            return {};
-        case LOBATTO_NOT_CONVERGED:
-            why = fmt::format(
-                "the iteration for the positions inside the step did not converge: its last increment was {:.2g} "
-                "of the displacement "
-                "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
-                "of the potential",
-                result.increment_failed);
-            advice = smaller + more + ", or start elsewhere";
-            break;
-        case LOBATTO_NOT_FINITE:
-            if (!result.started) {
-                why =
-                    "a number computed from the parameters, the step and this start alone is infinite or not a number: "
-                    "they are too large or too small together, or the start is at a singularity";
-                advice = "other units, so that numbers are nearer to 1, or start elsewhere";
-                break;
-            }
-            why =
-                "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
-                "potential or away to infinity, or the "
-                "step is too long for the method to be stable";
-            advice = smaller + more + ", an earlier end, or start elsewhere";
-            break;
-        case LOBATTO_SINGULAR_JACOBIAN:
-            why =
-                "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
-                "This h meets a resonance of the forces there, or constraints depend on one another, as at a dead "
-                "point";
-            advice = smaller + ", or a slightly different one";
-            break;
-        case LOBATTO_SINGULAR_MASS:
-            why =
-                "the mass matrix has no inverse for these parameters or at this state, so that momenta do not "
-                "determine velocities";
-            advice =
-                "other values of the parameters that stand before the squared velocities, or start elsewhere; none of "
-                "the "
-                "masses may vanish";
-            break;
-        case LOBATTO_UNSUPPORTED:
-            why =
-                "the kernel was compiled without what is asked of it: states between steps, events, energies or "
-                "tangent "
-                "maps";
-            advice = "to compile it from a scene whose [output] asks for it";
-            break;
-        case LOBATTO_OFF_CONSTRAINTS:
-            why = "the start does not keep the constraints: its positions or its momenta are off";
-            advice = "positions and velocities that keep them, or assemble = true under [run] of the scene";
-            break;
-        case LOBATTO_IMPACTS_ACCUMULATE:
-            why =
-                "impacts accumulate within this step, more than 100 of them or nearer to one another than can be told "
-                "apart: the motion comes to rest on a wall, or slides along it, and walls throw back only; or friction "
-                "holds it fast, and formulas that are not smooth are known on their two sides only";
-            advice = "an end before that time, a stop under [run] where the motion has become slow, or " + smaller +
-                     " where many impacts belong into a step";
-            break;
-        case LOBATTO_TIME_STANDS_STILL:
-            if (request.arrivals.interval != 0) {
-                why = "the clock is not above 0 along the step, or so small that time stands still";
-                advice = "a clock that is positive wherever the motion goes";
-                break;
-            }
-            why = fmt::format("t + h equals t in the numbers of the run: h = {:.6g} is below the rounding of t",
-                              request.step);
-            advice = "a larger step, or a start time nearer to zero";
-            break;
-    }
-    const std::string where =
-        !result.started ? fmt::format("the run cannot begin at t = {:.6g}", result.time)
-        : request.arrivals.interval != 0
-            ? fmt::format("the run stopped in step {}, after t = {:.6g}", result.chain_steps + 1, result.time)
-        : result.steps_done == 0
-            ? fmt::format("the run stopped in its first step, at t = {:.6g}", result.time)
-            : fmt::format("the run stopped in step {}, after t = {:.6g}", result.steps_done + 1, result.time);
-    return fmt::format("{}, from q = {}, p = {}: {}. Try {}.", where, list_text(result.q), list_text(result.p), why,
-                       advice);
 }
 
 }  // namespace lobatto

@@ -51,13 +51,13 @@ std::int64_t companion_steps(std::int64_t steps) {
     return taken;
 }
 
-Companion::Companion(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request)
+Companion::Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request)
     : kernel_(kernel),
       parts_(static_cast<std::size_t>(kernel->parts)),
-      groups_(amplitude_groups(derivation.scene)),
-      order_(derivation.quadrature.order()),
+      groups_(amplitude_groups(outline.scene)),
+      order_(outline.quadrature.order()),
       rows_a_step_(1 + request.dense),
-      narrow_(derivation.system) {
+      narrow_(outline.system) {
     narrow_.set_parameters(request.parameters);
     const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {
         return whole.empty() ? as_parts(doubles, parts_) : whole;
@@ -75,13 +75,13 @@ Companion::Companion(const Outline& derivation, const Kernel& kernel, const Traj
     request_.arrivals.keeps_chain = false;
     request_.every = request.every;
     request_.tolerance = request.tolerance;
-    pulses_ = find_pulses(derivation.system, request.parameters, request.time, time_after(request, request.steps),
+    pulses_ = find_pulses(outline.system, request.parameters, request.time, time_after(request, request.steps),
                           std::fabs(request.step));
     const std::int64_t comparisons =
         std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
     stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
-    is_driven_ = !derivation.system.autonomous;
+    is_driven_ = !outline.system.autonomous;
     if (is_driven_) stride_ *= (fewest_driven_steps + stride_ - 1) / stride_;
 }
 

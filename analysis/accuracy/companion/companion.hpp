@@ -62,7 +62,7 @@ std::string text_of(const MeasuredError& error, const Scene& scene);
 class Companion {
 public:
     // What is handed over is copied, but for what the kernel needs. `request`: the run's.
-    Companion(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request);
+    Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request);
     ~Companion();
 
     // The kept states of the run go by.

@@ -43,15 +43,15 @@ const double* whole_row(const Records& kept, std::int64_t i) {
 
 }  // namespace
 
-EnsembleCompanion::EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const Kernel& plain,
+EnsembleCompanion::EnsembleCompanion(const Outline& outline, const Kernel& kernel, const Kernel& plain,
                                      const EnsembleRequest& request)
-    : derivation_(derivation),
+    : outline_(outline),
       kernel_(kernel),
       parts_(static_cast<std::size_t>(kernel->parts)),
       request_(request),
-      groups_(amplitude_groups(derivation.scene)),
-      order_(derivation.quadrature.order()),
-      narrow_(derivation.system),
+      groups_(amplitude_groups(outline.scene)),
+      order_(outline.quadrature.order()),
+      narrow_(outline.system),
       stepper_(plain) {}
 
 void EnsembleCompanion::compute(std::int64_t first) {
@@ -125,8 +125,7 @@ bool EnsembleCompanion::has_pulses(const EnsembleStart& start) {
     if (start.parameters == pulse_parameters_ && !start.parameters.empty()) return has_pulses_;
     pulse_parameters_ = start.parameters;
     const double end = request_.time + static_cast<double>(request_.steps) * request_.step;
-    has_pulses_ =
-        !find_pulses(derivation_.system, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
+    has_pulses_ = !find_pulses(outline_.system, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
     return has_pulses_;
 }
 
@@ -148,7 +147,7 @@ bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory,
 
 bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
     if (meets_narrow_terms(trajectory, start)) return true;
-    if (derivation_.system.autonomous) return false;
+    if (outline_.system.autonomous) return false;
     return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
 }
 
@@ -176,7 +175,7 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     request.steps = request_.steps;
     request.every = request_.every == 0 ? request_.steps : request_.every;
     request.tolerance = request_.tolerance;
-    Companion companion(derivation_, kernel_, request);
+    Companion companion(outline_, kernel_, request);
     Records kept = trajectory.kept;
     if (trajectory.stop >= 0) --kept.count;  // where it was stopped, between two steps
     companion.observe(kept);

@@ -16,7 +16,7 @@ namespace lobatto {
 class EnsembleCompanion {
 public:
     // What is handed over outlives it. `plain`: the kernel in double. `request`: that of the sweep, with its start.
-    EnsembleCompanion(const Outline& derivation, const Kernel& kernel, const Kernel& plain,
+    EnsembleCompanion(const Outline& outline, const Kernel& kernel, const Kernel& plain,
                       const EnsembleRequest& request);
 
     struct Error {
@@ -46,7 +46,7 @@ private:
     void move(EnsembleStart& start) const;
     Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
 
-    Outline derivation_;
+    Outline outline_;
     Kernel kernel_;
     std::size_t parts_;
     const EnsembleRequest& request_;

@@ -90,15 +90,15 @@ std::int64_t mixed_number(std::int64_t number) {
 
 }  // namespace
 
-bool EnergyWatch::can_watch(const Outline& derivation) {
-    return !derivation.scene.clock && derivation.scene.switches.empty() && derivation.conserves_energy() &&
-           derivation.system.q.size() <= ExactEnergy::most_coordinates;
+bool EnergyWatch::can_watch(const Outline& outline) {
+    return !outline.scene.clock && outline.scene.switches.empty() && outline.conserves_energy() &&
+           outline.system.q.size() <= ExactEnergy::most_coordinates;
 }
 
-EnergyWatch::EnergyWatch(const Outline& derivation, const Kernel& kernel)
-    : watches_(kernel->has_energy != 0 && can_watch(derivation)),
-      columns_(1 + 2 * derivation.system.q.size()),
-      rows_a_step_(1 + derivation.scene.outputs.dense) {}
+EnergyWatch::EnergyWatch(const Outline& outline, const Kernel& kernel)
+    : watches_(kernel->has_energy != 0 && can_watch(outline)),
+      columns_(1 + 2 * outline.system.q.size()),
+      rows_a_step_(1 + outline.scene.outputs.dense) {}
 
 void EnergyWatch::observe(const Records& records) {
     if (!watches_) return;
@@ -162,11 +162,11 @@ void EnergyWatch::restore(const std::vector<double>& saved) {
 }
 
 // In 60 digits: of small motions the energy in double is rounding.
-std::string EnergyWatch::departure(const Outline& derivation, const Kernel& kernel,
+std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
                                    const TrajectoryRequest& request) const {
     LoadedStepper<double> stepper(kernel);
     if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return "";
-    ExactEnergy energy(derivation, request.parameters);
+    ExactEnergy energy(outline, request.parameters);
     const auto energy_of = [&](const State& state) {
         return state.v.empty() ? std::nullopt : energy.at(state.q, state.v);
     };

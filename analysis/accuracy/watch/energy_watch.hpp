@@ -16,8 +16,8 @@ class EnergyWatch {
 public:
     // Systems without time and forces, of up to 64 coordinates. Their kernels need an energy, whether the scene asks
     // for it or not.
-    static bool can_watch(const Outline& derivation);
-    EnergyWatch(const Outline& derivation, const Kernel& kernel);
+    static bool can_watch(const Outline& outline);
+    EnergyWatch(const Outline& outline, const Kernel& kernel);
     // Looks at the kept states go by: some of all times, and those where the energy error has doubled.
     void observe(const Records& records);
 
@@ -28,7 +28,7 @@ public:
     // The first such state, where the energy is off by half of the mean kinetic energy, and by more than rounding of
     // the positions explains, or not real: no path of this Lagrangian goes there. What to tell of it, as of any stop;
     // empty: there is none.
-    std::string departure(const Outline& derivation, const Kernel& kernel, const TrajectoryRequest& request) const;
+    std::string departure(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request) const;
 
 private:
     using States = std::vector<std::vector<double>>;  // t, q, p

@@ -3,8 +3,7 @@
 
 namespace lobatto {
 
-ExactEnergy::ExactEnergy(const Outline& derivation, const std::vector<double>& parameters)
-    : system_(derivation.system) {
+ExactEnergy::ExactEnergy(const Outline& outline, const std::vector<double>& parameters) : system_(outline.system) {
     for (std::size_t i = 0; i < parameters.size(); ++i)
         formulas_.set(system_.parameters[i], float_of(GiNaC::numeric(parameters[i])));
     GiNaC::ex energy = -system_.lagrangian;

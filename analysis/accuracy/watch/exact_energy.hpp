@@ -13,7 +13,7 @@ namespace lobatto {
 class ExactEnergy {
 public:
     // Of a system whose formulas hold no time; parameters in the order of the scene.
-    ExactEnergy(const Outline& derivation, const std::vector<double>& parameters);
+    ExactEnergy(const Outline& outline, const std::vector<double>& parameters);
 
     // H = q'.dL/dq' - L at positions and velocities, n each.
     struct Energy {

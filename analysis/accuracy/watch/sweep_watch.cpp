@@ -33,13 +33,13 @@ double kinetic_energy(const LoadedStepper<double>& stepper, double time, const s
 
 }  // namespace
 
-SweepWatch::SweepWatch(const Outline& derivation, const KernelSource& source, const Kernel& kernel,
+SweepWatch::SweepWatch(const Outline& outline, const KernelSource& source, const Kernel& kernel,
                        const EnsembleRequest& request)
-    : derivation_(derivation),
+    : outline_(outline),
       source_(source),
       request_(request),
       kernel_(kernel),
-      watches_(kernel->has_energy != 0 && EnergyWatch::can_watch(derivation)),
+      watches_(kernel->has_energy != 0 && EnergyWatch::can_watch(outline)),
       stepper_(kernel) {}
 
 bool SweepWatch::departs(const EnsembleTrajectory& trajectory) {
@@ -60,7 +60,7 @@ bool SweepWatch::prepare(const EnsembleTrajectory& trajectory) {
 }
 
 void SweepWatch::observe(const EnsembleTrajectory& trajectory) {
-    const std::size_t n = derivation_.system.q.size();
+    const std::size_t n = outline_.system.q.size();
     if (n > most_coordinates || looks_ == most_looks || !prepare(trajectory)) return;
     ++looks_;
     const double* const row = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns;
@@ -79,7 +79,7 @@ void SweepWatch::observe(const EnsembleTrajectory& trajectory) {
 }
 
 std::string SweepWatch::warning() const {
-    const double limit = radians_ > 0 ? stability_limit(derivation_.quadrature, radians_) : radians_;
+    const double limit = radians_ > 0 ? stability_limit(outline_.quadrature, radians_) : radians_;
     if (!(radians_ > limit)) return "";
     return fmt::format(
         "the step is beyond the linear stability limit, at most in trajectory {}: h omega = {:.3g} is more than "
@@ -107,9 +107,9 @@ bool SweepWatch::run_again(const EnsembleTrajectory& trajectory) {
     again.tolerance = request_.tolerance;
     again.steps = trajectory.steps_done;
     again.interrupted = request_.interrupted;
-    EnergyWatch watch(derivation_, *alone_);
+    EnergyWatch watch(outline_, *alone_);
     again.sink = [&](const Records& records) { watch.observe(records); };
-    return integrate(*alone_, again).status == LOBATTO_OK && !watch.departure(derivation_, *alone_, again).empty();
+    return integrate(*alone_, again).status == LOBATTO_OK && !watch.departure(outline_, *alone_, again).empty();
 }
 
 }  // namespace lobatto

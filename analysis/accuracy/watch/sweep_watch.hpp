@@ -17,7 +17,7 @@ namespace lobatto {
 class SweepWatch {
 public:
     // What is handed over outlives it. Systems that EnergyWatch can watch; of others nothing is told.
-    SweepWatch(const Outline& derivation, const KernelSource& source, const Kernel& kernel,
+    SweepWatch(const Outline& outline, const KernelSource& source, const Kernel& kernel,
                const EnsembleRequest& request);
     // Whether the energy of this one, which reached the end, is off by as much as the motion has. Those where the
     // kinetic energies of both ends leave that open are run once more by themselves, as `lobatto run` does it.
@@ -33,7 +33,7 @@ private:
     bool run_again(const EnsembleTrajectory& trajectory);
     bool prepare(const EnsembleTrajectory& trajectory);
 
-    Outline derivation_;
+    Outline outline_;
     const KernelSource& source_;
     const EnsembleRequest& request_;
     Kernel kernel_;                // in double

@@ -2,21 +2,19 @@
 // The mechanical system of a scene: L(q, q', t) and forces, their first and second derivatives, and of what kind they
 // are.
 //
-// Derivatives are taken symbolically, term by term. Whether one vanishes, or depends on q, v or t, is told by its
-// values at seeded points to 60 digits: a formula that is zero only after simplification is recognised, and nothing is
-// expanded.
+// Derivatives are taken symbolically, term by term (derivatives.cpp). Whether one vanishes, or depends on q, v or t, is
+// told by its values at seeded points to 60 digits (dependence.cpp): a formula that is zero only after simplification
+// is recognised, and nothing is expanded.
 #include "generator/mechanics/system/system.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <map>
-#include <set>
 
 #include "generator/formula/real.hpp"
 #include "generator/graph/notation.hpp"
-#include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/system/dependence.hpp"
 #include "generator/mechanics/system/mass_equations.hpp"
 
 namespace lobatto {
@@ -24,187 +22,7 @@ namespace lobatto {
 namespace {
 
 using GiNaC::ex;
-using GiNaC::exvector;
 using Symbols = std::vector<GiNaC::symbol>;
-
-[[noreturn]] void refuse(const Scene& scene, const std::string& reason) {
-    scene.source.fail(scene.lagrangian_at, "the Lagrangian " + reason);
-}
-
-// The variables that an expression holds, as indices in ascending order.
-class Occurrences {
-public:
-    explicit Occurrences(const Symbols& variables) {
-        for (std::size_t i = 0; i < variables.size(); ++i) index_[variables[i]] = i;
-    }
-    std::set<std::size_t> in(const ex& expression) const {
-        std::set<std::size_t> found;
-        visit(expression, found);
-        return found;
-    }
-
-private:
-    void visit(const ex& expression, std::set<std::size_t>& found) const {
-        if (GiNaC::is_a<GiNaC::symbol>(expression)) {
-            if (const auto known = index_.find(expression); known != index_.end()) found.insert(known->second);
-            return;
-        }
-        for (std::size_t i = 0; i < expression.nops(); ++i) visit(expression.op(i), found);
-    }
-    std::map<ex, std::size_t, GiNaC::ex_is_less> index_;
-};
-
-// GiNaC goes through the whole of a substitution at every sum and product: only what occurs is put into it.
-ex at(const ex& expression, const Symbols& variables, const Occurrences& occurrences, const ex& value) {
-    GiNaC::exmap found;
-    for (const std::size_t i : occurrences.in(expression)) found[variables[i]] = value;
-    return expression.subs(found, GiNaC::subs_options::no_pattern);
-}
-
-// A value that does not depend on what its formula mentions, without it: at the origin, or where that is a pole, beside
-// it.
-ex without(const ex& value, const Symbols& mentioned, const Occurrences& occurrences) {
-    for (const ex& place : {ex(0), ex(GiNaC::numeric(1, 2))}) try {
-            return at(value, mentioned, occurrences, place);
-        } catch (const std::exception&) {
-        }
-    GiNaC::exmap apart;
-    for (const std::size_t i : occurrences.in(value))
-        apart[mentioned[i]] = GiNaC::numeric(1, static_cast<long>(apart.size()) + 3);
-    return value.subs(apart, GiNaC::subs_options::no_pattern);
-}
-
-void append_terms(const ex& expression, const Occurrences& occurrences, std::vector<ex>& terms) {
-    if (GiNaC::is_a<GiNaC::add>(expression)) {
-        for (const ex& term : expression) append_terms(term, occurrences, terms);
-        return;
-    }
-    if (GiNaC::is_a<GiNaC::mul>(expression)) {
-        exvector free, bound;
-        for (const ex& factor : expression) (occurrences.in(factor).empty() ? free : bound).push_back(factor);
-        if (bound.size() == 1 && GiNaC::is_a<GiNaC::add>(bound.front())) {
-            std::vector<ex> inner;
-            append_terms(bound.front(), occurrences, inner);
-            const ex coefficient = GiNaC::mul(free);
-            for (const ex& term : inner) terms.push_back(coefficient * term);
-            return;
-        }
-    }
-    terms.push_back(expression);
-}
-
-ex sum_of(const exvector& terms) {
-    return terms.empty() ? ex(0) : ex(GiNaC::add(terms));
-}
-
-// Which of q, v, t and the inputs the derivatives of a system depend on, from their values at sample points.
-class Dependence {
-public:
-    struct Kind {
-        bool zero = true, on_q = false, on_v = false, on_t = false, on_inputs = false;
-        bool constant() const { return !on_q && !on_v && !on_t && !on_inputs; }
-    };
-
-    Dependence(const Scene& scene, const System& system, const Symbols& motion)
-        : scene_(scene), system_(system), motion_(motion) {}
-
-    // What is pieced may jump or bend beyond the sampled points, as x/sqrt(x^2) does: what holds it is taken to depend
-    // on all that it mentions. Everything else is analytic: constant near a point is constant.
-    bool is_broken(const ex& expression) const {
-        for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
-            if (is_pieced(*part) && !motion_.in(*part).empty()) return true;
-        return false;
-    }
-    // Whether something broken holds positions or velocities.
-    bool is_bent(const ex& expression) const {
-        const std::size_t n = system_.q.size();
-        for (auto part = expression.preorder_begin(); part != expression.preorder_end(); ++part)
-            if (is_pieced(*part))
-                for (const std::size_t variable : motion_.in(*part))
-                    if (variable < 2 * n) return true;
-        return false;
-    }
-
-    std::vector<Kind> of(const std::vector<ex>& expressions) const {
-        std::vector<Kind> kinds = sampled(expressions);
-        const std::size_t n = system_.q.size();
-        for (std::size_t i = 0; i < kinds.size(); ++i) {
-            if (!is_broken(expressions[i])) continue;
-            kinds[i].zero = false;
-            for (const std::size_t variable : motion_.in(expressions[i]))
-                (variable < n        ? kinds[i].on_q
-                 : variable < 2 * n  ? kinds[i].on_v
-                 : variable == 2 * n ? kinds[i].on_t
-                                     : kinds[i].on_inputs) = true;
-        }
-        return kinds;
-    }
-
-    std::shared_ptr<const Formulas> formulas() const { return formulas_; }
-
-private:
-    std::vector<Kind> sampled(const std::vector<ex>& expressions) const {
-        std::vector<Kind> kinds(expressions.size());
-        try {
-            at_sample_points(scene_, [&](NearStart& point) {
-                point.set_all(*formulas_);
-                examine(*formulas_, formulas_->convert(expressions), point, kinds);
-            });
-        } catch (const DomainError& error) {
-            refuse(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
-                                       "from the singularity, or mend the formula",
-                                       error.what()));
-        }
-        return kinds;
-    }
-
-    void examine(Formulas& formulas, const std::vector<Id>& roots, NearStart& point, std::vector<Kind>& kinds) const {
-        const std::vector<Sized> all = formulas.evaluate_all_sized(roots);
-        const auto here = [&](std::size_t i) -> const Sized& { return all[static_cast<std::size_t>(roots[i])]; };
-        const auto moved = [&](const Symbols& symbols, bool Kind::*flag) {
-            const std::vector<bool> holding = formulas.holding(roots, symbols);
-            std::vector<std::size_t> which;
-            std::vector<Id> those;
-            for (std::size_t i = 0; i < roots.size(); ++i)
-                if (holding[i]) {
-                    which.push_back(i);
-                    those.push_back(roots[i]);
-                }
-            if (those.empty()) return;
-            std::vector<cln::cl_R> before;
-            for (const GiNaC::symbol& symbol : symbols) {
-                before.push_back(formulas.get(symbol));
-                formulas.set(symbol, point.near(before.back()));
-            }
-            const std::vector<Sized> there = formulas.evaluate_sized(those);
-            for (std::size_t i = 0; i < those.size(); ++i)
-                if (!here(which[i]).equals(there[i])) kinds[which[i]].*flag = true;
-            for (std::size_t k = 0; k < symbols.size(); ++k) formulas.set(symbols[k], before[k]);
-        };
-        // What a term depends on counts also where the term is too small to be seen.
-        const std::vector<GiNaC::exset> hidden = formulas.hidden(roots, all);
-        const auto hides = [&](std::size_t i, const Symbols& symbols) {
-            return !hidden[i].empty() &&
-                   std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return hidden[i].contains(s); });
-        };
-        for (std::size_t i = 0; i < kinds.size(); ++i) {
-            if (!here(i).vanishes() || !hidden[i].empty()) kinds[i].zero = false;
-            kinds[i].on_q |= hides(i, system_.q);
-            kinds[i].on_v |= hides(i, system_.v);
-            kinds[i].on_t |= hides(i, {system_.t});
-            kinds[i].on_inputs |= hides(i, system_.inputs);
-        }
-        moved(system_.q, &Kind::on_q);
-        moved(system_.v, &Kind::on_v);
-        moved({system_.t}, &Kind::on_t);
-        if (!system_.inputs.empty()) moved(system_.inputs, &Kind::on_inputs);
-    }
-
-    const Scene& scene_;
-    const System& system_;
-    const Occurrences motion_;  // q, v, t, inputs
-    const std::shared_ptr<Formulas> formulas_ = std::make_shared<Formulas>();
-};
 
 // Refuses a mass matrix that is singular near the start.
 void check_mass(const Scene& scene, const System& system) {
@@ -217,10 +35,11 @@ void check_mass(const Scene& scene, const System& system) {
             if (!elimination.singular) break;
             if (const std::string dependent = equations.dependent_constraints(elimination); !dependent.empty())
                 scene.source.fail(system.constraints.front().at, dependent);
-            refuse(scene,
-                   "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
-                   "do not follow from momenta. No kinetic energy opposes the direction " +
-                       direction_text(system, elimination.vector) + "; add the missing mass, or remove a coordinate");
+            refuse_lagrangian(
+                scene,
+                "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "
+                "do not follow from momenta. No kinetic energy opposes the direction " +
+                    direction_text(system, elimination.vector) + "; add the missing mass, or remove a coordinate");
         } catch (const DomainError&) {
             if (attempt == sample_attempts) throw;
         }
@@ -244,46 +63,6 @@ std::string direction_text(const System& system, const std::vector<cln::cl_R>& d
         text += (text.empty() ? "" : ", ") + system.v[k].get_name() + " = " + decimal(direction[k], 6);
     }
     return text;
-}
-
-std::vector<ex> terms_of(const ex& expression, const Symbols& variables) {
-    std::vector<ex> terms;
-    append_terms(expression, Occurrences(variables), terms);
-    return terms;
-}
-
-std::vector<ex> all_at(const std::vector<ex>& expressions, const Symbols& variables, const ex& value) {
-    const Occurrences occurrences(variables);
-    std::vector<ex> result;
-    for (const ex& expression : expressions) result.push_back(at(expression, variables, occurrences, value));
-    return result;
-}
-
-std::vector<ex> gradient_of(const std::vector<ex>& terms, const Symbols& variables) {
-    const Occurrences occurrences(variables);
-    std::vector<exvector> parts(variables.size());
-    for (const ex& term : terms)
-        for (const std::size_t i : occurrences.in(term)) parts[i].push_back(term.diff(variables[i]));
-    std::vector<ex> gradient;
-    for (const exvector& part : parts) gradient.push_back(sum_of(part));
-    return gradient;
-}
-
-SparseMatrix derivative_of(const std::vector<ex>& vector, const Symbols& variables) {
-    const Occurrences occurrences(variables);
-    SparseMatrix result(static_cast<int>(vector.size()), static_cast<int>(variables.size()));
-    for (std::size_t k = 0; k < vector.size(); ++k) {
-        std::vector<ex> terms;
-        append_terms(vector[k], occurrences, terms);
-        std::map<std::size_t, exvector> parts;
-        for (const ex& term : terms)
-            for (const std::size_t i : occurrences.in(term)) parts[i].push_back(term.diff(variables[i]));
-        for (const auto& [i, part] : parts) {
-            const ex value = sum_of(part);
-            if (!value.is_zero()) result.put(static_cast<int>(k), static_cast<int>(i), value);
-        }
-    }
-    return result;
 }
 
 namespace {

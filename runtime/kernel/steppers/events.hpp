@@ -105,9 +105,59 @@ struct WatchedStepper : Stepper<K> {
     real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
 };
 
+// One function of the motion, sampled over a step.
+template <class real>
+struct SampledFunction {
+    static constexpr real rounding = real(2) * Limits<real>::epsilon;
+
+    struct Sample {
+        real theta, value;
+        bool is_exact;
+    };
+
+    static bool has_sign(real value) { return is_finite(value) && value != real(0); }
+    static bool changes(real a, real b) { return has_sign(a) && has_sign(b) && (a > real(0)) != (b > real(0)); }
+
+    // From a sample where g is defined towards a place where it is not: the last sample before its domain ends, or one
+    // where its sign has changed.
+    template <class G>
+    static Sample last_defined(Sample inside, real outside, const G& g) {
+        const real start = inside.value;
+        while (fabs(outside - inside.theta) > rounding && !changes(inside.value, start)) {
+            const real middle = real(0.5) * (inside.theta + outside), value = g(middle);
+            if (is_finite(value))
+                inside = {middle, value, inside.is_exact};
+            else
+                outside = middle;
+        }
+        return inside;
+    }
+
+    // The least |g| between a and b by golden sections, or the first place found where the sign is another.
+    template <class G>
+    static Sample least_between(const Sample& a, Sample middle, const Sample& b, const G& g) {
+        real low = a.theta, high = b.theta;
+        for (int i = 0; i < 48 && !changes(middle.value, a.value) && high - low > Limits<real>::root_epsilon; ++i) {
+            const bool is_above = high - middle.theta > middle.theta - low;
+            const real theta = middle.theta + real(0.381966) * (is_above ? high - middle.theta : low - middle.theta);
+            const real value = g(theta);
+            if (changes(value, a.value) || fabs(value) < fabs(middle.value)) {
+                (is_above ? low : high) = middle.theta;
+                middle = {theta, value, middle.is_exact};
+            } else {
+                (is_above ? high : low) = theta;
+            }
+        }
+        return middle;
+    }
+};
+
 template <class K>
-struct Events {
+struct Events : SampledFunction<typename K::real> {
     using real = typename K::real;
+    using Sampled = SampledFunction<real>;
+    using Sampled::changes, Sampled::has_sign, Sampled::last_defined, Sampled::least_between, Sampled::rounding;
+    using typename Sampled::Sample;
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, pieces = 2 * S::nodes;
     static constexpr int grid_size = pieces + 3;     // the ends of pieces, and a place next to each end of the step
@@ -115,12 +165,6 @@ struct Events {
     static constexpr int columns = 1 + Between<K>::columns;
     static constexpr int most = K::events * room;  // rows of one step
     static constexpr int walls = S::walls, first_wall = K::events - walls;
-    static constexpr real rounding = real(2) * Limits<real>::epsilon;
-
-    struct Sample {
-        real theta, value;
-        bool is_exact;
-    };
 
     explicit Events(const S& stepper) : partial(new S(stepper)) {
         for (int i = 0; i < grid_size; ++i) {
@@ -188,9 +232,6 @@ private:
     bool knows_end[2]{};
     Sample samples[room]{};
     int sample_count{};
-
-    static bool has_sign(real value) { return is_finite(value) && value != real(0); }
-    static bool changes(real a, real b) { return has_sign(a) && has_sign(b) && (a > real(0)) != (b > real(0)); }
 
     void on_grid(int i) {
         if constexpr (S::basis > 0) {
@@ -315,21 +356,6 @@ private:
         return true;
     }
 
-    // From a sample where g is defined towards a place where it is not: the last sample before its domain ends, or one
-    // where its sign has changed.
-    template <class G>
-    static Sample last_defined(Sample inside, real outside, const G& g) {
-        const real start = inside.value;
-        while (fabs(outside - inside.theta) > rounding && !changes(inside.value, start)) {
-            const real middle = real(0.5) * (inside.theta + outside), value = g(middle);
-            if (is_finite(value))
-                inside = {middle, value, inside.is_exact};
-            else
-                outside = middle;
-        }
-        return inside;
-    }
-
     // In pieces at one end of which g is not defined: a sample where its domain ends, and one half way to it.
     template <class G>
     void reach_undefined(bool is_exact, const G& g) {
@@ -379,24 +405,6 @@ private:
             if (y[j] > largest) largest = y[j];
         }
         return is_no_dip<pieces>(y, piece_at(i), largest);
-    }
-
-    // The least |g| between a and b by golden sections, or the first place found where the sign is another.
-    template <class G>
-    static Sample least_between(const Sample& a, Sample middle, const Sample& b, const G& g) {
-        real low = a.theta, high = b.theta;
-        for (int i = 0; i < 48 && !changes(middle.value, a.value) && high - low > Limits<real>::root_epsilon; ++i) {
-            const bool is_above = high - middle.theta > middle.theta - low;
-            const real theta = middle.theta + real(0.381966) * (is_above ? high - middle.theta : low - middle.theta);
-            const real value = g(theta);
-            if (changes(value, a.value) || fabs(value) < fabs(middle.value)) {
-                (is_above ? low : high) = middle.theta;
-                middle = {theta, value, middle.is_exact};
-            } else {
-                (is_above ? high : low) = theta;
-            }
-        }
-        return middle;
     }
 
     // Exact values at both ends of each piece along which the sign changes, as far as that moves the changes.
