@@ -40,6 +40,7 @@ struct SweepOptions {
     MethodOption method;
     Overrides overrides;
     std::optional<std::int64_t> steps;
+    std::string device = "cpu";
     int threads = 0;
     bool resume = false;
     bool unmeasured = false;
@@ -133,6 +134,9 @@ std::unique_ptr<SweepStudy> study_of(const SweepOptions& options, int threads) {
     StudyOptions study;
     study.overrides = options.overrides;
     study.steps = options.steps;
+    study.device = options.device == "cuda"   ? StudyDevice::cuda
+                   : options.device == "auto" ? StudyDevice::automatic
+                                              : StudyDevice::processor;
     study.threads = threads;
     study.measures = !options.unmeasured;
     study.beyond_horizon = options.beyond_horizon;
@@ -258,7 +262,13 @@ void sweep(const SweepOptions& options) {
     if (!quiet) fmt::print("{}: kernel {}\n", scene.path, study->first_setting().source->digest);
     Results results = results_of(options, *study, path, head, shard.first());
     std::vector<std::string> warnings;
-    const StudyTimes times = compute(*study, crew ? &*crew : nullptr, results, shard.last(), quiet, warnings);
+    StudyTimes times;
+    try {
+        times = compute(*study, crew ? &*crew : nullptr, results, shard.last(), quiet, warnings);
+    } catch (const MachineError&) {  // what was computed is there for --resume
+        results.table->flush();
+        throw;
+    }
     results.table->finish();
 
     const SweepTally& tally = results.tally;
@@ -317,6 +327,12 @@ void add_sweep(CommandLine& program) {
                 "Keep the start, every N-th state and the last one (default: the last one alone)")
         .shown_as("N");
     add_set_option(command, options->overrides);
+    command
+        .option("--device", options->device,
+                "What takes the steps: cpu, cuda (an NVIDIA GPU; docs/gpu.md), or auto, the faster of both (default: "
+                "cpu)")
+        .shown_as("DEVICE")
+        .one_of(std::vector<std::string>{"cpu", "cuda", "auto"});
     command.option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
         .shown_as("N")
         .between(1, 1024);
