@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "bench/device.hpp"
 #include "bench/growth.hpp"
 #include "bench/instructions.hpp"
 #include "bench/reference.hpp"
@@ -21,7 +22,7 @@ struct Options {
     std::string output = "out/bench";
     bool ensemble = false, single = false;
     bool references = false;
-    bool growth = false, instructions = false, store = false;
+    bool device = false, growth = false, instructions = false, store = false;
     RaceOptions race;
 };
 
@@ -70,6 +71,7 @@ int main(int argc, char** argv) {
     program.add_flag("--quick", options.race.quick, "Fewer kernels, coarser steps and fewer repetitions");
     program.add_flag("--references", options.references,
                      "No race: how far the references of the problems move with shorter steps");
+    program.add_flag("--device", options.device, "No race: sweeps of P1 to P4 on a GPU, beside the processor");
     program.add_flag("--growth", options.growth, "No race: chains of 8 to 4096 masses, linear systems");
     CLI::Option* instructions = program.add_flag("--instructions", options.instructions,
                                                  "No race: count the instructions a step, compare with the stored");
@@ -79,6 +81,9 @@ int main(int argc, char** argv) {
         if (options.instructions) return check_instructions(options.store);
         if (options.references) {
             print_references(options.problems);
+        } else if (options.device) {
+            print_machine();
+            print_device_rates();
         } else if (options.growth) {
             print_machine();
             print_growth();

@@ -109,6 +109,9 @@ std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& 
         StudyOptions wish;
         wish.overrides = overrides_of(options);
         wish.steps = options.steps;
+        wish.device = options.device == Device::cuda        ? StudyDevice::cuda
+                      : options.device == Device::automatic ? StudyDevice::automatic
+                                                            : StudyDevice::processor;
         wish.threads = options.threads;
         wish.measures = options.measure;
         wish.beyond_horizon = options.beyond_horizon;

@@ -14,15 +14,6 @@ namespace lobatto {
 
 namespace {
 
-// In one translation unit a header's guard is a warning and its include of another part is a missing file.
-void append_part(std::string& whole, const std::string& text) {
-    std::istringstream lines(text);
-    for (std::string line; std::getline(lines, line);) {
-        const bool joins_parts = line == "#pragma once" || line.starts_with("#include \"");
-        if (!joins_parts) whole += line + '\n';
-    }
-}
-
 // What a library of this kernel is compiled from.
 std::string support_of(const KernelSource& source, bool is_ensemble, bool is_refilled) {
     if (source.support.empty()) return support_text();
@@ -43,6 +34,14 @@ Kernel built(const KernelSource& source, const Translation& translation, Compile
 }
 
 }  // namespace
+
+void append_part(std::string& whole, const std::string& text) {
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        const bool joins_parts = line == "#pragma once" || line.starts_with("#include \"");
+        if (!joins_parts) whole += line + '\n';
+    }
+}
 
 Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together, bool refilled) {
     Translation translation;

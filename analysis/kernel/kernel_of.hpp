@@ -16,6 +16,9 @@ namespace lobatto {
 Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together = 0,
                            bool refilled = false);
 
+// In one translation unit a header's guard is a warning and its include of another part is a missing file.
+void append_part(std::string& whole, const std::string& text);
+
 // Compiles it, or finds it in the cache, and loads it. `source` must have been emitted with this precision, without
 // standalone support.
 Kernel kernel_of(const KernelSource& source, Precision precision, Compiled* compiled = nullptr);

@@ -11,7 +11,9 @@
 #include "analysis/exact_start.hpp"
 #include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/reductions.hpp"
+#include "analysis/sweep/pace.hpp"
 #include "generator/mechanics/start.hpp"
+#include "runtime/error.hpp"
 #include "runtime/run/output.hpp"
 
 namespace lobatto {
@@ -100,6 +102,37 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
     }
     rows_ = std::make_unique<SweepRows>(scene_, *starts_, states_kept(options.overrides, scene_), options.measures);
     first_ = prepare(0);
+    choose_device();
+}
+
+void SweepStudy::choose_device() {
+    if (options_.device == StudyDevice::processor) return;
+    const std::string obstacle = why_not_on_device(scene_);
+    if (options_.device == StudyDevice::cuda) {
+        if (!obstacle.empty())
+            throw InputError(fmt::format("{}: --device cuda: {}; compute with --device cpu", scene_.path, obstacle));
+        device_ = CudaDevice::open();
+        put_on_device(*first_);
+        return;
+    }
+    if (!obstacle.empty() || !is_long(*first_->kernel, first_->request, starts_->count())) return;
+    try {
+        if (!find_nvcc()) return;
+        device_ = CudaDevice::open();
+        put_on_device(*first_);
+        if (is_faster_on_device(*first_->kernel, first_->request)) return;
+    } catch (const MachineError&) {  // no driver, no device, a full one: then the processor
+    } catch (const InputError&) {    // no lanes
+    }
+    device_ = nullptr;
+    first_ = prepare(0);
+}
+
+void SweepStudy::put_on_device(Setting& setting) const {
+    if (!device_) return;
+    std::string compiled;
+    setting.request.device = device_kernel_of(*setting.source, setting.scene.method.numbers, device_, &compiled);
+    setting.compiled += "+" + compiled;
 }
 
 Steps SweepStudy::steps_of_setting(Scene& scene) const {
@@ -151,6 +184,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     setting->plain = is_double ? setting->kernel : kernel_of(*known.plain, Precision::double_);
     setting->compiled = std::filesystem::path(compiled.object).stem().string();
     setting->request = request_of(*setting);
+    put_on_device(*setting);
     return setting;
 }
 
@@ -213,7 +247,7 @@ StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink
         steps_gone += request.count * request.steps;
         first += request.count;
         times.add({result.interrupted, result.steps_done, result.processor_seconds, result.seconds, result.threads,
-                   (*current_->kernel)->lanes == 0 ? 0 : result.lanes});
+                   (*current_->kernel)->lanes == 0 && !device_ ? 0 : result.lanes});
     }
     return times;
 }

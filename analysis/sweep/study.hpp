@@ -16,14 +16,19 @@
 #include "analysis/sweep/judges.hpp"
 #include "analysis/sweep/rows.hpp"
 #include "analysis/sweep/starts.hpp"
+#include "runtime/run/ensemble/cuda.hpp"
 
 namespace lobatto {
+
+// What takes the steps; automatic: the faster of both in a trial, the processor where there is no device.
+enum class StudyDevice { processor, cuda, automatic };
 
 struct StudyOptions {
     Overrides overrides;
     std::optional<std::int64_t> steps;  // instead of an end time
-    int threads = 0;                    // 0: as many as the machine runs
-    bool measures = true;               // errors, by companions
+    StudyDevice device = StudyDevice::processor;
+    int threads = 0;       // 0: as many as the machine runs
+    bool measures = true;  // errors, by companions
     bool beyond_horizon = false;
 };
 
@@ -39,13 +44,14 @@ struct StudyTimes {
 class SweepStudy {
 public:
     // `scene` with its method and what it keeps, as read; `options` are applied here. Compiles the kernel of the first
-    // setting. InputError where something makes no sense.
+    // setting. InputError where something makes no sense; MachineError where a device is asked for and cannot be had.
     SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options,
                std::recursive_mutex* algebra = nullptr);
 
     const Scene& scene() const { return scene_; }  // with all values that are the same for all
     const SweepStarts& starts() const { return *starts_; }
     const SweepRows& rows() const { return *rows_; }
+    const CudaDevice* device() const { return device_.get(); }  // that takes the steps; null: the processor does
 
     // One setting of the method: what its trajectories share.
     struct Setting {
@@ -79,6 +85,8 @@ private:
     std::unique_ptr<Setting> prepare(std::int64_t number);
     EnsembleRequest request_of(const Setting& setting) const;
     Steps steps_of_setting(Scene& scene) const;
+    void choose_device();
+    void put_on_device(Setting& setting) const;
     void enter(std::int64_t number);
     void note_warning();
 
@@ -93,6 +101,7 @@ private:
         std::shared_ptr<const KernelSource> source, plain;  // plain: in double
     };
     std::map<std::pair<int, int>, Derived> derived_;  // by family and number of points
+    std::shared_ptr<const CudaDevice> device_;
     std::unique_ptr<Setting> first_;
     std::unique_ptr<Setting> current_;
     std::optional<Judges> judges_;

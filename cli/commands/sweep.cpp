@@ -38,6 +38,7 @@ struct SweepOptions {
     MethodOption method;
     Overrides overrides;
     std::optional<std::int64_t> steps;
+    std::string device = "cpu";
     int threads = 0;
     bool resume = false;
     bool unmeasured = false;
@@ -92,6 +93,9 @@ std::unique_ptr<SweepStudy> study_of(const SweepOptions& options, int threads) {
     api::SweepOptions wish;
     static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
     wish.keep = options.keep;
+    wish.device = options.device == "cuda"   ? api::Device::cuda
+                  : options.device == "auto" ? api::Device::automatic
+                                             : api::Device::processor;
     wish.steps = options.steps;
     wish.threads = threads;
     wish.measure = !options.unmeasured;
@@ -214,7 +218,13 @@ void sweep(const SweepOptions& options) {
     if (!quiet) fmt::print("{}: kernel {}\n", scene.path, study->first_setting().source->digest);
     Results results = results_of(options, *study, path, head, shard.first());
     std::vector<std::string> warnings;
-    const StudyTimes times = compute(*study, crew ? &*crew : nullptr, results, shard.last(), quiet, warnings);
+    StudyTimes times;
+    try {
+        times = compute(*study, crew ? &*crew : nullptr, results, shard.last(), quiet, warnings);
+    } catch (const MachineError&) {  // what was computed is there for --resume
+        results.table->flush();
+        throw;
+    }
     results.table->finish();
 
     const SweepTally& tally = results.tally;
@@ -273,6 +283,12 @@ void add_sweep(CommandLine& program) {
                 "Keep the start, every N-th state and the last one (default: the last one alone)")
         .shown_as("N");
     add_set_option(command, options->overrides);
+    command
+        .option("--device", options->device,
+                "What takes the steps: cpu, cuda (an NVIDIA GPU; docs/gpu.md), or auto, the faster of both (default: "
+                "cpu)")
+        .shown_as("DEVICE")
+        .one_of(std::vector<std::string>{"cpu", "cuda", "auto"});
     command.option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
         .shown_as("N")
         .between(1, 1024);

@@ -76,14 +76,19 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
         print_row("steps", fmt::format("{} each, h = {:.6g}, to t = {:.6g}", request.steps, request.step,
                                        static_cast<double>(request.steps) * request.step));
     }
-    if (times.threads > 0)
+    if (const CudaDevice* const device = study.device(); device != nullptr)
+        print_row("device",
+                  fmt::format("{}, {} at a time", device->name(), counted(times.lanes, "trajectory", "trajectories")));
+    else if (times.threads > 0)
         print_row("threads",
                   fmt::format("{}, {} each", times.threads,
                               times.lanes == 0 ? "one trajectory at a time" : counted(times.lanes, "lane", "lanes")));
     if (times.steps_done > 0) {
         const auto steps = static_cast<double>(times.steps_done);
         print_row("speed", fmt::format("{:.3g} steps per second", steps / times.seconds));
-        print_row("time per step", duration(times.processor_seconds / steps) + " of a processor, for one trajectory");
+        if (study.device() == nullptr)
+            print_row("time per step",
+                      duration(times.processor_seconds / steps) + " of a processor, for one trajectory");
     }
     if (!is_one) {
         print_settings(study, tally);

@@ -32,11 +32,11 @@ public:
 
     void add(const TableCell* cells, std::size_t rows);
     std::int64_t rows() const { return rows_; }
+    void flush();  // all rows so far stand in NAME.partial
     void finish();
     void discard();  // nothing of it stays
 
 private:
-    void flush();
     std::string partial_json() const;
 
     std::string path_;

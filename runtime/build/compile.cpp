@@ -10,6 +10,7 @@
 #include "runtime/build/cache.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/process.hpp"
+#include "runtime/build/recipe.hpp"
 #include "runtime/error.hpp"
 #include "runtime/kernel/abi.h"
 
@@ -53,17 +54,15 @@ std::string how_it_ended(const ProcessResult& result, double seconds_limit) {
 
 }  // namespace
 
-Compiled compile(const Translation& translation, const std::atomic<bool>* abandoned) {
-    const Compiler compiler = find_compiler(translation.quadruple);
-    const std::string source = translation.name + ".cpp", object = translation.name + ".so";
+Compiled build(const Recipe& recipe, const std::atomic<bool>* abandoned) {
     ProcessRequest request;
-    request.arguments = compile_arguments(compiler, source, object, translation);
+    request.arguments = recipe.arguments;
     const std::string command = shell_text(request.arguments);
 
-    const CacheEntry entry(
-        translation.name,
-        fmt::format("interface: {}\ncommand: {}\ncompiler: {}processor:\n{}source:\n{}", LOBATTO_ABI_VERSION, command,
-                    compiler.identity, processor_identity(), translation.text));
+    const CacheEntry entry(recipe.name,
+                           fmt::format("interface: {}\ncommand: {}\ncompiler: {}processor:\n{}source:\n{}",
+                                       LOBATTO_ABI_VERSION, command, recipe.identity, recipe.processor, recipe.text),
+                           recipe.ending);
     if (entry.is_valid()) return {entry.object_path(), command, true, 0};
 
     const CacheEntry::Lock lock(entry);
@@ -73,22 +72,18 @@ Compiled compile(const Translation& translation, const std::atomic<bool>* abando
     request.folder = entry.building_path();
     request.abandoned = abandoned;
     request.environment = {{"TMPDIR", request.folder}};  // what a killed compiler leaves is removed with the folder
-    write_file(request.folder + "/" + source, translation.text);
+    write_file(request.folder + "/" + recipe.source, recipe.text);
     const auto start = std::chrono::steady_clock::now();
     const ProcessResult result = run_process(request);
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     if (result.abandoned) {
         std::error_code ignored;
         std::filesystem::remove_all(request.folder, ignored);
-        throw MachineError("the C++ compiler was ended, since nobody waited for it");
+        throw MachineError(recipe.compiler + " was ended, since nobody waited for it");
     }
-    const bool has_object = std::filesystem::exists(request.folder + "/" + object);
+    const bool has_object = std::filesystem::exists(request.folder + "/" + recipe.object);
     if (!result.succeeded() || !has_object) {
-        if (translation.many_digits > 0 && lacks_mpfr(result.output))
-            throw MachineError(fmt::format(
-                "numbers = \"{} digits\" needs MPFR, and {} does not find its header mpfr.h; install Debian's package "
-                "libmpfr-dev (apt-get install libmpfr-dev), or choose \"double-double\" or \"quadruple\"",
-                translation.many_digits, compiler.words[0]));
+        if (recipe.explain) recipe.explain(result.output);
         std::string kept = "Source, command and whole output are kept in " + entry.failed_path();
         try {
             write_file(request.folder + "/command", command + "\n");
@@ -97,17 +92,35 @@ Compiled compile(const Translation& translation, const std::atomic<bool>* abando
         } catch (const MachineError& error) {
             kept = std::string("Nothing of this could be kept: ") + error.what();
         }
-        const std::string how = result.succeeded()
-                                    ? fmt::format(
-                                          "{} ended well but wrote no {}; correct the environment variable CXX, or "
-                                          "unset it to use g++ or clang++",
-                                          compiler.words[0], object)
-                                    : how_it_ended(result, request.seconds_limit);
-        throw MachineError(fmt::format("the C++ compiler {}.\nCommand: {}\nIts output:\n{}{}", how, command,
+        const std::string how = result.succeeded() ? fmt::format("{} ended well but wrote no {}; {}",
+                                                                 recipe.arguments[0], recipe.object, recipe.mend)
+                                                   : how_it_ended(result, request.seconds_limit);
+        throw MachineError(fmt::format("{} {}.\nCommand: {}\nIts output:\n{}{}", recipe.compiler, how, command,
                                        first_lines(result.output), kept));
     }
-    entry.publish(object);
+    entry.publish(recipe.object);
     return {entry.object_path(), command, false, elapsed.count(), was_altered};
+}
+
+Compiled compile(const Translation& translation, const std::atomic<bool>* abandoned) {
+    const Compiler compiler = find_compiler(translation.quadruple);
+    Recipe recipe;
+    recipe.name = translation.name;
+    recipe.source = translation.name + ".cpp";
+    recipe.object = translation.name + ".so";
+    recipe.text = translation.text;
+    recipe.arguments = compile_arguments(compiler, recipe.source, recipe.object, translation);
+    recipe.identity = compiler.identity;
+    recipe.processor = processor_identity();
+    recipe.mend = "correct the environment variable CXX, or unset it to use g++ or clang++";
+    recipe.explain = [&](const std::string& output) {
+        if (translation.many_digits > 0 && lacks_mpfr(output))
+            throw MachineError(fmt::format(
+                "numbers = \"{} digits\" needs MPFR, and {} does not find its header mpfr.h; install Debian's package "
+                "libmpfr-dev (apt-get install libmpfr-dev), or choose \"double-double\" or \"quadruple\"",
+                translation.many_digits, compiler.words[0]));
+    };
+    return build(recipe, abandoned);
 }
 
 }  // namespace lobatto

@@ -26,29 +26,6 @@ bool is_program(const std::string& path) {
     return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode) && ::access(path.c_str(), X_OK) == 0;
 }
 
-// As execvp would find it, but absolute.
-std::optional<std::string> find_program(const std::string& name) {
-    if (name.find('/') != std::string::npos) {
-        return is_program(name) ? std::optional(std::filesystem::absolute(name).string()) : std::nullopt;
-    }
-    std::istringstream folders(environment_variable("PATH"));
-    for (std::string folder; std::getline(folders, folder, ':');) {
-        const std::string path = std::filesystem::absolute(folder.empty() ? "." : folder) / name;
-        if (is_program(path)) return path;
-    }
-    return std::nullopt;
-}
-
-// Two programs at one path differ in size or in the time of their last change.
-std::string identity_of(const std::string& path) {
-    std::error_code ignored;
-    const std::string file = std::filesystem::canonical(path, ignored);
-    struct stat status {};
-    ::stat(path.c_str(), &status);
-    return fmt::format("{} = {}, {} bytes, changed {}.{:09}\n", path, file, status.st_size, status.st_mtim.tv_sec,
-                       status.st_mtim.tv_nsec);
-}
-
 bool is_clang(const std::string& path) {
     std::error_code ignored;
     const std::string file = std::filesystem::canonical(path, ignored).filename();
@@ -64,6 +41,27 @@ bool is_clang(const std::string& path) {
 }
 
 }  // namespace
+
+std::optional<std::string> find_program(const std::string& name) {
+    if (name.find('/') != std::string::npos) {
+        return is_program(name) ? std::optional(std::filesystem::absolute(name).string()) : std::nullopt;
+    }
+    std::istringstream folders(environment_variable("PATH"));
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        const std::string path = std::filesystem::absolute(folder.empty() ? "." : folder) / name;
+        if (is_program(path)) return path;
+    }
+    return std::nullopt;
+}
+
+std::string identity_of(const std::string& path) {
+    std::error_code ignored;
+    const std::string file = std::filesystem::canonical(path, ignored);
+    struct stat status {};
+    ::stat(path.c_str(), &status);
+    return fmt::format("{} = {}, {} bytes, changed {}.{:09}\n", path, file, status.st_size, status.st_mtim.tv_sec,
+                       status.st_mtim.tv_nsec);
+}
 
 Compiler find_compiler(bool quadruple) {
     Compiler compiler;

@@ -2,6 +2,7 @@
 // The user's C++ compiler: which one it is, how to recognise it again without running it, and with which flags.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,11 @@ Compiler find_compiler(bool quadruple);
 // The whole argument list that makes `object` from `source`, both relative to the folder of the compilation.
 std::vector<std::string> compile_arguments(const Compiler& compiler, const std::string& source,
                                            const std::string& object, const Translation& translation);
+
+// As execvp would find it, but absolute.
+std::optional<std::string> find_program(const std::string& name);
+// Its path, the file behind it, size and time of change: two programs at one path differ in one of these.
+std::string identity_of(const std::string& path);
 
 // A word of a command as one would type it: quoted when anything in it is unusual.
 std::string shell_word(const std::string& word);

@@ -15,8 +15,9 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::int64_t numbers_at_once = 1 << 20;  // of companions that are computed together
-constexpr std::int64_t between_looks = 8;          // steps of a companion, at least
+// Of companions that are computed together; a device has many trajectories at a time.
+constexpr std::int64_t numbers_at_once = 1 << 20, numbers_on_device = 1 << 24;
+constexpr std::int64_t between_looks = 8;  // steps of a companion, at least
 
 const double unknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -58,9 +59,9 @@ void EnsembleCompanion::compute(std::int64_t first) {
     const auto n = static_cast<std::int64_t>(groups_.size());
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
                        rows = (request_.steps / every + 1) * looks_of(every),
-                       count =
-                           std::min(std::max<std::int64_t>(numbers_at_once / ((4 + 2 * rows) * n * kernel_->parts), 64),
-                                    request_.first + request_.count - first);
+                       numbers = request_.device ? numbers_on_device : numbers_at_once,
+                       count = std::min(std::max<std::int64_t>(numbers / ((4 + 2 * rows) * n * kernel_->parts), 64),
+                                        request_.first + request_.count - first);
     first_ = first;
     known_.assign(static_cast<std::size_t>(count), {});
     const std::int64_t whole = request_.steps / every * every;

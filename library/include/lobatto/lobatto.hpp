@@ -283,12 +283,17 @@ struct Starts {
     std::map<std::string, std::vector<double>> columns;
 };
 
+/// What takes the steps of a sweep: the processor, an NVIDIA GPU (docs/gpu.md; Error where there is none), or the
+/// faster of both in a trial.
+enum class Device { processor, cuda, automatic };
+
 struct SweepOptions : Settings {
     std::vector<std::string> keep;      ///< "first(b = pi)", "max(H)": instead of the last states
     std::optional<std::int64_t> steps;  ///< instead of an end time
-    int threads = 0;                    ///< 0: as many as the machine runs
-    bool measure = true;                ///< errors by companions, which take 3/2 of the sweep's time
-    bool beyond_horizon = false;        ///< trajectories of which nothing is left are no failures
+    Device device = Device::processor;
+    int threads = 0;              ///< 0: as many as the machine runs
+    bool measure = true;          ///< errors by companions, which take 3/2 of the sweep's time
+    bool beyond_horizon = false;  ///< trajectories of which nothing is left are no failures
     std::function<bool(double)> progress;
 };
 

@@ -47,7 +47,7 @@ constexpr double near_below = 0.7853981633974483;  // pi/4
 
 // x, in the lanes that are too far from `angle`, takes its place there.
 template <class T>
-[[gnu::noinline, gnu::cold]] void recentre(Angle<T>& angle, const T& x) {
+[[gnu::cold]] LOBATTO_APART void recentre(Angle<T>& angle, const T& x) {
     const auto near = fabs(x - angle.x) <= near_below;  // not where one of them is not a number
     T sine, cosine;
     lobatto::sincos(x, sine, cosine);
@@ -97,7 +97,7 @@ template <class T, int places, int count>
 struct AngleTable {
     Angle<T> angles[places * count];
 
-    Angle<T>* of(int place) { return angles + place * count; }
+    LOBATTO_DEVICE Angle<T>* of(int place) { return angles + place * count; }
 };
 template <class T, int places>
 struct AngleTable<T, places, 0> {};

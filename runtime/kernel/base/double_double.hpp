@@ -29,7 +29,8 @@ LOBATTO_INLINE T fused_once(const T& a, const T& b, const T& c) {
 // A product that the compiler must not contract with a sum: g++ 12 does (VEC_FMADDSUB), even with -ffp-contract=off.
 template <class T>
 LOBATTO_INLINE void keep_rounded([[maybe_unused]] T& product) {
-#if defined(__x86_64__)
+#if defined(__CUDACC__)  // nvcc contracts nothing with --fmad=false
+#elif defined(__x86_64__)
     asm("" : "+x"(product));
 #elif defined(__aarch64__)
     asm("" : "+w"(product));

@@ -132,7 +132,7 @@ LOBATTO_INLINE Doubles<width> log(const Doubles<width>& x) {
                                 fused(z, P(2.222219843214978396e-01), P(2.857142874366239149e-01))),
                           fused(z, P(3.999999999940941908e-01), P(6.666666666666735130e-01)));
     const P value = fused(split.k, P(ln2_high), f - (half - fused(s, half + R, split.k * ln2_low)));
-    return unless(is_normal_positive(x), x, x, value, [](double a, double) { return __builtin_log(a); });
+    return unless(is_normal_positive(x), x, x, value, [](double a, double) { return LOBATTO_LIBRARY(log)(a); });
 }
 
 // high + low = a b.
@@ -192,7 +192,7 @@ LOBATTO_INLINE Doubles<width> pow(const Doubles<width>& x, const Doubles<width>&
     exponent_low = fused(y, log_low, exponent_low);
     const Where<width> holds = is_normal_positive(x) & (fabs(y) < 0x1p+64) & (fabs(exponent) < 745.0);
     const Exponential<width> e(exponent, exponent_low);
-    return unless(holds, x, y, e.value(0.0), [](double a, double b) { return __builtin_pow(a, b); });
+    return unless(holds, x, y, e.value(0.0), [](double a, double b) { return LOBATTO_LIBRARY(pow)(a, b); });
 }
 
 }  // namespace functions

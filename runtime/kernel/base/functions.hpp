@@ -34,7 +34,7 @@ LOBATTO_INLINE Doubles<width> with_sign_of(const Doubles<width>& y, const Double
 
 // `value` where the path without branches holds, the library's function of x (and y) elsewhere.
 template <class Function>
-[[gnu::noinline, gnu::cold]] void by_library(int width, const double* beyond, const double* x, const double* y,
+[[gnu::noinline, gnu::cold]] LOBATTO_DEVICE void by_library(int width, const double* beyond, const double* x, const double* y,
                                              double* values, Function function) {
     for (int i = 0; i < width; ++i)
         if (beyond[i] != 0) values[i] = function(x[i], y[i]);
@@ -66,7 +66,9 @@ LOBATTO_INLINE Pack<float, width> narrowed(const Pack<double, width>& x) {
     float to[width];
     x.store(from);
     for (int i = 0; i < width; ++i) to[i] = static_cast<float>(from[i]);
+#ifndef __CUDACC__
     asm("" : "+m"(to));  // g++ 12 leaves out this rounding of two lanes where a widening follows
+#endif
     return Pack<float, width>::load(to);
 }
 

@@ -10,6 +10,21 @@
 #include <quadmath.h>
 #endif
 
+// In front of functions that a lane's step calls: with nvcc they are for the device too (device_lanes.hpp). There what
+// has a lane's arrays must be in line, so that they are registers: LOBATTO_LANE, and LOBATTO_APART, which elsewhere is a
+// function by itself. LOBATTO_LIBRARY(f): a function of the C library, which nvcc knows by its own name.
+#ifdef __CUDACC__
+#define LOBATTO_DEVICE __host__ __device__
+#define LOBATTO_LANE __host__ __device__ __forceinline__
+#define LOBATTO_APART __host__ __device__ __forceinline__
+#define LOBATTO_LIBRARY(f) ::f
+#else
+#define LOBATTO_DEVICE
+#define LOBATTO_LANE
+#define LOBATTO_APART [[gnu::noinline]]
+#define LOBATTO_LIBRARY(f) __builtin_##f
+#endif
+
 namespace lobatto {
 
 template <class real>
@@ -32,9 +47,9 @@ constexpr bool is_many_digits = false;
 template <class real, class type>
 using Only = std::enable_if_t<std::is_same_v<real, type>, real>;
 #define LOBATTO_FUNCTION(type, f, suffix) \
-    template <class real>                 \
-    inline Only<real, type> f(real x) {   \
-        return __builtin_##f##suffix(x);  \
+    template <class real>                              \
+    LOBATTO_DEVICE inline Only<real, type> f(real x) { \
+        return LOBATTO_LIBRARY(f##suffix)(x);          \
     }
 #define LOBATTO_FUNCTIONS(type, suffix)                                                       \
     LOBATTO_FUNCTION(type, acos, suffix)                                                      \
@@ -49,20 +64,24 @@ using Only = std::enable_if_t<std::is_same_v<real, type>, real>;
     LOBATTO_FUNCTION(type, tan, suffix)                                                       \
     LOBATTO_FUNCTION(type, tanh, suffix)                                                      \
     template <class real>                                                                     \
-    inline Only<real, type> pow(real x, Only<real, type> y) {                                 \
-        return __builtin_pow##suffix(x, y);                                                   \
+    LOBATTO_DEVICE inline Only<real, type> pow(real x, Only<real, type> y) {                  \
+        return LOBATTO_LIBRARY(pow##suffix)(x, y);                                            \
     }                                                                                         \
     /* x y + z rounded once on every target, for error-free products; slow without an FMA. */ \
-    inline type rounded_once(type x, type y, type z) {                                        \
-        return __builtin_fma##suffix(x, y, z);                                                \
+    LOBATTO_DEVICE inline type rounded_once(type x, type y, type z) {                         \
+        return LOBATTO_LIBRARY(fma##suffix)(x, y, z);                                         \
     }
 LOBATTO_FUNCTIONS(float, f)
 LOBATTO_FUNCTIONS(double, )
+#ifndef __CUDACC__
 LOBATTO_FUNCTIONS(long double, l)
+#endif
 LOBATTO_FUNCTION(float, sin, f)
 LOBATTO_FUNCTION(float, cos, f)
+#ifndef __CUDACC__
 LOBATTO_FUNCTION(long double, sin, l)
 LOBATTO_FUNCTION(long double, cos, l)
+#endif
 #undef LOBATTO_FUNCTIONS
 #undef LOBATTO_FUNCTION
 
@@ -102,13 +121,13 @@ inline __float128 rounded_once(__float128 x, __float128 y, __float128 z) {
 
 // Sine and cosine of one argument together. Those of double are in base/trigonometry.hpp.
 template <class real>
-inline void sincos(real x, real& sine, real& cosine) {
+LOBATTO_DEVICE inline void sincos(real x, real& sine, real& cosine) {
     sine = sin(x);
     cosine = cos(x);
 }
 
 template <class... reals>
-inline bool is_finite(reals... x) {
+LOBATTO_DEVICE inline bool is_finite(reals... x) {
     return ((x - x == reals(0)) && ...);
 }
 

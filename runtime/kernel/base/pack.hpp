@@ -12,8 +12,13 @@
 
 #include "numbers.hpp"
 
+#ifdef __CUDACC__
+#define LOBATTO_INLINE __host__ __device__ __forceinline__
+#define LOBATTO_FORMULA
+#else
 #define LOBATTO_INLINE [[gnu::always_inline]] inline
 #define LOBATTO_FORMULA __attribute__((always_inline))  // behind the parameters of a function object
+#endif
 
 // An expression for each register i of a pack, which has `count` of them, at most eight. It is text, not a function of
 // i: the compiler's time goes with the number of functions.
@@ -93,12 +98,12 @@ struct Register<double, 1> {
 };
 
 // a b + c, rounded once where the target has fused multiply-add (FMA) and twice elsewhere.
-#if defined(__FMA__) || defined(__FP_FAST_FMA) || defined(__aarch64__)
+#if defined(__FMA__) || defined(__FP_FAST_FMA) || defined(__aarch64__) || defined(__CUDACC__)
 LOBATTO_INLINE float fused(float a, float b, float c) {
-    return __builtin_fmaf(a, b, c);
+    return LOBATTO_LIBRARY(fmaf)(a, b, c);
 }
 LOBATTO_INLINE double fused(double a, double b, double c) {
-    return __builtin_fma(a, b, c);
+    return LOBATTO_LIBRARY(fma)(a, b, c);
 }
 constexpr bool has_fused = true;
 #else
@@ -192,7 +197,7 @@ LOBATTO_INLINE bool all(Truths truths) {
     LOBATTO_INLINE bool all(Register<real, width>::Truths truths) { \
         return signs((type)truths) == (1 << (width)) - 1;           \
     }
-#ifdef __SSE2__
+#if defined(__SSE2__) && !defined(__CUDACC__)
 using Double2 = Register<double, 2>::Values;
 using Float4 = Register<float, 4>::Values;
 LOBATTO_ROOT(Double2, __builtin_ia32_sqrtpd)
@@ -200,7 +205,7 @@ LOBATTO_ROOT(Float4, __builtin_ia32_sqrtps)
 LOBATTO_SIGNS(double, 2, Double2, __builtin_ia32_movmskpd)
 LOBATTO_SIGNS(float, 4, Float4, __builtin_ia32_movmskps)
 #endif
-#ifdef __AVX__
+#if defined(__AVX__) && !defined(__CUDACC__)
 using Double4 = Register<double, 4>::Values;
 using Float8 = Register<float, 8>::Values;
 LOBATTO_ROOT(Double4, __builtin_ia32_sqrtpd256)
@@ -208,7 +213,7 @@ LOBATTO_ROOT(Float8, __builtin_ia32_sqrtps256)
 LOBATTO_SIGNS(double, 4, Double4, __builtin_ia32_movmskpd256)
 LOBATTO_SIGNS(float, 8, Float8, __builtin_ia32_movmskps256)
 #endif
-#if defined(__FMA__) && defined(__SSE2__)
+#if defined(__FMA__) && defined(__SSE2__) && !defined(__CUDACC__)
 LOBATTO_INLINE Double2 fused(Double2 a, Double2 b, Double2 c) {
     return __builtin_ia32_vfmaddpd(a, b, c);
 }
@@ -366,7 +371,11 @@ struct Pack {
         LOBATTO_EACH(part[i] = other.part[i]);
         return *this;
     }
+#ifdef __CUDACC__
+    LOBATTO_INLINE Pack(real x) { LOBATTO_EACH(part[i] = Operations::spread(x)); }  // constants have no address there
+#else
     LOBATTO_INLINE Pack(const real& x) { LOBATTO_EACH(part[i] = Operations::spread(x)); }
+#endif
     // From a literal, where numbers are a class.
     template <class Number, class = std::enable_if_t<std::is_class_v<real> && std::is_arithmetic_v<Number>>>
     LOBATTO_INLINE Pack(Number x) : Pack(real(x)) {}
@@ -581,19 +590,19 @@ using real_of = typename RealOf<T>::type;
 
 // One lane of a value, which may be a plain number.
 template <class real, int width>
-inline void set_lane(Pack<real, width>& value, int lane, real x) {
+LOBATTO_DEVICE inline void set_lane(Pack<real, width>& value, int lane, real x) {
     value.set(lane, x);
 }
 template <class real>
-inline void set_lane(real& value, int, real x) {
+LOBATTO_DEVICE inline void set_lane(real& value, int, real x) {
     value = x;
 }
 template <class real, int width>
-inline real lane_of(const Pack<real, width>& value, int lane) {
+LOBATTO_DEVICE inline real lane_of(const Pack<real, width>& value, int lane) {
     return value[lane];
 }
 template <class real>
-inline real lane_of(const real& value, int) {
+LOBATTO_DEVICE inline real lane_of(const real& value, int) {
     return value;
 }
 

@@ -87,9 +87,9 @@ LOBATTO_INLINE void sincos(const Doubles<width>& x, Doubles<width>& sine, Double
     const Doubles<width> c = select(swap, reduced.sine, reduced.cosine);
     const Where<width> holds = fabs(x) < reduced_below;
     sine = unless(holds, x, x, from_bits(bits(s) ^ sign_of(reduced.quadrant)),
-                  [](double a, double) { return __builtin_sin(a); });
+                  [](double a, double) { return LOBATTO_LIBRARY(sin)(a); });
     cosine = unless(holds, x, x, from_bits(bits(c) ^ sign_of(reduced.quadrant + Words<width>(1))),
-                    [](double a, double) { return __builtin_cos(a); });
+                    [](double a, double) { return LOBATTO_LIBRARY(cos)(a); });
 }
 // One alone has the bits it has in the pair.
 template <int width>
@@ -97,14 +97,14 @@ LOBATTO_INLINE Doubles<width> sin(const Doubles<width>& x) {
     const Reduced<width> reduced(x);
     const Doubles<width> sine = select(is_odd(reduced.quadrant), reduced.cosine, reduced.sine);
     return unless(fabs(x) < reduced_below, x, x, from_bits(bits(sine) ^ sign_of(reduced.quadrant)),
-                  [](double a, double) { return __builtin_sin(a); });
+                  [](double a, double) { return LOBATTO_LIBRARY(sin)(a); });
 }
 template <int width>
 LOBATTO_INLINE Doubles<width> cos(const Doubles<width>& x) {
     const Reduced<width> reduced(x);
     const Doubles<width> cosine = select(is_odd(reduced.quadrant), reduced.sine, reduced.cosine);
     return unless(fabs(x) < reduced_below, x, x, from_bits(bits(cosine) ^ sign_of(reduced.quadrant + Words<width>(1))),
-                  [](double a, double) { return __builtin_cos(a); });
+                  [](double a, double) { return LOBATTO_LIBRARY(cos)(a); });
 }
 template <int width>
 LOBATTO_INLINE Doubles<width> tan(const Doubles<width>& x) {
@@ -113,7 +113,7 @@ LOBATTO_INLINE Doubles<width> tan(const Doubles<width>& x) {
     const Doubles<width> quotient =
         select(swap, reduced.cosine, reduced.sine) / select(swap, reduced.sine, reduced.cosine);
     return unless(fabs(x) < reduced_below, x, x, from_bits(bits(quotient) ^ (reduced.quadrant << 63)),
-                  [](double a, double) { return __builtin_tan(a); });
+                  [](double a, double) { return LOBATTO_LIBRARY(tan)(a); });
 }
 
 }  // namespace functions
@@ -141,20 +141,20 @@ LOBATTO_INLINE void sincos(const Pack<real, width>& x, Pack<real, width>& sine, 
 }
 
 // Sine and cosine of one double: a pack of one lane, so that a lone trajectory and a lane of many have the same bits.
-inline void sincos(double x, double& sine, double& cosine) {
+LOBATTO_DEVICE inline void sincos(double x, double& sine, double& cosine) {
     Pack<double, 1> one_sine, one_cosine;
     sincos(Pack<double, 1>(x), one_sine, one_cosine);
     sine = one_sine[0];
     cosine = one_cosine[0];
 }
 template <class real>
-inline Only<real, double> sin(real x) {
+LOBATTO_DEVICE inline Only<real, double> sin(real x) {
     real sine, cosine;
     sincos(x, sine, cosine);
     return sine;
 }
 template <class real>
-inline Only<real, double> cos(real x) {
+LOBATTO_DEVICE inline Only<real, double> cos(real x) {
     real sine, cosine;
     sincos(x, sine, cosine);
     return cosine;

@@ -31,6 +31,7 @@ struct EnsembleFixedPoint : StageMap<K, T> {
     using typename Tables::ActiveMask;
     static constexpr int values = inner_room * n;  // node by node
     static constexpr int evaluation_limit = 16;
+    static constexpr real first_weight = K::b[0], last_weight = K::b[s - 1];
 
     struct Arrays {
         T P[values], X[values], W[values], S[inner_room * entries], d[values], delta[values], bend[values];
@@ -41,6 +42,15 @@ struct EnsembleFixedPoint : StageMap<K, T> {
     // position's size and a number.
     struct Measure {
         real enough, part, least;
+    };
+
+    // The same for all trajectories of one step size. Where a trajectory's numbers are taken into the map, it is not.
+    struct Shared {
+        std::conditional_t<absorbs, Unit, typename Tables::Map> map;
+        std::conditional_t<absorbs, Unit, T> reach;
+        T node_time[parts], weight[parts], arrival[parts];
+        real h;
+        Measure settled, near;
     };
 
     Measure settled, near;
@@ -84,6 +94,37 @@ struct EnsembleFixedPoint : StageMap<K, T> {
                 real(8) * Limits<real>::smallest / linear};
     }
 
+    Shared shared() const {
+        Shared all{};
+        if constexpr (!absorbs) {
+            all.map = this->map[0];
+            all.reach = reach;
+        }
+        for (int i = 0; i < parts; ++i) {
+            all.node_time[i] = node_time[i];
+            all.weight[i] = weight[i];
+            all.arrival[i] = arrival[i];
+        }
+        all.h = h;
+        all.settled = settled;
+        all.near = near;
+        return all;
+    }
+    LOBATTO_INLINE void take(const Shared& all) {
+        if constexpr (!absorbs) {
+            this->map[0] = all.map;
+            reach = all.reach;
+        }
+        for (int i = 0; i < parts; ++i) {
+            node_time[i] = all.node_time[i];
+            weight[i] = all.weight[i];
+            arrival[i] = all.arrival[i];
+        }
+        h = all.h;
+        settled = all.settled;
+        near = all.near;
+    }
+
     // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
     // have moved; the others stay.
     template <class Given, class Time>
@@ -120,12 +161,12 @@ private:
     LOBATTO_INLINE void begin_step(const T* q, const T* u, Arrays& a) const {
         for (int c = 0; c < n; ++c) {
             const T W0 = w[c * s + s - 1], position = fabs(q[c]);
-            a.rate[c] = fused(T(-h * K::b[0]), W0, u[c]);
+            a.rate[c] = fused(T(-h * first_weight), W0, u[c]);
             const T moved = T(fabs(h)) * (fabs(a.rate[c]) + fabs(T(h) * W0));
             a.inverse_scale[c] = T(real(1)) / maximum(moved, fused(T(settled.part), position, T(settled.least)));
             a.inverse_next[c] = reach * a.inverse_scale[c];
             a.inverse_linear[c] = T(real(1)) / maximum(moved, fused(T(near.part), position, T(near.least)));
-            const T rate = fused(T(-h * (K::b[0] + K::b[s - 1])), W0, drifting[c]);
+            const T rate = fused(T(-h * (first_weight + last_weight)), W0, drifting[c]);
             const auto& of = map_of(c);
             const T* last;
             if constexpr (absorbs)
@@ -160,6 +201,7 @@ private:
     }
     // (S - D) x.
     LOBATTO_INLINE void slopes_times(const Arrays& a, const T* x, T* product) const {
+        static constexpr Places place{};
         for (int j = 0; j < m; ++j) {
             T* const sum = product + j * n;
             for (int c = 0; c < n; ++c)
@@ -169,24 +211,26 @@ private:
                     sum[c] = T(real(0));
 #pragma GCC unroll 16
             for (int e = 0; e < K::entries; ++e) {
-                const T &S = a.S[j * entries + e], &moved = x[j * n + K::entry_column[e]];
-                T& to = sum[K::entry_row[e]];
-                to = !absorbs && first_in_row.holds[e] ? S * moved : fused(S, moved, to);
+                const T &S = a.S[j * entries + e], &moved = x[j * n + place.column[e]];
+                T& to = sum[place.row[e]];
+                to = !absorbs && place.is_first[e] ? S * moved : fused(S, moved, to);
             }
         }
     }
-    // Whether an entry of S is the first of its row.
-    struct FirstInRow {
-        bool holds[entries]{};
-        constexpr FirstInRow() {
+    // Where the entries of S stand, and whether one is the first of its row.
+    struct Places {
+        int row[entries]{}, column[entries]{};
+        bool is_first[entries]{};
+        constexpr Places() {
             for (int e = 0; e < K::entries; ++e) {
-                holds[e] = true;
+                row[e] = K::entry_row[e];
+                column[e] = K::entry_column[e];
+                is_first[e] = true;
                 for (int f = 0; f < e; ++f)
-                    if (K::entry_row[f] == K::entry_row[e]) holds[e] = false;
+                    if (row[f] == row[e]) is_first[e] = false;
             }
         }
     };
-    static constexpr FirstInRow first_in_row{};
 
     // The sum of (x_i scale_i)^2.
     LOBATTO_INLINE static T size(const T* x, const T* scale) {
@@ -337,12 +381,12 @@ private:
         for (int c = 0; c < n; ++c) {
             const T* const W = a.W + c;
             q1[c] = q[c] + sum_over_nodes(T(h) * a.rate[c], arrival, W);
-            change[c] = sum_over_nodes(T(-h * K::b[0]) * w[c * s + s - 1], weight, W);
+            change[c] = sum_over_nodes(T(-h * first_weight) * w[c * s + s - 1], weight, W);
         }
         Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
         T not_finite = T(real(0));
         for (int c = 0; c < n; ++c) {
-            u1[c] = u[c] + fused(T(-h * K::b[s - 1]), W1[c], change[c]);
+            u1[c] = u[c] + fused(T(-h * last_weight), W1[c], change[c]);
             not_finite = fused(T(real(0)), q1[c] + u1[c], not_finite);
         }
         solved = solved & (not_finite == T(real(0)));
@@ -388,8 +432,12 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
     using real = typename K::real;
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
+    using Shared = typename EnsembleFixedPoint<K, T>::Shared;
     T q[n], u[n], evaluations = T(real(0));
     EnsembleFixedPoint<K, T> fixed_point;
+
+    Shared shared() const { return fixed_point.shared(); }
+    LOBATTO_INLINE void take(const Shared& all) { fixed_point.take(all); }
 
     const T& position(int c) const { return q[c]; }
     const T* rates() const { return u; }
@@ -407,7 +455,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
     template <class Given, class Time>
-    ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
+    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const ActiveMask moved = fixed_point.step(k, time, q, u, active);
         evaluations = fixed_point.evaluations;
         return moved;

@@ -105,6 +105,19 @@ struct GalerkinFixedPoint {
         }
     }
 
+    // The same for all trajectories of one step size.
+    struct Shared {
+        V position_map[r][parts], momentum_map[r][parts], ahead[r][parts], weight[parts], legendre[parts],
+            on_legendre[parts], node_time[parts];
+        real h, tolerance;
+    };
+    Shared shared() const {
+        Shared all{};
+        exchange(all, *this);
+        return all;
+    }
+    LOBATTO_INLINE void take(const Shared& all) { exchange(*this, all); }
+
     // Begins at a state.
     void begin(const typename K::Coefficients& k, real time, const real* q, const real* velocity, int lane = 0) {
         mass.begin(k, time, q, velocity, lane);
@@ -118,7 +131,7 @@ struct GalerkinFixedPoint {
     // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
     // have moved; the others stay.
     template <class Given, class Time>
-    ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active) {
+    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active) {
         return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, active, a); });
     }
 
@@ -143,6 +156,22 @@ private:
             set_lane(values[i / width], i % width, x);
         else
             values[i] = V(x);
+    }
+    template <class To, class From>
+    LOBATTO_INLINE static void exchange(To& to, const From& from) {
+        for (int i = 0; i < parts; ++i) {
+            for (int j = 0; j < r; ++j) {
+                to.position_map[j][i] = from.position_map[j][i];
+                to.momentum_map[j][i] = from.momentum_map[j][i];
+                to.ahead[j][i] = from.ahead[j][i];
+            }
+            to.weight[i] = from.weight[i];
+            to.legendre[i] = from.legendre[i];
+            to.on_legendre[i] = from.on_legendre[i];
+            to.node_time[i] = from.node_time[i];
+        }
+        to.h = from.h;
+        to.tolerance = from.tolerance;
     }
 
     // The values of one part.
@@ -176,7 +205,7 @@ private:
     }
 
     template <class Given, class Time>
-    ActiveMask step_in(const Given& k, const Time& time, T* q, T* p, ActiveMask active, Arrays& a) {
+    LOBATTO_LANE ActiveMask step_in(const Given& k, const Time& time, T* q, T* p, ActiveMask active, Arrays& a) {
         constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
         // Each coordinate has its own measure: increments as small as its rounding are so whatever the others do.
         const real least = maximum(tolerance, Limits<real>::epsilon);
@@ -387,8 +416,8 @@ private:
     }
 
     template <class Given, class Time>
-    ActiveMask finish(const Given& k, [[maybe_unused]] const Time& time, T* q, T* p, const T* kappa_now,
-                      ActiveMask done, Arrays& a) {
+    LOBATTO_LANE ActiveMask finish(const Given& k, [[maybe_unused]] const Time& time, T* q, T* p, const T* kappa_now,
+                                   ActiveMask done, Arrays& a) {
         T q1[n], p1[n], not_finite = T(real(0));
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
@@ -428,8 +457,12 @@ struct LaneStepper<K, T, Form::general, stepping> {
     using Chain = Stepper<FallbackKernel<K>, Form::general, Stepping::solved>;
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
+    using Shared = typename GalerkinFixedPoint<K, T>::Shared;
     T q[n], p[n], evaluations = T(real(0));
     GalerkinFixedPoint<K, T> fixed_point;
+
+    Shared shared() const { return fixed_point.shared(); }
+    LOBATTO_INLINE void take(const Shared& all) { fixed_point.take(all); }
 
     const T& position(int c) const { return q[c]; }
     const T* rates() const { return p; }
@@ -446,7 +479,7 @@ struct LaneStepper<K, T, Form::general, stepping> {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
     template <class Given, class Time>
-    [[gnu::noinline]] ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
+    LOBATTO_APART ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const ActiveMask moved = fixed_point.step(k, time, q, p, active);
         evaluations = fixed_point.evaluations;
         return moved;

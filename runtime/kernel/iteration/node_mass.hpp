@@ -66,6 +66,15 @@ struct NodeMass {
     static constexpr int room = is_scaled ? 1 : is_diagonal ? n : n * n;  // values that are kept of it
     static constexpr int shapes = !is_scaled ? 1 : is_diagonal ? n : n * n;
 
+    // Where the entries that K::stage gives stand in what is kept.
+    struct Places {
+        int of[given]{};
+        constexpr Places() {
+            for (int e = 0; e < given; ++e)
+                of[e] = is_diagonal ? K::mass_row[e] : K::mass_row[e] * n + K::mass_column[e];
+        }
+    };
+
     T shape[shapes], inverse_shape[shapes];  // M0 and its inverse, where masses are scaled
 
     // M0 from M at some place.
@@ -109,14 +118,15 @@ struct NodeMass {
 
     // What is kept of a node's mass matrix, of what K::stage gives.
     LOBATTO_INLINE static void take(const V* packed, V* M) {
+        static constexpr Places place{};
         if constexpr (is_scaled) {
             M[0] = packed[0];
         } else if constexpr (is_diagonal) {
-            for (int e = 0; e < given; ++e) M[K::mass_row[e]] = V(real(1)) / packed[e];
+            for (int e = 0; e < given; ++e) M[place.of[e]] = V(real(1)) / packed[e];
         } else {
 #pragma GCC unroll 8
             for (int i = 0; i < n * n; ++i) M[i] = V(real(0));
-            for (int e = 0; e < given; ++e) M[K::mass_row[e] * n + K::mass_column[e]] = packed[e];
+            for (int e = 0; e < given; ++e) M[place.of[e]] = packed[e];
             factor_symmetric<n>(M);
         }
     }

@@ -41,7 +41,7 @@ struct NodeLayout {
 
 // Values of nodes one by one: a Pack's lanes in memory.
 template <int parts, class V, class T>
-inline void lay_flat(const V* values, int stride, T* flat) {
+LOBATTO_DEVICE inline void lay_flat(const V* values, int stride, T* flat) {
     for (int p = 0; p < parts; ++p) {
         if constexpr (std::is_same_v<V, T>)
             flat[p] = values[p * stride];
@@ -141,7 +141,7 @@ struct StageMap {
             }
     }
 
-    const Map& map_of(int c) const { return map[absorbs ? c : 0]; }
+    LOBATTO_DEVICE const Map& map_of(int c) const { return map[absorbs ? c : 0]; }
 
     // Rows of the map: those of A, then the end of the step.
     static real row(int i, int j) { return stage_coefficients<K>.map[i][j]; }

@@ -80,7 +80,7 @@ inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
 
 // (q1, p1) = (q, p) + E (q, p) + shift, E = Phi - I; E: 2n x (2n + 1), the shift its last column.
 template <int n, class given, class number>
-inline void apply_map(const given* E, const number* q, const number* p, number* q1, number* p1) {
+LOBATTO_DEVICE inline void apply_map(const given* E, const number* q, const number* p, number* q1, number* p1) {
     for (int r = 0; r < 2 * n; ++r) {
         const given* const row = E + r * (2 * n + 1);
         number sum = row[2 * n];
@@ -225,7 +225,10 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
     T q[n], p[n], evaluations = T(real(0));
+    struct Shared {};  // the map is of a trajectory's parameters
 
+    Shared shared() const { return {}; }
+    LOBATTO_INLINE void take(const Shared&) {}
     const T& position(int c) const { return q[c]; }
     const T* rates() const { return p; }
 
@@ -241,7 +244,7 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
     template <class Given, class Time>
-    ActiveMask step(const Given& k, const Time&, ActiveMask active) {
+    LOBATTO_LANE ActiveMask step(const Given& k, const Time&, ActiveMask active) {
         T q1[n], p1[n], not_finite = T(real(0));
         K::propagate(k, +q, +p, +q1, +p1);
         for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);

@@ -27,9 +27,11 @@ struct Composition {
 
     real kick[s];  // -h b
     real drift[s - 1];
+    real node_time[s];  // h c
 
     void prepare(real h) {
         for (int i = 0; i < s; ++i) kick[i] = -h * K::b[i];
+        for (int i = 0; i < s; ++i) node_time[i] = K::c[i] * h;
         for (int i = 0; i < s - 1; ++i) drift[i] = h * K::drift_length[i];
     }
 };
@@ -48,7 +50,7 @@ LOBATTO_INLINE void kick_and_drift(const Composition<K>& composition, const Give
     if constexpr (Composition<K>::kicks_ends) kick(0);
     drift(0);
     for (int i = 1; i < s - 1; ++i) {
-        Formulas<K>::minus_acceleration(k, T(time + K::c[i] * h), static_cast<const T*>(q), W);
+        Formulas<K>::minus_acceleration(k, T(time + composition.node_time[i]), static_cast<const T*>(q), W);
         kick(i);
         drift(i);
     }
@@ -87,7 +89,7 @@ LOBATTO_INLINE void immediate_step(const Composition<K>& composition, const Give
         const KickAndDrift<K, T, Given, is_last()> step{
             q1, u1, W1, T(composition.kick[i]), T(is_last ? 0 : composition.drift[i]), k};
         const T* const position = q1;
-        Formulas<K>::template along_rows<Immediate>(k, T(time + K::c[i] * h), position, step);
+        Formulas<K>::template along_rows<Immediate>(k, T(time + composition.node_time[i]), position, step);
     };
     for (int c = 0; c < n; ++c) {
         u1[c] = Composition<K>::kicks_ends ? fused(T(composition.kick[0]), W[c], u[c]) : u[c];
@@ -384,7 +386,16 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
     T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
     Composition<K> composition;
     real h;
+    struct Shared {  // by all trajectories of one step size
+        Composition<K> composition;
+        real h;
+    };
 
+    Shared shared() const { return {composition, h}; }
+    LOBATTO_INLINE void take(const Shared& all) {
+        composition = all.composition;
+        h = all.h;
+    }
     const T& position(int c) const { return q[now][c]; }
     const T* rates() const { return u[now]; }
     void prepare(const ScalarFallback<K>& single, int) {
@@ -399,7 +410,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
     }
     template <class Given, class Time>
-    ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
+    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const int next = 1 - now;
         T not_finite = T(real(0));
         if constexpr (moves_immediately<K>()) {

@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "runtime/error.hpp"
+#include "runtime/run/ensemble/device_trajectories.hpp"
 #include "runtime/run/ensemble/ended.hpp"
 #include "runtime/run/ensemble/refilled.hpp"
 #include "runtime/run/ensemble/side_by_side.hpp"
@@ -36,6 +37,14 @@ struct Plan {
     std::int64_t threads, group_size, groups, window;  // window: groups in memory
     Plan(const Kernel& kernel, const EnsembleRequest& request) {
         threads = thread_count(request.threads);
+        if (request.device) {
+            // While the device takes the steps of one group, the processor prepares another.
+            threads = std::min<std::int64_t>(2, request.count > 2 * DeviceKernel::block ? threads : 1);
+            group_size = device_room(kernel, request, threads);
+            groups = (request.count + group_size - 1) / group_size;
+            window = threads + 1;
+            return;
+        }
         const std::int64_t lanes = std::max(kernel->lanes, 1);
         const std::int64_t times = kernel->refilled_advance != nullptr ? fillings : 1;
         const std::int64_t wanted = std::min(
@@ -50,14 +59,17 @@ struct Plan {
 // One thread's work: trajectories of one group after another, as many at a time as there are lanes.
 class Worker {
 public:
-    Worker(const Kernel& kernel, const EnsembleRequest& request, Shared& shared)
+    // `room`: of a device, trajectories at a time.
+    Worker(const Kernel& kernel, const EnsembleRequest& request, Shared& shared, std::int64_t room)
         : request_(request),
           shared_(shared),
           n_(static_cast<std::size_t>(kernel->coordinates)),
           parts_(static_cast<std::size_t>(kernel->parts)),
           step_(request.whole_step.empty() ? as_parts({request.step}, parts_) : request.whole_step),
           single_(kernel) {
-        if (kernel->lanes > 0)
+        if (request.device)
+            lanes_ = std::make_unique<DeviceTrajectories>(kernel, request, room, thread_count(request.threads) / 2);
+        else if (kernel->lanes > 0)
             lanes_ = std::make_unique<LaneTrajectories>(kernel);
         else if (kernel->real_kind != LOBATTO_DOUBLE)
             lanes_ = std::make_unique<NumberTrajectory>(kernel, request);
@@ -152,7 +164,7 @@ private:
         std::int64_t done = 0;
         while (done < request_.steps && active()) {
             if (shared_.halted.load(std::memory_order_relaxed)) return false;
-            const double start = processor_seconds();
+            const double start = seconds_of_work();
             const std::int64_t from = done, target = done + std::min(chunk_.steps(), request_.steps - done);
             while (done < target && active()) {
                 const std::int64_t next =
@@ -160,7 +172,7 @@ private:
                 advance(next, next - done, ended);
                 done = next;
             }
-            const double passed = processor_seconds() - start;
+            const double passed = seconds_of_work() - start;
             seconds += passed;
             chunk_.took(done - from, passed);
             shared_.steps_gone += (done - from) * side_by_side;
@@ -196,6 +208,12 @@ private:
             else if (failed ? trajectory.steps_done > trajectory.row_step : kept_here)
                 keep(lane, trajectory);
         }
+    }
+
+    // While a device works, the thread only waits.
+    double seconds_of_work() const {
+        if (!request_.device) return processor_seconds();
+        return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
     }
 
     const EnsembleRequest& request_;
@@ -325,8 +343,8 @@ double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
     const auto start = std::chrono::steady_clock::now();
     EnsembleResult result;
-    result.lanes = std::max(kernel->lanes, 1);
     const Plan plan(kernel, request);
+    result.lanes = request.device ? static_cast<int>(plan.group_size) : std::max(kernel->lanes, 1);
     result.threads = static_cast<int>(plan.threads);
 
     Shared shared;
@@ -338,10 +356,10 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
     };
     const auto work = [&] {
         try {
-            if (kernel->refilled_advance != nullptr)
+            if (kernel->refilled_advance != nullptr && !request.device)
                 work_with(RefilledLanes(kernel, request, shared));
             else
-                work_with(Worker(kernel, request, shared));
+                work_with(Worker(kernel, request, shared, plan.group_size));
         } catch (...) {
             window.fail(std::current_exception());
         }

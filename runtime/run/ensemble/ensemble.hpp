@@ -18,6 +18,8 @@
 
 namespace lobatto {
 
+struct DeviceKernel;  // runtime/run/device_trajectories.hpp
+
 // Where a trajectory begins.
 struct EnsembleStart {
     std::vector<double> parameters;  // scene order
@@ -73,6 +75,8 @@ struct EnsembleRequest {
     std::int64_t every = 0;                                 // keep every such state; 0: the last one alone
     bool stops = false;                                     // the kernel's stops end trajectories
     std::function<std::unique_ptr<Reducer>()> reducer;      // one a thread; nothing: none. Of kernels without lanes
+    std::shared_ptr<const DeviceKernel> device;             // takes the steps; nothing: the processor. Without stops,
+                                                            // reducer and clock
     int threads = 0;                                        // that compute; 0: as many as the machine runs at once
     std::function<void(const EnsembleTrajectory&)> sink;    // in the order of the indices, in the thread of the caller
     std::function<void(std::int64_t steps_done)> progress;  // of all trajectories; about ten times a second, likewise

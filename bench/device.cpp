@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "bench/device.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
+#include "analysis/kernel/derived_kernel.hpp"
+#include "analysis/kernel/device_kernel.hpp"
+#include "analysis/kernel/kernel_of.hpp"
+#include "runtime/error.hpp"
+
+namespace lobatto::bench {
+
+namespace {
+
+struct Row {
+    const char *name, *scene;
+    int points;
+    double step;
+};
+constexpr Row rows[] = {{"P1", "p1_pendulum", 4, 0.2},
+                        {"P2", "p2_henon_heiles", 6, 0.25},
+                        {"P3", "p3_double_pendulum", 6, 0.05},
+                        {"P4", "p4_kepler", 6, 0.1}};
+constexpr std::int64_t counts[] = {1'000, 10'000, 100'000, 1'000'000, 10'000'000};
+constexpr std::int64_t steps_each = 2000, steps_of_processor = 200'000'000;
+
+// Steps of all trajectories in a second, what begins and ends them included; 0: some failed.
+double rate_of(const Kernel& kernel, EnsembleRequest request, std::int64_t count) {
+    request.count = count;
+    const EnsembleResult result = integrate(kernel, request);
+    return result.count_of[LOBATTO_OK] < count ? 0 : static_cast<double>(result.steps_done) / result.seconds;
+}
+
+void print_rates(const Row& row, const std::shared_ptr<const CudaDevice>& device) {
+    Scene scene = read_scene(fmt::format("{}/bench/scenes/{}.toml", LOBATTO_SOURCE_DIR, row.scene));
+    scene.method.points = row.points;
+    const DerivedKernel derived = derived_kernel(scene, {});
+    const Kernel kernel = ensemble_kernel_of(derived.source, Precision::double_, 1 << 20);
+    EnsembleRequest request;
+    EnsembleStart scenes_start;
+    for (const Parameter& parameter : scene.parameters)
+        scenes_start.parameters.push_back(scene.evaluate(parameter.value, parameter.name).to_double());
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
+        scenes_start.q.push_back(scene.evaluate(scene.initial_position[k], "a position").to_double());
+        scenes_start.rate.push_back(scene.evaluate(scene.initial_rate[k], "a velocity").to_double());
+    }
+    request.start = [scenes_start](std::int64_t index, EnsembleStart& start) {
+        start = scenes_start;
+        start.q[0] *= 1 + static_cast<double>(index % 1000) / 1e6;
+    };
+    request.from_velocities = scene.start == Start::velocity;
+    request.step = row.step;
+    request.steps = steps_each;
+    request.tolerance = 1e-9;
+    EnsembleRequest alone = request, there = request;
+    alone.threads = 1;
+    there.device = device_kernel_of(derived.source, Precision::double_, device);
+    const CudaFunction& function = *there.device->function;
+    const int blocks = function.resident(DeviceKernel::block);
+    fmt::print("\n{}: {}, h = {}, {} steps each; {} registers, {} threads on each of {} multiprocessors\n\n", row.name,
+               scene.method.name(), row.step, steps_each, function.registers(), blocks * DeviceKernel::block,
+               device->multiprocessors());
+    fmt::print("| trajectories | one core, steps/s | all cores | {} | times one core | times all |\n", device->name());
+    fmt::print("|---|---|---|---|---|---|\n");
+    for (const std::int64_t count : counts) {
+        const std::int64_t few = std::min(count, steps_of_processor / steps_each);
+        const double one = rate_of(kernel, alone, few), all = rate_of(kernel, request, few),
+                     device_rate = rate_of(kernel, there, count);
+        fmt::print("| {} | {:.3g} | {:.3g} | {:.3g} | {:.1f} | {:.1f} |\n", count, one, all, device_rate,
+                   device_rate / one, device_rate / all);
+    }
+}
+
+}  // namespace
+
+void print_device_rates() {
+    std::shared_ptr<const CudaDevice> device;
+    std::string missing;
+    try {
+        device = CudaDevice::open();
+        if (!find_nvcc()) missing = "there is no nvcc, which compiles for it";
+    } catch (const MachineError& error) {
+        missing = error.what();
+    }
+    if (!missing.empty()) {
+        fmt::print(
+            "Not measured here: the rates of P1 to P4 with 10^3 to 10^7 trajectories on a GPU, beside one and all "
+            "cores; "
+            "registers and occupancy there.\nWhat is missing: {}.\n",
+            missing);
+        return;
+    }
+    for (const Row& row : rows) print_rates(row, device);
+    fmt::print(
+        "\nThe fractal of flips is not among them: stops are found by the processor alone. Shares of the peak are not "
+        "measured.\n");
+}
+
+}  // namespace lobatto::bench

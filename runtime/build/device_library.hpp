@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// The host's side of a kernel's lanes on a device (runtime/kernel/device_lanes.hpp), loaded and checked.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "runtime/kernel/abi.h"
+
+namespace lobatto {
+
+// Copies share the library, which is unloaded with the last of them.
+class DeviceLibrary {
+public:
+    // Throws MachineError.
+    static DeviceLibrary load(const std::string& object, const std::string& expected_digest);
+
+    bool has_lanes() const { return table_->words > 0; }
+    const lobatto_device_lanes* operator->() const { return table_; }
+
+private:
+    std::shared_ptr<void> library_;
+    const lobatto_device_lanes* table_ = nullptr;
+};
+
+}  // namespace lobatto

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Sweeps on a device, with a driver that has none (fake_cuda.cpp): the device's text is compiled by a C++ compiler, all
+// else is as with a GPU. What a GPU computes of that text is not tested here.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+
+#include "runtime/build/cuda_compiler.hpp"
+#include "tests/cli/sweep/tables.hpp"
+
+using namespace lobatto;
+using test::pendulum_file;
+
+namespace {
+
+// Stands in the place of nvcc: reads the same command.
+const char* const compiler_of_text = R"(#!/bin/sh
+while [ $# -gt 0 ]; do
+    case "$1" in
+        *.cu) source=$1 ;;
+        -o) object=$2 ;;
+    esac
+    shift
+done
+exec ${CXX:-g++} -x c++ -std=c++17 -O2 -march=native -ffp-contract=off -fno-math-errno -fPIC -shared -w "$source" -o "$object"
+)";
+
+class FakeDevice {
+public:
+    FakeDevice() {
+        test::write_text(folder_ / "nvcc", compiler_of_text);
+        std::filesystem::permissions(std::string(folder_ / "nvcc"), std::filesystem::perms::owner_all);
+        const test::Finished made =
+            test::run({"g++", "-std=c++17", "-shared", "-fPIC", "-I", LOBATTO_SOURCE_DIR,
+                       LOBATTO_SOURCE_DIR "/tests/cli/fake_cuda.cpp", "-o", std::string(folder_ / "libcuda.so.1")});
+        REQUIRE_MESSAGE(made.exit_code == 0, made.err);
+    }
+
+private:
+    test::TemporaryFolder folder_;
+    test::EnvironmentVariable driver_{"LD_LIBRARY_PATH", std::string(folder_ / "")},
+        nvcc_{"NVCC", std::string(folder_ / "nvcc")};
+};
+
+std::string scene_file(const std::string& name) {
+    return LOBATTO_SOURCE_DIR "/scenes/" + name + ".toml";
+}
+
+// The table of one sweep on the device has the bytes of that on the processor. What is said of failures agrees too.
+void check_same_bytes(const std::string& scene, const std::vector<std::string>& words, int exit_code = 0) {
+    CAPTURE(scene);
+    CAPTURE(fmt::format("{}", fmt::join(words, " ")));
+    const test::SweepFolder place;
+    std::vector<test::Finished> ends;
+    for (const std::string device : {"cpu", "cuda"}) {
+        std::vector<std::string> all{"sweep", scene, "--quiet", "--device", device, "-o", place.file(device + ".csv")};
+        all.insert(all.end(), words.begin(), words.end());
+        ends.push_back(place.lobatto(all));
+        CHECK_MESSAGE(ends.back().exit_code == exit_code, ends.back().err);
+    }
+    CHECK(test::read_file(place.file("cpu.csv")) == test::read_file(place.file("cuda.csv")));
+    const auto before_path = [&](const std::string& text) { return text.substr(0, text.find("What was computed")); };
+    CHECK(before_path(ends[0].err) == before_path(ends[1].err));
+}
+
+}  // namespace
+
+TEST_SUITE("slow") {
+    TEST_CASE("states of all forms on the device have the bits of the processor's lanes after 200 steps") {
+        const FakeDevice device;
+        check_same_bytes(pendulum_file, {"--vary", "q=0.1:3:300", "--vary", "omega=1,2", "--steps", "200"});
+        check_same_bytes(scene_file("kepler"), {"--vary", "y'=1.5:2.2:70", "--steps", "200", "--unmeasured"});
+        check_same_bytes(scene_file("double_pendulum"), {"--vary", "a=0.1:3:70", "--steps", "200", "--unmeasured"});
+        check_same_bytes(scene_file("harmonic_oscillator"),
+                         {"--vary", "q=0:3:70", "--vary", "omega=1,2", "--steps", "200"});
+        check_same_bytes(scene_file("henon_heiles"),
+                         {"--splitting", "6", "--random", "70", "--draw", "y ~ uniform(-0.2, 0.2)", "--steps", "200"});
+        check_same_bytes(scene_file("driven_damped_pendulum"),
+                         {"--vary", "theta=0:3:70", "--steps", "200", "--unmeasured"});
+        check_same_bytes(pendulum_file,
+                         {"--vary", "q=0.1:3:70", "--steps", "200", "--numbers", "float", "--unmeasured"});
+    }
+
+    TEST_CASE("kept states, steps that are varied and steps that fail on the device are those of the processor") {
+        const FakeDevice device;
+        check_same_bytes(pendulum_file,
+                         {"--vary", "q=0.1:2.8:70", "--vary", "step=0.1,0.05", "--until", "20", "--every", "30"});
+        // Iterations fail in many of these: the processor takes such steps by Newton's iteration, or says that it
+        // cannot.
+        check_same_bytes(scene_file("double_pendulum"),
+                         {"--vary", "a=0.1:3:70", "--step", "0.3", "--steps", "200", "--unmeasured"}, 3);
+        check_same_bytes(scene_file("kepler"),
+                         {"--vary", "y'=0.1:2.2:70", "--step", "0.1", "--steps", "200", "--unmeasured"}, 3);
+    }
+
+    TEST_CASE("a device that is lost ends the sweep, its finished rows stay, and --resume goes on to the same bytes") {
+        const FakeDevice device;
+        const test::SweepFolder place;
+        const std::vector<std::string> words{"--vary",  "q=0.1:2.8:70", "--vary",       "step=0.1,0.05", "--until", "2",
+                                             "--every", "10",           "--unmeasured", "--threads",     "1"};
+        const std::string whole = place.bytes("whole.csv", words);
+        std::vector<std::string> on_device = words;
+        on_device.insert(on_device.end(), {"--device", "cuda", "--resume"});
+        {
+            const test::EnvironmentVariable lost("FAKE_CUDA_LOST",
+                                                 "3");  // two launches take the first step size to its end
+            CHECK(place.refusal("lost.csv", on_device, 4) ==
+                  "lobatto: the GPU no real GPU does not begin the steps: unspecified launch failure "
+                  "(CUDA_ERROR_LAUNCH_FAILED); or compute with --device cpu\n");
+        }
+        // The last one of a part may lack rows, and is computed again.
+        const test::Finished resumed = place.sweep("lost.csv", on_device);
+        CHECK(resumed.exit_code == 0);
+        CHECK_MESSAGE(resumed.out.find("after 69 trajectories") != std::string::npos, resumed.out);
+        CHECK(test::read_file(place.file("lost.csv")) == whole);
+    }
+}
+
+TEST_CASE("what stands in the way of a sweep on a device is said, with what to do") {
+    const test::SweepFolder place;
+    const std::vector<std::string> words{"--vary", "q=1,2", "--steps", "10", "--device", "cuda"};
+    SUBCASE("no nvcc") {
+        const FakeDevice device;
+        const test::EnvironmentVariable none("NVCC", "/nowhere/nvcc");
+        CHECK(
+            place.refusal("t.csv", words, 4) ==
+            "lobatto: the environment variable NVCC names '/nowhere/nvcc', which is no program; correct NVCC, or unset "
+            "it to look for nvcc in PATH and in /usr/local/cuda/bin\n");
+    }
+    SUBCASE("no device") {
+        const FakeDevice device;
+        const test::EnvironmentVariable none("FAKE_CUDA_DEVICES", "0");
+        CHECK(place.refusal("t.csv", words, 4) ==
+              "lobatto: NVIDIA's driver shows no GPU; see what nvidia-smi says, and whether CUDA_VISIBLE_DEVICES hides "
+              "it; or compute with --device cpu\n");
+    }
+    SUBCASE("no memory") {
+        const FakeDevice device;
+        const test::EnvironmentVariable none("FAKE_CUDA_BYTES", "100");
+        CHECK(
+            place.refusal("t.csv", words, 4) ==
+            "lobatto: the GPU no real GPU cannot hold the trajectories: its memory is full; wait until other programs "
+            "have left it; or compute with --device cpu\n");
+    }
+    SUBCASE("what the device does not do") {
+        std::vector<std::string> kept = words;
+        kept.insert(kept.end(), {"--keep", "max(q)"});
+        CHECK(place.refusal("t.csv", kept) == pendulum_file +
+                                                  ": --device cuda: what --keep asks for is computed by the processor "
+                                                  "alone; compute with --device cpu\n");
+    }
+}
+
+TEST_CASE("--device auto takes the processor where there is no device") {
+    const FakeDevice device;
+    const test::EnvironmentVariable none("FAKE_CUDA_DEVICES", "0");
+    const test::SweepFolder place;
+    const std::vector<std::string> words{"--vary", "q=1,2", "--steps", "10"};
+    std::vector<std::string> chosen = words;
+    chosen.insert(chosen.end(), {"--device", "auto"});
+    CHECK(place.bytes("auto.csv", chosen) == place.bytes("cpu.csv", words));
+}
