@@ -34,7 +34,7 @@ public:
         std::filesystem::permissions(std::string(folder_ / "nvcc"), std::filesystem::perms::owner_all);
         const test::Finished made =
             test::run({"g++", "-std=c++17", "-shared", "-fPIC", "-I", LOBATTO_SOURCE_DIR,
-                       LOBATTO_SOURCE_DIR "/tests/cli/fake_cuda.cpp", "-o", std::string(folder_ / "libcuda.so.1")});
+                       LOBATTO_SOURCE_DIR "/tests/cli/sweep/fake_cuda.cpp", "-o", std::string(folder_ / "libcuda.so.1")});
         REQUIRE_MESSAGE(made.exit_code == 0, made.err);
     }
 
