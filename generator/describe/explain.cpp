@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "generator/formula/expansion.hpp"
+#include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/programs/programs.hpp"
 
 namespace lobatto {
@@ -168,10 +169,10 @@ std::string solver_text(const Derivation& derivation) {
         if (known == kinds.end()) known = kinds.insert(kinds.end(), {text, {}});
         known->second.push_back(solve.coordinates.front());
     }
-    const bool has_fixed_point = !derivation.structure.full() &&
-                                 (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
-                                 (derivation.structure.form() == Form::separable ||
-                                  derivation.system.n <= most_iterated || derivation.structure.light_mass());
+    const bool has_fixed_point =
+        !derivation.structure.full() && (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
+        (derivation.structure.form() == Form::separable || derivation.system.n <= most_iterated ||
+         has_light_mass(derivation.scene, derivation.system, derivation.structure));
     std::string text = derivation.structure.linear ? "once a step, without iteration; "
                        : has_fixed_point
                            ? "by fixed-point iteration over all points at once; where it does not contract, "

@@ -8,6 +8,7 @@
 
 #include "generator/emit/function_text.hpp"
 #include "generator/mechanics/derivation.hpp"
+#include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/programs/looped.hpp"
 
 namespace lobatto {
@@ -92,8 +93,9 @@ std::string general_shapes(const Derivation& d) {
     text += places("mass", mass);
     line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
          d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
-    line(text, fmt::format("bool scaled_mass = {}", d.structure.scaled_mass()),
-         d.structure.scaled_mass() ? "M is one function times a constant matrix" : "masses change in different ways");
+    const bool scaled = uses_scaled_mass(d.scene, d.system, d.structure);
+    line(text, fmt::format("bool scaled_mass = {}", scaled),
+         scaled ? "M is one function times a constant matrix" : "masses change in different ways");
     const bool hamiltonian = d.structure.hamiltonian().has_value();
     line(text, fmt::format("bool hamiltonian = {}", hamiltonian),
          hamiltonian ? "velocities and forces are formulas of positions and momenta"

@@ -2,6 +2,7 @@
 // The programs of any other Lagrangian: one node's slopes and second derivatives in z = (v, q, P), from which the
 // support header assembles the equations of a step (D25 ... D30).
 #include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/programs/builder.hpp"
 #include "generator/programs/identifier.hpp"
 
@@ -69,9 +70,10 @@ private:
         program("momentum", "p", bodies ? momentum_of(*bodies) : momentum);
         for (std::size_t k = 0; k < n_; ++k) legendre.outputs.push_back({at("p", k), momentum[k]});
         std::size_t e = 0;
+        const bool scaled = uses_scaled_mass(d_.scene, d_.system, d_.structure);
         for (const auto& [place, value] : d_.system.momentum_v.entries()) {
             legendre.outputs.push_back({at("M", e), convert(value)});
-            if (!d_.structure.scaled_mass())
+            if (!scaled)
                 stage.outputs.push_back({at("M", e), convert(value)});
             else if (e == 0)
                 stage.outputs.push_back({at("M", e), convert(GiNaC::pow(value, -1))});

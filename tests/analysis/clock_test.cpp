@@ -11,6 +11,7 @@
 #include "analysis/motion.hpp"
 #include "generator/mechanics/algebra/sample.hpp"
 #include "generator/mechanics/clock/clock.hpp"
+#include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "runtime/run/output.hpp"
@@ -221,7 +222,7 @@ TEST_CASE("a clock's masses change alike, for any number of bodies") {
         "z = { position = [0, 1, -1, -3, 2, 2], velocity = 0 }\n[method]\npoints = 6\nclock = \"auto\"\n[run]\n"
         "step = 0.1\nuntil = 4\n";
     const Derivation derivation = derive(scene_of(text));
-    CHECK(derivation.structure.light_mass());
+    CHECK(has_light_mass(derivation.scene, derivation.system, derivation.structure));
     const Ended ended = run(scene_of(text), 1);
     CHECK(ended.energy_error < 1e-9);
     // Fixed-point iterations: Newton's would be 2 or 3 a step.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "generator/mechanics/structure/scaled_mass.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "generator/mechanics/algebra/sample.hpp"
@@ -27,6 +28,7 @@ bool has_scaled_mass(const Scene& scene, const System& system) {
     bool is_scaled = true;
     try {
         at_sample_points(scene, [&](NearStart& point) {
+            if (!is_scaled) return;
             Formulas formulas;
             point.set_all(formulas);
             for (const Sized& value : formulas.evaluate_sized(formulas.convert(differences)))
@@ -36,6 +38,20 @@ bool has_scaled_mass(const Scene& scene, const System& system) {
         return false;
     }
     return is_scaled;
+}
+
+bool has_diagonal_mass(const System& system) {
+    const auto& entries = system.momentum_v.entries();
+    return std::all_of(entries.begin(), entries.end(), [](const auto& e) { return e.first.first == e.first.second; });
+}
+
+bool uses_scaled_mass(const Scene& scene, const System& system, const Structure& structure) {
+    return structure.form() == Form::general && !structure.full() && !structure.looped && !structure.linear &&
+           system.constraints.empty() && has_scaled_mass(scene, system);
+}
+
+bool has_light_mass(const Scene& scene, const System& system, const Structure& structure) {
+    return has_diagonal_mass(system) && uses_scaled_mass(scene, system, structure);
 }
 
 }  // namespace lobatto

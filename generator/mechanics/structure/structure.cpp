@@ -312,18 +312,15 @@ private:
 
     // What an iteration need not factor.
     void masses() {
-        const auto& entries = system_.momentum_v.entries();
-        const bool diagonal =
-            std::all_of(entries.begin(), entries.end(), [](const auto& e) { return e.first.first == e.first.second; });
-        general_.scaled_mass = has_scaled_mass(scene_, system_);
-        general_.light_mass = general_.scaled_mass && diagonal;
         if (n_ == 1 || general_.hamiltonian) return;
-        find("scaled mass matrix", general_.scaled_mass,
-             general_.scaled_mass ? "all masses change alike: M is one function times a constant matrix, so an "
-                                    "iteration divides by that function and solves nothing"
-             : diagonal           ? "each mass changes in its own way; no two velocities are multiplied, so an "
-                                    "iteration divides by each"
-                                  : "the masses change in different ways, so an iteration factors M at every node");
+        const bool scaled = has_scaled_mass(scene_, system_);
+        find("scaled mass matrix", scaled,
+             scaled ? "all masses change alike: M is one function times a constant matrix, so an "
+                      "iteration divides by that function and solves nothing"
+             : has_diagonal_mass(system_)
+                 ? "each mass changes in its own way; no two velocities are multiplied, so an "
+                   "iteration divides by each"
+                 : "the masses change in different ways, so an iteration factors M at every node");
     }
 
     void velocities_of_momenta() {

@@ -69,9 +69,7 @@ struct SeparableForm : ConstantMassForm {
 };
 // Any L: all nodes but the first are implicit (D25 ... D30).
 struct GeneralForm {
-    bool full = false;         // asked for: nothing is looked for, matrices are full
-    bool scaled_mass = false;  // M = m(q, v, t) M0 with a constant M0 (scaled_mass.hpp)
-    bool light_mass = false;   // and M0 is diagonal
+    bool full = false;  // asked for: nothing is looked for, matrices are full
     Routhian routhian;
     std::optional<Hamiltonian> hamiltonian;  // iterations take velocities and forces of momenta (D62)
 };
@@ -100,8 +98,6 @@ struct Structure {
     bool diagonal_part() const { return form() == Form::separable && separable().diagonal_part; }
     bool absorbed() const { return form() == Form::separable && separable().absorbed; }
     bool full() const { return form() == Form::general && std::get<GeneralForm>(of_form).full; }
-    bool scaled_mass() const { return form() == Form::general && std::get<GeneralForm>(of_form).scaled_mass; }
-    bool light_mass() const { return form() == Form::general && std::get<GeneralForm>(of_form).light_mass; }
 };
 
 // Coordinates of a linear map; unknowns of a separable step whose constant mass matrix is full.

@@ -32,7 +32,7 @@ struct LongTime {
 template <class K>
 struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, Stepping::solved> {
     using Chain = Stepper<K, Form::general, Stepping::solved>;
-    using Chain::n, Chain::q, Chain::p, Chain::coefficients, Chain::step_size, Chain::elapsed;
+    using Chain::n, Chain::q, Chain::p, Chain::coefficients, Chain::step_size, Chain::elapsed, Chain::rates;
     using typename Chain::real;
     static constexpr int trial_limit = 60, r = K::nodes;
 
@@ -180,7 +180,6 @@ private:
     // theta at which the polynomial of the last step's rates says that `wanted` has passed: its integral is theta times
     // the polynomial of the mean rates until each node. Newton's iteration, as far as it stays within the step.
     real theta_of(real wanted, real theta, const real* share) const {
-        const real* const rates = Chain::rates;
         real mean[r], value[r];
         for (int i = 0; i < r; ++i) {
             mean[i] = K::c[i] > real(0) ? real(0) : rates[i];

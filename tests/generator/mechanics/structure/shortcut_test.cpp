@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "generator/mechanics/structure/scaled_mass.hpp"
 #include "runtime/run/trajectory.hpp"
 #include "tests/scenes/scenes.hpp"
 
@@ -128,10 +129,11 @@ TEST_CASE("masses that all change alike leave no matrix of a node to factor") {
           Row{"x'^2 + (1 + x^2)*y'^2", false, false}, Row{"(1 + x^2)*(x'^2 + y'^2) + x'*y'", false, false}}) {
         INFO(row.energy);
         const Scene whole = with_kinetic_energy(row.energy);
-        Structure structure = derive(whole).structure;
-        if (structure.form() != Form::general) continue;  // as constant as can be
-        CHECK(structure.scaled_mass() == row.is_scaled);
-        CHECK(structure.light_mass() == row.is_light);
+        const Derivation derivation = derive(whole);
+        REQUIRE(derivation.structure.form() == Form::general);
+        CHECK(uses_scaled_mass(whole, derivation.system, derivation.structure) == row.is_scaled);
+        CHECK(finding(derivation, "scaled mass matrix").holds == row.is_scaled);
+        CHECK(has_light_mass(whole, derivation.system, derivation.structure) == row.is_light);
     }
     for (const char* energy :
          {"(1 + x^2)*(x'^2 + 3*y'^2) + x*y'", "(1 + x^2 + y^2)*(x'^2 + x'*y' + y'^2)", "x'^2 + (1 + x^2)*y'^2"})
