@@ -68,6 +68,7 @@ int main(int argc, char** argv) {
     CLI::Option* ensemble = program.add_flag("--ensemble", options.ensemble, "Only the ensembles");
     program.add_flag("--single", options.single, "Only one trajectory")->excludes(ensemble);
     program.add_flag("--peers-only", options.race.peers_only, "Without our kernels");
+    program.add_option("--method", options.race.methods, "Only methods whose names hold this word; may be given again");
     program.add_flag("--quick", options.race.quick, "Fewer kernels, coarser steps and fewer repetitions");
     program.add_flag("--references", options.references,
                      "No race: how far the references of the problems move with shorter steps");

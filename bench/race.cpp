@@ -177,7 +177,12 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
         enter(clocked_contestants(problem, options.quick));
         enter(kernel_contestants(problem, options.quick, trajectories > 1 ? trajectories : 0));
     }
+    const auto is_wanted = [&](const Contestant& contestant) {
+        const auto holds = [&](const std::string& word) { return contestant.method.find(word) != std::string::npos; };
+        return options.methods.empty() || std::any_of(options.methods.begin(), options.methods.end(), holds);
+    };
     for (Contestant& contestant : contestants) {
+        if (!is_wanted(contestant)) continue;
         say(race, contestant.method);
         Lane lane{std::move(contestant), {}, {}};
         scan(course, lane, options.quick, time_limit_of(problem, race.lanes));

@@ -36,6 +36,7 @@ struct Race {
 struct RaceOptions {
     bool quick = false;  // fewer kernels, coarser ladders, fewer repetitions
     bool peers_only = false;
+    std::vector<std::string> methods;  // only those whose names hold one of these; none: all
 };
 
 double seconds(const Lane& lane, std::size_t target);  // of the best setting; infinity: it does not reach the target
