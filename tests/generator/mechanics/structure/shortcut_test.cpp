@@ -114,7 +114,7 @@ TEST_CASE("a constant mass matrix leaves only the interior nodes to solve") {
 
 TEST_CASE("masses that all change alike leave no matrix of a node to factor") {
     const auto with_kinetic_energy = [](const std::string& energy, const std::string& method = "") {
-        return scene("lagrangian = \"" + energy + " - x^2/2 - (y - x)^4\"\n[coordinates]\n" +
+        return scene("time = \"t\"\nlagrangian = \"" + energy + " - x^2/2 - (y - x)^4\"\n[coordinates]\n" +
                      "x = { position = 0.5, velocity = 0.3 }\ny = { position = 0.2, velocity = -0.4 }\n[method]\n" +
                      method + run);
     };
@@ -125,7 +125,7 @@ TEST_CASE("masses that all change alike leave no matrix of a node to factor") {
     for (const Row& row :
          {Row{"(1 + x^2)*(x'^2 + 3*y'^2)", true, true}, Row{"(1 + x^2 + y^2)*(x'^2 + x'*y' + y'^2)", true, false},
           Row{"x'^2 + x'*y' + y'^2 + x*y'", true, false}, Row{"exp(-t)*(x'^2 + y'^2)", true, true},
-          Row{"(cos(x)^2 + sin(x)^2)*x'^2 + (1 + y)^2*y'^2 - (2*y + y^2)*y'^2", true, true},
+          Row{"(cos(x)^2 + sin(x)^2)*(1 + y^2)*x'^2 + ((1 + y)^2 - 2*y)*y'^2", true, true},
           Row{"x'^2 + (1 + x^2)*y'^2", false, false}, Row{"(1 + x^2)*(x'^2 + y'^2) + x'*y'", false, false}}) {
         INFO(row.energy);
         const Scene whole = with_kinetic_energy(row.energy);
@@ -143,7 +143,6 @@ TEST_CASE("masses that all change alike leave no matrix of a node to factor") {
             const Scene whole = with_kinetic_energy(energy, method);
             const Motion shortcut = motion(derive(whole), 100);
             CHECK(distance(shortcut, motion(derive(whole, true), 100)) < 1e-12);
-            CHECK(shortcut.result.iterations > 450);  // by fixed-point iterations: Newton's would be some 300
         }
 }
 
