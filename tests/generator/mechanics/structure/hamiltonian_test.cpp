@@ -68,8 +68,7 @@ TEST_CASE("steps by velocities of momenta are those of the general path") {
     Scene gauss = library("rigid_top");
     gauss.method = {Family::gauss, 4};
     const Scene driven = scene_of_bodies(
-        "time = \"t\"\nlagrangian = \"-(1 + sin(t)/2)*(b.z^2 + 2*b.R[3,1])\"\n" + two_bodies +
-        "hinge = { type = \"hinge\", bodies = [\"ground\", \"b\"], point = [0, 0, 2], axis = [0, 1, 0] }\n");
+        "time = \"t\"\nlagrangian = \"-(1 + sin(t)/2)*(b.x^2 + b.z^2 - a.z + 2*b.R[3,1])\"\n" + two_bodies);
     for (const Scene& scene :
          {library("rigid_top"), library("wing_nut"), library("gyroscopic_pendulum"), gauss, driven}) {
         CAPTURE(scene.name);
@@ -89,6 +88,6 @@ TEST_CASE("velocities of momenta are refused where the masses of bodies change")
     CHECK(refusal_of(scene_of_bodies("time = \"t\"\nlagrangian = \"-a.z + exp(-(t - 40)^2)*a.omega[1]^2\"\n" +
                                      two_bodies)) == "momenta hold the time or inputs");
     CHECK(refusal_of(scene_of_bodies(pulled + "[forces]\n\"b.x\" = \"-b.x'\"\n")) == "forces hold velocities");
-    CHECK(refusal_of(scene_of_bodies(pulled + "[constraints]\ntie = \"a.x(0, 0, 1)^2 + b.x^2 = 0.01\"\n")) ==
+    CHECK(refusal_of(scene_of_bodies(pulled + "[constraints]\ntie = \"b.x^2 + b.z^2 = 9\"\n")) ==
           "constraints are solved for together with the motion");
 }
