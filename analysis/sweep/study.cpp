@@ -10,6 +10,7 @@
 #include "analysis/accuracy/watch/energy_watch.hpp"
 #include "analysis/exact_start.hpp"
 #include "analysis/kernel/derived_kernel.hpp"
+#include "analysis/kernel/device_kernel.hpp"
 #include "analysis/reductions.hpp"
 #include "analysis/sweep/pace.hpp"
 #include "generator/mechanics/start.hpp"
