@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "generator/scene/rigid_body.hpp"
+#include "generator/scene/bodies/rigid_body.hpp"
 #include "generator/scene/scene.hpp"
 
 using namespace lobatto;
