@@ -203,26 +203,27 @@ const lobatto_kernel* lobatto_kernel_table(void);
  * words[w * room + l]. On the device the pointers are its own. */
 typedef struct lobatto_device_call {
     uint64_t* words;
-    int64_t room, lanes; /* lanes that fit, and that there are */
-    int64_t target;      /* steps since the start to reach, of each lane whose status is LOBATTO_OK */
-    int64_t* steps;      /* since the start, one a lane; in and out, as the others */
-    int64_t* iterations; /* since the start */
-    int32_t* status;     /* LOBATTO_NOT_CONVERGED: `retake` takes the step */
+    int64_t room, lanes;           /* lanes that fit, and that there are */
+    int64_t target;                /* steps since the start to reach, of each lane whose status is LOBATTO_OK */
+    int64_t* steps;                /* since the start, one a lane; in and out, as the others */
+    int64_t* iterations;           /* since the start */
+    int32_t* status;               /* LOBATTO_NOT_CONVERGED: `retake` takes the step */
     double start_time[2], step[2]; /* numbers of the kernel, in their first bytes */
 } lobatto_device_call;
 
 typedef struct lobatto_device_lanes {
-    uint32_t abi_version; /* LOBATTO_ABI_VERSION */
-    uint32_t bytes;       /* sizeof(lobatto_device_lanes) */
-    const char* digest;   /* of the emitted text */
-    int32_t words;        /* of a lane; 0: the kernel has none, and the functions are null */
-    int32_t first_moving, moving; /* of these, which steps change and `state` reads */
+    uint32_t abi_version;                   /* LOBATTO_ABI_VERSION */
+    uint32_t bytes;                         /* sizeof(lobatto_device_lanes) */
+    const char* digest;                     /* of the emitted text */
+    int32_t words;                          /* of a lane; 0: the kernel has none, and the functions are null */
+    int32_t first_moving, moving;           /* of these, which steps change and `state` reads */
     int32_t shared_bytes, shared_alignment; /* of what all lanes of one step size share */
     int32_t host_bytes, host_alignment;     /* of room for the functions below, one a thread */
     /* Lanes first, ..., last - 1 at their starts; arrays are lane-major, as of ensembles. */
     void (*place)(void* host, lobatto_device_call* call, int64_t first, int64_t last, const void* parameters,
                   const void* q, const void* p, double tolerance);
-    void (*shared)(const lobatto_device_call* call, int64_t lane, void* shared); /* of any lane placed with LOBATTO_OK */
+    void (*shared)(const lobatto_device_call* call, int64_t lane,
+                   void* shared); /* of any lane placed with LOBATTO_OK */
     /* What a launch does, on the host. */
     void (*advance)(lobatto_device_call* call, const void* shared, int64_t first, int64_t last);
     /* From the step that failed to the target; parameters of this lane. */
