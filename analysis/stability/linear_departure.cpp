@@ -48,7 +48,7 @@ std::string linear_departure(const Outline& outline, const Scene& scene, const K
         std::ceil(std::log(times_too_large) / excess), result.time, list_text(result.q), list_text(result.p),
         std::exp(*measured), std::exp(own),
         outline.quadrature.method.family == Family::gauss ? "so long for this motion that rounding swamps it"
-                                                             : "beyond the stability of the method",
+                                                          : "beyond the stability of the method",
         request.step / 2,
         outline.quadrature.is_explicit() ? fmt::format(" --splitting {}", outline.quadrature.method.points) : "");
 }

@@ -63,8 +63,8 @@ void print(const Checked& checked) {
     const Scene& scene = derivation.scene;
     fmt::print(std::cout, "{} ({})\n\n", scene.title, scene.path);
     print_finding("Lagrangian", scene.lagrangian_text.size() <= 400
-                                ? scene.lagrangian_text
-                                : fmt::format("a formula of {} characters", scene.lagrangian_text.size()));
+                                    ? scene.lagrangian_text
+                                    : fmt::format("a formula of {} characters", scene.lagrangian_text.size()));
     print_finding("its kind", kind_of(derivation));
     print_findings("Found, and put to use", derivation.findings, true);
     print_findings("Looked for, not found", derivation.findings, false);
@@ -75,23 +75,23 @@ void print(const Checked& checked) {
         return here == without ? std::string() : fmt::format("; {} without what was found", without);
     };
     const int unknowns = unknowns_of(derivation);
-    print_finding("unknowns",
-              (unknowns == 0 ? "none" : std::to_string(unknowns)) + compared(unknowns, unknowns_of(checked.without)));
+    print_finding("unknowns", (unknowns == 0 ? "none" : std::to_string(unknowns)) +
+                                  compared(unknowns, unknowns_of(checked.without)));
     if (const std::string solver = solver_text(derivation); !solver.empty()) print_finding("solved", solver);
     const long elimination = elimination_of(derivation);
     if (!derivation.structure.is_explicit())
         print_finding("elimination", fmt::format("some {} multiplications{}", elimination,
-                                             compared(elimination, elimination_of(checked.without))));
+                                                 compared(elimination, elimination_of(checked.without))));
 
     fmt::print(std::cout, "\nThe kernel\n");
     for (const CheckedOutput& output : checked.outputs)
         print_finding(output.name, !output.asked ? "not asked for, left out"
-                               : output.operations == 0
-                                   ? output.text
-                                   : fmt::format("{}: {} operations", output.text, output.operations));
+                                   : output.operations == 0
+                                       ? output.text
+                                       : fmt::format("{}: {} operations", output.text, output.operations));
     // One function serves all points of a step.
     print_finding("operations", fmt::format("{} in all its formulas, each counted once{}", checked.operations,
-                                        compared(checked.operations, checked.operations_without)));
+                                            compared(checked.operations, checked.operations_without)));
     print_finding("derived and written in", fmt::format("{:.2f} s", checked.seconds));
 }
 

@@ -9,8 +9,8 @@
 
 namespace lobatto {
 
-// The environment variable NVCC, else nvcc in PATH, in $CUDA_HOME/bin or in /usr/local/cuda/bin; nothing: there is none.
-// MachineError where NVCC names no program.
+// The environment variable NVCC, else nvcc in PATH, in $CUDA_HOME/bin or in /usr/local/cuda/bin; nothing: there is
+// none. MachineError where NVCC names no program.
 std::optional<std::string> find_nvcc();
 
 struct DeviceTranslation {

@@ -34,8 +34,8 @@ LOBATTO_INLINE Doubles<width> with_sign_of(const Doubles<width>& y, const Double
 
 // `value` where the path without branches holds, the library's function of x (and y) elsewhere.
 template <class Function>
-[[gnu::noinline, gnu::cold]] LOBATTO_DEVICE void by_library(int width, const double* beyond, const double* x, const double* y,
-                                             double* values, Function function) {
+[[gnu::noinline, gnu::cold]] LOBATTO_DEVICE void by_library(int width, const double* beyond, const double* x,
+                                                            const double* y, double* values, Function function) {
     for (int i = 0; i < width; ++i)
         if (beyond[i] != 0) values[i] = function(x[i], y[i]);
 }

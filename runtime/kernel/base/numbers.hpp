@@ -11,8 +11,8 @@
 #endif
 
 // In front of functions that a lane's step calls: with nvcc they are for the device too (device_lanes.hpp). There what
-// has a lane's arrays must be in line, so that they are registers: LOBATTO_LANE, and LOBATTO_APART, which elsewhere is a
-// function by itself. LOBATTO_LIBRARY(f): a function of the C library, which nvcc knows by its own name.
+// has a lane's arrays must be in line, so that they are registers: LOBATTO_LANE, and LOBATTO_APART, which elsewhere is
+// a function by itself. LOBATTO_LIBRARY(f): a function of the C library, which nvcc knows by its own name.
 #ifdef __CUDACC__
 #define LOBATTO_DEVICE __host__ __device__
 #define LOBATTO_LANE __host__ __device__ __forceinline__
@@ -46,7 +46,7 @@ constexpr bool is_many_digits = false;
 // cosine of double are in base/trigonometry.hpp.
 template <class real, class type>
 using Only = std::enable_if_t<std::is_same_v<real, type>, real>;
-#define LOBATTO_FUNCTION(type, f, suffix) \
+#define LOBATTO_FUNCTION(type, f, suffix)              \
     template <class real>                              \
     LOBATTO_DEVICE inline Only<real, type> f(real x) { \
         return LOBATTO_LIBRARY(f##suffix)(x);          \

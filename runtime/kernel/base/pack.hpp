@@ -372,9 +372,13 @@ struct Pack {
         return *this;
     }
 #ifdef __CUDACC__
-    LOBATTO_INLINE Pack(real x) { LOBATTO_EACH(part[i] = Operations::spread(x)); }  // constants have no address there
+    LOBATTO_INLINE Pack(real x) {
+        LOBATTO_EACH(part[i] = Operations::spread(x));
+    }  // constants have no address there
 #else
-    LOBATTO_INLINE Pack(const real& x) { LOBATTO_EACH(part[i] = Operations::spread(x)); }
+    LOBATTO_INLINE Pack(const real& x) {
+        LOBATTO_EACH(part[i] = Operations::spread(x));
+    }
 #endif
     // From a literal, where numbers are a class.
     template <class Number, class = std::enable_if_t<std::is_class_v<real> && std::is_arithmetic_v<Number>>>
@@ -385,16 +389,32 @@ struct Pack {
         LOBATTO_EACH(result.part[i] = Operations::load(from + i * lanes));
         return result;
     }
-    LOBATTO_INLINE void store(real* to) const { LOBATTO_EACH(Operations::store(part[i], to + i * lanes)); }
+    LOBATTO_INLINE void store(real* to) const {
+        LOBATTO_EACH(Operations::store(part[i], to + i * lanes));
+    }
 
-    LOBATTO_INLINE real operator[](int lane) const { return Operations::lane(part[lane / lanes], lane % lanes); }
-    LOBATTO_INLINE void set(int lane, const real& x) { Operations::set(part[lane / lanes], lane % lanes, x); }
+    LOBATTO_INLINE real operator[](int lane) const {
+        return Operations::lane(part[lane / lanes], lane % lanes);
+    }
+    LOBATTO_INLINE void set(int lane, const real& x) {
+        Operations::set(part[lane / lanes], lane % lanes, x);
+    }
 
-    LOBATTO_INLINE Pack operator-() const { LOBATTO_PARTS(Pack, -part[i]); }
-    LOBATTO_INLINE Pack& operator+=(const Pack& b) { return *this = *this + b; }
-    LOBATTO_INLINE Pack& operator-=(const Pack& b) { return *this = *this - b; }
-    LOBATTO_INLINE Pack& operator*=(const Pack& b) { return *this = *this * b; }
-    LOBATTO_INLINE Pack& operator/=(const Pack& b) { return *this = *this / b; }
+    LOBATTO_INLINE Pack operator-() const {
+        LOBATTO_PARTS(Pack, -part[i]);
+    }
+    LOBATTO_INLINE Pack& operator+=(const Pack& b) {
+        return *this = *this + b;
+    }
+    LOBATTO_INLINE Pack& operator-=(const Pack& b) {
+        return *this = *this - b;
+    }
+    LOBATTO_INLINE Pack& operator*=(const Pack& b) {
+        return *this = *this * b;
+    }
+    LOBATTO_INLINE Pack& operator/=(const Pack& b) {
+        return *this = *this / b;
+    }
     LOBATTO_OPERATOR(Pack, Pack, +);
     LOBATTO_OPERATOR(Pack, Pack, -);
     LOBATTO_OPERATOR(Pack, Pack, *);
@@ -409,8 +429,12 @@ struct Pack {
     LOBATTO_INLINE friend Pack fused(const Pack& a, const Pack& b, const Pack& c) {
         LOBATTO_PARTS(Pack, Operations::fused(a.part[i], b.part[i], c.part[i]));
     }
-    LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) { return select(a < b, a, b); }
-    LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) { return select(a > b, a, b); }
+    LOBATTO_INLINE friend Pack minimum(const Pack& a, const Pack& b) {
+        return select(a < b, a, b);
+    }
+    LOBATTO_INLINE friend Pack maximum(const Pack& a, const Pack& b) {
+        return select(a > b, a, b);
+    }
 
     LOBATTO_INLINE friend Bits<real, width> bits(const Pack& a) {
         Bits<real, width> result;

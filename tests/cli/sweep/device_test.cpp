@@ -32,9 +32,9 @@ public:
     FakeDevice() {
         test::write_text(folder_ / "nvcc", compiler_of_text);
         std::filesystem::permissions(std::string(folder_ / "nvcc"), std::filesystem::perms::owner_all);
-        const test::Finished made =
-            test::run({"g++", "-std=c++17", "-shared", "-fPIC", "-I", LOBATTO_SOURCE_DIR,
-                       LOBATTO_SOURCE_DIR "/tests/cli/sweep/fake_cuda.cpp", "-o", std::string(folder_ / "libcuda.so.1")});
+        const test::Finished made = test::run({"g++", "-std=c++17", "-shared", "-fPIC", "-I", LOBATTO_SOURCE_DIR,
+                                               LOBATTO_SOURCE_DIR "/tests/cli/sweep/fake_cuda.cpp", "-o",
+                                               std::string(folder_ / "libcuda.so.1")});
         REQUIRE_MESSAGE(made.exit_code == 0, made.err);
     }
 
