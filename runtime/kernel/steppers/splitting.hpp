@@ -82,8 +82,8 @@ LOBATTO_INLINE void store_to(const KickAndDrift<K, T, Given, is_last>& step, int
 // One step from q, u and W to q1, u1 and W1 of neighbouring coordinates of trajectories side by side: once along the
 // coordinates for each kick.
 template <class K, class T, class Given, class Time>
-LOBATTO_INLINE void immediate_step(const Composition<K>& composition, const Given& k, const Time& time,
-                                   typename K::real h, const T* q, const T* u, const T* W, T* q1, T* u1, T* W1) {
+LOBATTO_INLINE void immediate_step(const Composition<K>& composition, const Given& k, const Time& time, const T* q,
+                                   const T* u, const T* W, T* q1, T* u1, T* W1) {
     constexpr int n = K::coordinates, s = K::points;
     const auto pass = [&](int i, auto is_last) LOBATTO_FORMULA {
         const KickAndDrift<K, T, Given, is_last()> step{
@@ -414,7 +414,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         const int next = 1 - now;
         T not_finite = T(real(0));
         if constexpr (moves_immediately<K>()) {
-            immediate_step<K>(composition, k, time, h, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+            immediate_step<K>(composition, k, time, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {
             T q1[n], u1[n], W1[n];
