@@ -64,7 +64,7 @@ TEST_CASE("the examples in the comments of lobatto.hpp compile without a warning
     CHECK(said.starts_with("q = 1.5708 rad\n-- 1\n-- 2\nq = "));
     CHECK(said.find(" after 3, error ") != std::string::npos);
     CHECK(said.find("0: q = 1\n1: q = ") != std::string::npos);  // of the second start, each 20th step of 0.05
-    CHECK(said.ends_with("-- 4\n-- 5\n-- 6\n"));                 // all claims hold
+    CHECK(said.ends_with("-- 5\n-- 6\n-- 7\n"));                 // all claims hold
 }
 
 TEST_CASE("the examples in the comments of lobatto.h compile as C99 without a warning, and do what they say" *
