@@ -80,7 +80,8 @@ TEST_CASE("the command line and the library refuse the same with the same words 
     };
     for (const auto& [call, words] : both) {
         const auto of_library = refusal_of(call), of_command = refusal_of_command(words);
-        INFO(words[0] << " ... " << words.back());
+        const std::string command = words[0] + " ... " + words.back();
+        INFO(command);
         CHECK(of_library.first == of_command.first);
         CHECK(of_library.first >= 2);
         CHECK(of_library.second == of_command.second);
