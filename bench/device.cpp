@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -19,13 +21,15 @@ struct Row {
     const char *name, *scene;
     int points;
     double step;
+    std::int64_t steps;  // of each trajectory
 };
-constexpr Row rows[] = {{"P1", "p1_pendulum", 4, 0.2},
-                        {"P2", "p2_henon_heiles", 6, 0.25},
-                        {"P3", "p3_double_pendulum", 6, 0.05},
-                        {"P4", "p4_kepler", 6, 0.1}};
+constexpr Row rows[] = {{"P1", "p1_pendulum", 4, 0.2, 20'000},
+                        {"P2", "p2_henon_heiles", 6, 0.25, 10'000},
+                        {"P3", "p3_double_pendulum", 6, 0.05, 4'000},
+                        {"P4", "p4_kepler", 6, 0.1, 10'000}};
 constexpr std::int64_t counts[] = {1'000, 10'000, 100'000, 1'000'000, 10'000'000};
-constexpr std::int64_t steps_each = 2000, steps_of_processor = 200'000'000;
+constexpr std::int64_t many = 10'000'000;                // so many go a fifth of the way
+constexpr std::int64_t steps_of_processor = 30'000'000;  // of each core: it takes fewer trajectories as far
 
 // Steps of all trajectories in a second, what begins and ends them included; 0: some failed.
 double rate_of(const Kernel& kernel, EnsembleRequest request, std::int64_t count) {
@@ -53,24 +57,27 @@ void print_rates(const Row& row, const std::shared_ptr<const CudaDevice>& device
     };
     request.from_velocities = scene.start == Start::velocity;
     request.step = row.step;
-    request.steps = steps_each;
     request.tolerance = 1e-9;
     EnsembleRequest alone = request, there = request;
     alone.threads = 1;
     there.device = device_kernel_of(derived.source, Precision::double_, device);
     const CudaFunction& function = *there.device->function;
     const int blocks = function.resident(DeviceKernel::block);
-    fmt::print("\n{}: {}, h = {}, {} steps each; {} registers, {} threads on each of {} multiprocessors\n\n", row.name,
-               scene.method.name(), row.step, steps_each, function.registers(), blocks * DeviceKernel::block,
+    fmt::print("\n{}: {}, h = {}, {} registers, {} threads on each of {} multiprocessors\n\n", row.name,
+               scene.method.name(), row.step, function.registers(), blocks * DeviceKernel::block,
                device->multiprocessors());
-    fmt::print("| trajectories | one core, steps/s | all cores | {} | times one core | times all |\n", device->name());
-    fmt::print("|---|---|---|---|---|---|\n");
+    fmt::print("| trajectories | steps of each | one core, steps/s | {} cores | {} | times one core | times all |\n",
+               thread_count(0), device->name());
+    fmt::print("|---|---|---|---|---|---|---|\n");
     for (const std::int64_t count : counts) {
-        const std::int64_t few = std::min(count, steps_of_processor / steps_each);
-        const double one = rate_of(kernel, alone, few), all = rate_of(kernel, request, few),
+        const std::int64_t steps = count == many ? row.steps / 5 : row.steps, few = steps_of_processor / steps;
+        alone.steps = request.steps = there.steps = steps;
+        const double one = rate_of(kernel, alone, std::min(count, few)),
+                     all = rate_of(kernel, request, std::min(count, few * thread_count(0))),
                      device_rate = rate_of(kernel, there, count);
-        fmt::print("| {} | {:.3g} | {:.3g} | {:.3g} | {:.1f} | {:.1f} |\n", count, one, all, device_rate,
+        fmt::print("| {} | {} | {:.3g} | {:.3g} | {:.3g} | {:.1f} | {:.1f} |\n", count, steps, one, all, device_rate,
                    device_rate / one, device_rate / all);
+        std::fflush(stdout);
     }
 }
 
