@@ -102,7 +102,7 @@ void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& t
 }  // namespace
 
 std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options) {
-    return in_algebra([&] {
+    auto study = in_algebra([&] {
         lobatto::Scene read =
             options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);
         method_of(options).apply(read);
@@ -115,11 +115,15 @@ std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& 
         wish.threads = options.threads;
         wish.measures = options.measure;
         wish.beyond_horizon = options.beyond_horizon;
-        auto study = std::make_unique<SweepStudy>(std::move(read), starts, wish, &algebra());
-        refuse_both(options, study->starts());
-        refuse_too_much(*study);
-        return study;
+        auto made = std::make_unique<SweepStudy>(std::move(read), starts, wish, &algebra());
+        refuse_both(options, made->starts());
+        return made;
     });
+    guarded([&] {
+        study->choose_device();
+        refuse_too_much(*study);
+    });
+    return study;
 }
 
 Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options) {

@@ -3,6 +3,7 @@
 // one of them takes the program down.
 #define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -62,6 +63,8 @@ struct Worker {
     std::string file, notes, log;
 };
 
+constexpr unsigned most_seconds = 900;  // of a file: then it hangs, and is ended inside the test that does
+
 class Workers {
 public:
     Workers(int argc, char** argv, int at_once) : argc_(argc), argv_(argv), at_once_(at_once) {}
@@ -109,6 +112,7 @@ private:
             ::dup2(log, 2);
             ::close(log);
             ::setenv("LOBATTO_TEST_NOTES", worker.notes.c_str(), 1);
+            ::alarm(most_seconds);
             doctest::Context context(argc_, argv_);
             context.addFilter("source-file", file.c_str());
             context.setOption("minimal", true);

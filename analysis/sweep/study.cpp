@@ -103,20 +103,17 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
     }
     rows_ = std::make_unique<SweepRows>(scene_, *starts_, states_kept(options.overrides, scene_), options.measures);
     first_ = prepare(0);
-    choose_device();
+    if (options_.device != StudyDevice::cuda) return;
+    if (const std::string obstacle = why_not_on_device(scene_); !obstacle.empty())
+        throw InputError(fmt::format("{}: --device cuda: {}; compute with --device cpu", scene_.path, obstacle));
+    device_ = CudaDevice::open();
+    put_on_device(*first_);
 }
 
 void SweepStudy::choose_device() {
-    if (options_.device == StudyDevice::processor) return;
-    const std::string obstacle = why_not_on_device(scene_);
-    if (options_.device == StudyDevice::cuda) {
-        if (!obstacle.empty())
-            throw InputError(fmt::format("{}: --device cuda: {}; compute with --device cpu", scene_.path, obstacle));
-        device_ = CudaDevice::open();
-        put_on_device(*first_);
+    if (options_.device != StudyDevice::automatic || !why_not_on_device(scene_).empty() ||
+        !is_long(*first_->kernel, first_->request, starts_->count()))
         return;
-    }
-    if (!obstacle.empty() || !is_long(*first_->kernel, first_->request, starts_->count())) return;
     try {
         if (!find_nvcc()) return;
         device_ = CudaDevice::open();
@@ -126,6 +123,7 @@ void SweepStudy::choose_device() {
     } catch (const InputError&) {    // no lanes
     }
     device_ = nullptr;
+    const std::lock_guard lock(*algebra_);
     first_ = prepare(0);
 }
 

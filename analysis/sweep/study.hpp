@@ -47,6 +47,9 @@ public:
     // setting. InputError where something makes no sense; MachineError where a device is asked for and cannot be had.
     SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options,
                std::recursive_mutex* algebra = nullptr);
+    // StudyDevice::automatic: takes the faster of processor and device, after trials in several threads. The caller
+    // must not hold `algebra`, for which they wait.
+    void choose_device();
 
     const Scene& scene() const { return scene_; }  // with all values that are the same for all
     const SweepStarts& starts() const { return *starts_; }
@@ -85,7 +88,6 @@ private:
     std::unique_ptr<Setting> prepare(std::int64_t number);
     EnsembleRequest request_of(const Setting& setting) const;
     Steps steps_of_setting(Scene& scene) const;
-    void choose_device();
     void put_on_device(Setting& setting) const;
     void enter(std::int64_t number);
     void note_warning();

@@ -41,7 +41,8 @@ std::vector<double> column(const std::vector<double>& q, int j) {
 
 }  // namespace
 
-TEST_CASE("plane bodies on hinges are the double pendulum in angles, those on a slider a pendulum on a cart") {
+TEST_CASE("plane bodies on hinges are the double pendulum in angles, those on a slider a pendulum on a cart" *
+          doctest::test_suite("slow")) {
     const std::vector<double> joints = end_of(
         "lagrangian = \"-upper.y - 2*lower.y\"\n[bodies]\nupper = { mass = 1, inertia = 0.3, position = [0, -1] }\n"
         "lower = { mass = 2, inertia = 0.2, position = [0, -3] }\n[joints]\n"
@@ -81,7 +82,7 @@ TEST_CASE("a hinge in space leaves one angle, with the moment of inertia about i
     CHECK(std::fabs(hinge[0] - angle[0]) < 1e-12);
 }
 
-TEST_CASE("a body on a joint moves like a free one that constraints hold") {
+TEST_CASE("a body on a joint moves like a free one that constraints hold" * doctest::test_suite("slow")) {
     const std::string body =
         "[bodies]\narm = { mass = 2, inertia = [1, 1.5, 0.8], position = [1, 0, 0], orientation = [2, 0, 1, 0], ";
     const std::string potential = "lagrangian = \"-2*arm.z\"\n";

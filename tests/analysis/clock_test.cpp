@@ -212,7 +212,7 @@ TEST_CASE("states at given times are as exact as the ends of steps") {
     }
 }
 
-TEST_CASE("a clock's masses change alike, for any number of bodies") {
+TEST_CASE("a clock's masses change alike, for any number of bodies" * doctest::test_suite("slow")) {
     // Three coordinates of each of six bodies: more than a full matrix at every node is kept for.
     std::string text =
         "lagrangian = \"sum(i = 1 .. 6, m[i]*(x[i]'^2 + y[i]'^2 + z[i]'^2)/2) + sum(i = 1 .. 5, sum(j = i + 1 .. 6, "

@@ -129,7 +129,7 @@ TEST_CASE("two points are RATTLE, written by hand") {
     CHECK(apart(ended.result.p, {px, py}) < 1e-13);
 }
 
-TEST_CASE("a double pendulum of rods moves like the one in angles, with order 2s - 2") {
+TEST_CASE("a double pendulum of rods moves like the one in angles, with order 2s - 2" * doctest::test_suite("slow")) {
     const std::vector<double> angles = end_of(scene_of(two_angles + method(10, 0.02, 2)));
     const double a = angles[0], b = angles[1];
     const std::vector<double> exact{std::sin(a), std::sin(a) + std::sin(b), -std::cos(a), -std::cos(a) - std::cos(b)};
@@ -223,7 +223,7 @@ TEST_CASE("fixed-point iteration with constraints finds the steps that Newton's 
     CHECK(other.result.iterations <= 3 * other.result.steps_done);
 }
 
-TEST_CASE("a constraint that moves: a pendulum whose pivot is shaken") {
+TEST_CASE("a constraint that moves: a pendulum whose pivot is shaken" * doctest::test_suite("slow")) {
     const std::string shaken =
         "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 0, velocity = 0.9 }\n"
         "y = { position = -1, velocity = 0 }\n[constraints]\nrod = \"(x - 0.3*sin(3*t))^2 + y^2 = 1\"\n";
@@ -237,7 +237,8 @@ TEST_CASE("a constraint that moves: a pendulum whose pivot is shaken") {
     CHECK(apart(end_of(scene_of(shaken + method(8, 0.05, 3))), exact) < 1e-13);
 }
 
-TEST_CASE("a dead point that is met exactly ends the run, and all that is kept is on the constraints") {
+TEST_CASE("a dead point that is met exactly ends the run, and all that is kept is on the constraints" *
+          doctest::test_suite("slow")) {
     // A parallelogram whose cranks turn with the velocity 1: after a time of s all four bars lie on one line, and
     // multipliers grow beyond what their rounding lets corrections change.
     const std::string bars =
@@ -275,7 +276,8 @@ TEST_CASE("a dead point that is met exactly ends the run, and all that is kept i
     }
 }
 
-TEST_CASE("a charge on a sphere in a magnetic field, with friction: any Lagrangian may be constrained") {
+TEST_CASE("a charge on a sphere in a magnetic field, with friction: any Lagrangian may be constrained" *
+          doctest::test_suite("slow")) {
     const std::string sphere =
         "lagrangian = \"(1 + z^2)*(x'^2 + y'^2 + z'^2)/2 + 0.7*(x*y' - y*x')/2 - z\"\n[coordinates]\n"
         "x = { position = \"sin(1)\", velocity = 0 }\ny = { position = 0, velocity = \"sin(1)\" }\n"
@@ -337,7 +339,7 @@ TEST_CASE("a free body in a quaternion turns as Euler's equations say") {
     CHECK(order_of(body, 3, 0.1, 3, exact) == doctest::Approx(4).epsilon(0.06));
 }
 
-TEST_CASE("a coordinate that a constraint holds at 0 is at rest, whatever pulls at it") {
+TEST_CASE("a coordinate that a constraint holds at 0 is at rest, whatever pulls at it" * doctest::test_suite("slow")) {
     // Rounding of its equations leaves 1e-66 or so there: neither increments nor errors are measured by that. A run
     // with g = 1000 stopped as infinite in its first step, one with g = 7 as beyond its horizon.
     const test::TemporaryFolder folder;
@@ -358,7 +360,7 @@ TEST_CASE("a coordinate that a constraint holds at 0 is at rest, whatever pulls 
         }
 }
 
-TEST_CASE("the multiplier of a rod is its tension, with the order of the steps") {
+TEST_CASE("the multiplier of a rod is its tension, with the order of the steps" * doctest::test_suite("slow")) {
     // Along (x, y) of length 1, whose slope is 2 (x, y): -m v^2 = 2 lambda - m g y.
     const auto error = [](int points, double step) {
         const test::TemporaryFolder folder;
@@ -377,7 +379,8 @@ TEST_CASE("the multiplier of a rod is its tension, with the order of the steps")
     CHECK(std::log2(error(3, 0.1) / error(3, 0.05)) == doctest::Approx(4).epsilon(0.1));
 }
 
-TEST_CASE("steps preserve areas on the constraints, and run backwards; friction is told apart") {
+TEST_CASE("steps preserve areas on the constraints, and run backwards; friction is told apart" *
+          doctest::test_suite("slow")) {
     const auto defect = [](const std::string& text) {
         const Scene scene = scene_of(text);
         EmitOptions options;

@@ -37,7 +37,7 @@ bool same(const Outline& a, const Outline& b) {
 
 }  // namespace
 
-TEST_CASE("a scene is derived once, and what is kept of it is what was derived") {
+TEST_CASE("a scene is derived once, and what is kept of it is what was derived" * doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
     for (const char* name : {"pendulum", "kepler", "double_pendulum", "driven_damped_pendulum", "pythagorean",

@@ -197,7 +197,7 @@ TEST_CASE("where a coordinate with an equation stays is said") {
           "x: an impact resets coordinates");
 }
 
-TEST_CASE("a chain of equations keeps neighbours beside one another") {
+TEST_CASE("a chain of equations keeps neighbours beside one another" * doctest::test_suite("slow")) {
     // x[9] and x[17] would follow from nine angles each.
     const Scene chain = follower_scene(
         "lagrangian = \"sum(i = 1 .. n, (x[i]'^2 + y[i]'^2 + a[i]'^2/12)/2 - y[i])\"\n[parameters]\nn = { value = 20, "

@@ -56,7 +56,8 @@ const char* const kepler =
 
 TEST_CASE(
     "one step past the pole decides: the printed error follows the true one, and a run that does not resolve it "
-    "warns") {
+    "warns" *
+    doctest::test_suite("slow")) {
     struct Run {
         double w, step;
         std::vector<std::string> method;
@@ -84,7 +85,7 @@ TEST_CASE(
     CHECK(!said_of(polar(0), {"--points", "4"}).warns);
 }
 
-TEST_CASE("a close encounter by Gauss is in the printed error") {
+TEST_CASE("a close encounter by Gauss is in the printed error" * doctest::test_suite("slow")) {
     // True errors: 0.13 and 0.22.
     const Said long_step = said_of(kepler, {"--stages", "6"});
     CHECK(long_step.error > 0.02);

@@ -70,7 +70,8 @@ bool contains(const std::string& text, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("a ball bounces at the exact times, by every method, also where a step holds several impacts") {
+TEST_CASE("a ball bounces at the exact times, by every method, also where a step holds several impacts" *
+          doctest::test_suite("slow")) {
     // From the height 1 at rest under g = 2 it falls for a time of 1, and flies e^k times 2 after impact k.
     for (const char* how : {"points = 2", "points = 5", "family = \"gauss\"\nstages = 2",
                             "family = \"splitting\"\nstages = 6", "points = 4\narithmetic = \"clean\""})
@@ -93,7 +94,7 @@ TEST_CASE("a ball bounces at the exact times, by every method, also where a step
         }
 }
 
-TEST_CASE("the energy stays at rounding over 10^5 impacts in a billiard") {
+TEST_CASE("the energy stays at rounding over 10^5 impacts in a billiard" * doctest::test_suite("slow")) {
     const Ended ended =
         run("lagrangian = \"(x'^2 + y'^2)/2\"\n[parameters]\nr = 0.4\n[coordinates]\nx = { position = 0.7, velocity = "
             "0.6 }\n"
@@ -138,7 +139,7 @@ TEST_CASE("the energy of bodies that tumble on a floor stays at rounding over 10
     CHECK(brick.result.energy_error_largest < 5e-12);
 }
 
-TEST_CASE("steps with impacts have the order of the method") {
+TEST_CASE("steps with impacts have the order of the method" * doctest::test_suite("slow")) {
     // A pendulum that meets a wall leaning against its left side, in angles.
     const std::string pendulum =
         "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0.3 }\n[impacts]\n"

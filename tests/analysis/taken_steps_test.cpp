@@ -28,7 +28,7 @@ Scene with_method(Scene scene, const Method& method) {
 
 }  // namespace
 
-TEST_CASE("steps of every form leave rounding in their equations") {
+TEST_CASE("steps of every form leave rounding in their equations" * doctest::test_suite("slow")) {
     const Scene pendulum = test::pendulum_scene(4);
     const Scene rod = test::scene_of("(1 + q^2)*q'^2/2 + cos(q)", "q = { position = 1, velocity = 0.3 }", 4);
     const Scene linear = test::scene_of("x'^2/2 + y'^2/2 - x^2 - x*y - y^2",

@@ -100,7 +100,8 @@ TEST_CASE("a kernel builder allows what the scene and lobatto run do") {
     CHECK(constrained.clocks().empty());
 }
 
-TEST_CASE("errors with a clock are those at given times, and at the steps themselves, against Kepler's solution") {
+TEST_CASE("errors with a clock are those at given times, and at the steps themselves, against Kepler's solution" *
+          doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     const Scene scene = scene_of(kepler_text(0.9, "points = 5\nclock = \"(x^2 + y^2)^(3/4)\"", 2));
     ExperimentRequest wish;

@@ -229,7 +229,8 @@ TEST_CASE("a measurement store keeps measurements, and leaves out a torn line an
 }
 
 TEST_CASE(
-    "a reference is refined until it is sure, on eccentric orbits too, where long double does not do in quadruple") {
+    "a reference is refined until it is sure, on eccentric orbits too, where long double does not do in quadruple" *
+    doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     for (const auto& orbit : std::map<std::string, Precision>{{"0.9", Precision::extended},  // 5e-11
                                                               {"0.99", Precision::quadruple}}) {
@@ -301,7 +302,7 @@ TEST_CASE("what cannot be promised or measured is refused with the reason") {
     refused({"tune", endless, "--error", "1e-6"}, 2, "until");
 }
 
-TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic solution") {
+TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic solution" * doctest::test_suite("slow")) {
     const Place place;
     const std::string scene = place.folder / "pendulum.toml";
     test::write_text(scene, test::read_file(pendulum));
@@ -322,8 +323,8 @@ TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic so
     CHECK(error > 1e-10);  // not far more than was asked for
 }
 
-TEST_CASE(
-    "tradeoff writes a table, CSV, JSON, pictures and a page that needs no other file, and goes on where it was") {
+TEST_CASE("tradeoff writes a table, CSV, JSON, pictures and a page that needs no other file, and goes on where it was" *
+          doctest::test_suite("slow")) {
     const Place place;
     const std::string out = place.folder / "out";
     const std::vector<std::string> command = {"tradeoff", pendulum, "--until", "10", "--budget", "7s", "-o", out};

@@ -104,7 +104,7 @@ TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
         "Kinetic minus potential energy, with constant masses; the time itself occurs; beside L, forces act on theta.");
 }
 
-TEST_CASE("what was found shrinks the equations of a step, and --general undoes it") {
+TEST_CASE("what was found shrinks the equations of a step, and --general undoes it" * doctest::test_suite("slow")) {
     struct Row {
         const char* scene;
         int unknowns, without;

@@ -70,7 +70,7 @@ TEST_CASE("derive shows the closed form of the harmonic oscillator: the paper's 
     CHECK(contains(shown.out, "    z = h^2*omega^2\n"));
 }
 
-TEST_CASE("derive prints the same bytes in every process, in every notation") {
+TEST_CASE("derive prints the same bytes in every process, in every notation" * doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     // Products of sums, whose signs GiNaC orders by address.
     test::write_text(folder / "signs.toml",

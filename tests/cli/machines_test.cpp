@@ -33,7 +33,8 @@ nlohmann::json answer_of(const std::string& schema, std::vector<std::string> com
 
 }  // namespace
 
-TEST_CASE("run --json: numbers for everything that run prints, also of a run that fails or stops") {
+TEST_CASE("run --json: numbers for everything that run prints, also of a run that fails or stops" *
+          doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     const std::string output = folder / "run.csv";
     const auto pendulum = answer_of("run", {"run", scene("pendulum"), "-o", output});

@@ -165,7 +165,7 @@ TEST_CASE("check --watch prints again after every save, and errors do not end it
     CHECK(wait_for("unknown name 'k'"));
     test::write_text(scene, scene_of("q^4/4"));
     CHECK(wait_for("q^4/4"));
-    CHECK(shell("kill -INT $(cat '" + (folder / "pid").string() + "')").code == 0);
+    CHECK(shell("kill $(cat '" + (folder / "pid").string() + "')").code == 0);
 }
 
 TEST_CASE("bench --help needs no build, and names every option of the race") {

@@ -112,7 +112,8 @@ TEST_CASE("sixteen bits and base64 keep a channel to a 65535th of its range") {
     CHECK(data["runs"][0]["times"] == "AAAAAAAAgD8AAABA");
 }
 
-TEST_CASE("ten minutes of motion make a page of at most 3 MB, however many steps they have") {
+TEST_CASE("ten minutes of motion make a page of at most 3 MB, however many steps they have" *
+          doctest::test_suite("slow")) {
     const std::string page = page_of_scene(tree + "/scenes/pleiades.toml", {"--until", "3", "--step", "1e-4"});
     CHECK(page.size() < 3'000'000);
     CHECK(page_of_scene(tree + "/scenes/pendulum.toml", {"--until", "600", "--step", "0.005"}).size() < 3'000'000);

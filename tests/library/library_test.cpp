@@ -289,7 +289,7 @@ TEST_CASE("progress may end a run, and what was computed is there") {
     CHECK(run.count > 1);
 }
 
-TEST_CASE("tune returns settings with which a run keeps the error that was asked for") {
+TEST_CASE("tune returns settings with which a run keeps the error that was asked for" * doctest::test_suite("slow")) {
     const lob::Scene scene(scenes + "pendulum.toml");
     lob::Settings settings;
     settings.until = "20";

@@ -42,7 +42,8 @@ lob::Settings settings(const Change& change) {
 
 }  // namespace
 
-TEST_CASE("the command line and the library refuse the same with the same words and the same exit code") {
+TEST_CASE("the command line and the library refuse the same with the same words and the same exit code" *
+          doctest::test_suite("slow")) {
     const lob::Scene scene(pendulum);
     const lobatto::test::TemporaryFolder folder;
     const std::string csv = folder / "x.csv";
@@ -62,7 +63,7 @@ TEST_CASE("the command line and the library refuse the same with the same words 
         {[&] { lob::tune(scene, 0.5); }, {"tune", pendulum, "--error", "0.5"}},
         {[&] { lob::tune(scene, 1e-3, {}, 0.5); }, {"tune", pendulum, "--error", "1e-3", "--budget", "0.5s"}},
         {[&] { lob::tune(scene, 1e-3, {}, 1e5); }, {"tune", pendulum, "--error", "1e-3", "--budget", "100000s"}},
-        {[&] { lob::tune(scene, 1e-27, {}, 5); }, {"tune", pendulum, "--error", "1e-27", "--budget", "5s"}},
+        {[&] { lob::tune(scene, 1e-28, {}, 600); }, {"tune", pendulum, "--error", "1e-28", "--budget", "600s"}},
         {[&] {
              lob::RunOptions options;
              static_cast<lob::Settings&>(options) = missing_equals;

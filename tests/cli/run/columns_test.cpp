@@ -69,7 +69,7 @@ TEST_CASE("columns have all digits of the numbers") {
     CHECK(beyond > 1e-22);  // digits that a double does not hold
 }
 
-TEST_CASE("bodies have columns of their orientation and angular velocity") {
+TEST_CASE("bodies have columns of their orientation and angular velocity" * doctest::test_suite("slow")) {
     const std::string top =
         "lagrangian = \"-top.z\"\n[bodies]\ntop = { mass = 1, inertia = [1, 2, 3], position = [0, 0, 1], orientation = "
         "[2, 0, 0, 2], angular_velocity = [0.1, 0.2, 3] }\n[run]\nstep = 0.01\nuntil = 1\n";

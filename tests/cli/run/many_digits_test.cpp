@@ -66,7 +66,8 @@ double apart(const std::vector<std::string>& a, const std::vector<std::string>& 
 
 }  // namespace
 
-TEST_CASE("a run in 50 digits converges with the order of its method far beyond quadruple, and keeps its energy") {
+TEST_CASE("a run in 50 digits converges with the order of its method far beyond quadruple, and keeps its energy" *
+          doctest::test_suite("slow")) {
     if (!has_mpfr()) return;
     const Digits place;
     const auto end_with = [&](const std::string& step) {
@@ -89,7 +90,8 @@ TEST_CASE("a run in 50 digits converges with the order of its method far beyond 
     CHECK(std::strtod(tight.out.c_str() + tight.out.find_first_of("0123456789", defect), nullptr) < 1e-58);
 }
 
-TEST_CASE("a run in 50 digits is that in quadruple to all digits of that, and its file reads back") {
+TEST_CASE("a run in 50 digits is that in quadruple to all digits of that, and its file reads back" *
+          doctest::test_suite("slow")) {
     if (!has_mpfr()) return;
     const Digits place;
     const std::vector<std::string> words{oscillators, "--points", "12", "--until", "2", "--numbers"};
@@ -130,7 +132,7 @@ TEST_CASE("parameters, nodes and functions are exact to all digits that are aske
     CHECK(error < 1e-139);
 }
 
-TEST_CASE("a kernel in 30 digits knows all functions, in all forms") {
+TEST_CASE("a kernel in 30 digits knows all functions, in all forms" * doctest::test_suite("slow")) {
     if (!has_mpfr()) return;
     const Digits place;
     for (const std::string kinetic : {"", "*(1 + x^2/9)"}) {
@@ -149,7 +151,8 @@ TEST_CASE("a kernel in 30 digits knows all functions, in all forms") {
     }
 }
 
-TEST_CASE("mechanisms, impacts and splitting methods know many digits, where their coefficients do") {
+TEST_CASE("mechanisms, impacts and splitting methods know many digits, where their coefficients do" *
+          doctest::test_suite("slow")) {
     if (!has_mpfr()) return;
     const Digits place;
     test::write_text(place.folder / "rod.toml",

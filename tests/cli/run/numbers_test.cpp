@@ -57,7 +57,8 @@ double distance(const std::vector<std::string>& a, const std::vector<std::string
 
 }  // namespace
 
-TEST_CASE("runs in double-double and quadruple agree to 30 digits, and each file reads back to its numbers") {
+TEST_CASE("runs in double-double and quadruple agree to 30 digits, and each file reads back to its numbers" *
+          doctest::test_suite("slow")) {
     const Place place;
     const auto end_in = [&](const std::string& numbers) {
         const std::string file = place.file(numbers + ".csv");
@@ -194,7 +195,8 @@ TEST_CASE("sweeps in other numbers go on where they were stopped, and refuse wha
                    "out --keep, or give --numbers double"));
 }
 
-TEST_CASE("verify proves the steps of a scene in its own numbers beside those in double and quadruple") {
+TEST_CASE("verify proves the steps of a scene in its own numbers beside those in double and quadruple" *
+          doctest::test_suite("slow")) {
     const Place place;
     for (const std::string numbers : {"double-double", "long double", "float"}) {
         CAPTURE(numbers);

@@ -17,7 +17,8 @@ std::string scene_file(const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("a run has the same bytes again, from a new cache and from a copy of the scene elsewhere") {
+TEST_CASE("a run has the same bytes again, from a new cache and from a copy of the scene elsewhere" *
+          doctest::test_suite("slow")) {
     for (const std::string name : scenes) {
         CAPTURE(name);
         const TemporaryFolder folder;
@@ -37,7 +38,8 @@ TEST_CASE("a run has the same bytes again, from a new cache and from a copy of t
     }
 }
 
-TEST_CASE("columns beside the state and what sweeps keep have the same bytes in every process") {
+TEST_CASE("columns beside the state and what sweeps keep have the same bytes in every process" *
+          doctest::test_suite("slow")) {
     const TemporaryFolder folder;
     const auto same = [&](const std::vector<std::string>& command, const char* name) {
         std::string first;

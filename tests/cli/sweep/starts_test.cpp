@@ -154,7 +154,8 @@ TEST_CASE("random rows are the same for the same seed, for each setting, and oth
               .starts_with("'q' is varied twice"));
 }
 
-TEST_CASE("a study of convergence is one command: errors fall as the order says, with steps, points, stages") {
+TEST_CASE("a study of convergence is one command: errors fall as the order says, with steps, points, stages" *
+          doctest::test_suite("slow")) {
     const test::SweepFolder place;
     const auto errors = [&](const std::vector<std::string>& words) {
         const TrajectoryTable table = place.table(words);

@@ -220,7 +220,8 @@ TEST_CASE("the grid has all combinations, the last name fastest, both ends exact
           std::vector<double>{3, 1});
 }
 
-TEST_CASE("each trajectory of a sweep is that of a run, with momenta of its own parameters") {
+TEST_CASE("each trajectory of a sweep is that of a run, with momenta of its own parameters" *
+          doctest::test_suite("slow")) {
     const Place place;
     // m stands in the momentum of the velocity and in the initial position.
     const std::string scene = place.file("scene.toml");
@@ -251,7 +252,8 @@ TEST_CASE("each trajectory of a sweep is that of a run, with momenta of its own 
     }
 }
 
-TEST_CASE("a table is the same file for any number of threads, in CSV and in NumPy's format") {
+TEST_CASE("a table is the same file for any number of threads, in CSV and in NumPy's format" *
+          doctest::test_suite("slow")) {
     const Place place;
     const auto content = [&](const std::string& threads, const std::string& format, const std::string& every) {
         const test::Finished done = place.sweep({coupled, "--vary", "x=0:0.3:17", "--vary", "y=-0.1:0.1:31", "--until",
@@ -311,7 +313,7 @@ TEST_CASE("names of a scene are varied as it writes them, and columns never shar
                    "--vary:1:1: " + scene + " gives initial momenta, not velocities; vary p_x_2 instead\n"));
 }
 
-TEST_CASE("wrong values to vary are refused with exit code 2, and no table is made") {
+TEST_CASE("wrong values to vary are refused with exit code 2, and no table is made" * doctest::test_suite("slow")) {
     const Place place;
     const auto refusal = [&](Strings arguments) {
         arguments.insert(arguments.begin(), pendulum);
@@ -425,7 +427,8 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     CHECK(std::isnan(test::column_of(starts, "x")[2]));
 }
 
-TEST_CASE("trajectories that leave their Lagrangian are told from those that stay, also where no energy is asked for") {
+TEST_CASE("trajectories that leave their Lagrangian are told from those that stay, also where no energy is asked for" *
+          doctest::test_suite("slow")) {
     const Place place;
     const std::string scene = place.file("kepler.toml");
     for (const char* energy : {"true", "false"}) {
@@ -497,7 +500,8 @@ TEST_CASE("the step and the end are the same for all, and it is said when a vari
           "method: Lobatto, 2 points, h = 0.05");
 }
 
-TEST_CASE("an interrupted sweep keeps complete rows, says so and returns 130; a killed one leaves readable rows") {
+TEST_CASE("an interrupted sweep keeps complete rows, says so and returns 130; a killed one leaves readable rows" *
+          doctest::test_suite("slow")) {
     for (const bool binary : {false, true}) {
         for (const int signal : {SIGINT, SIGTERM, SIGKILL}) {
             const Place place;
@@ -540,7 +544,8 @@ TEST_CASE("an interrupted sweep keeps complete rows, says so and returns 130; a 
     }
 }
 
-TEST_CASE("a machine that refuses to write is an error of exit code 4; a reader that goes away ends a sweep") {
+TEST_CASE("a machine that refuses to write is an error of exit code 4; a reader that goes away ends a sweep" *
+          doctest::test_suite("slow")) {
     const Place place;
     const auto to = [&](const std::string& path, const Strings& more = {}) {
         Strings arguments{"sweep", pendulum, "--vary", "q=0:1:10", "--until", "1", "-o", path};
@@ -654,7 +659,8 @@ TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by st
     }
 }
 
-TEST_CASE("a trajectory whose formulas have no value, though they cancel, is no success") {
+TEST_CASE("a trajectory whose formulas have no value, though they cancel, is no success" *
+          doctest::test_suite("slow")) {
     const Place place;
     const auto status_of = [&](const std::string& position, const std::string& lagrangian, const std::string& vary) {
         const std::string scene = place.file("scene.toml");

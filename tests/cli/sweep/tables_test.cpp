@@ -61,7 +61,7 @@ TEST_CASE("a .npy has beside it what it is: columns, units, scene, method, versi
     CHECK(json["columns"][2]["type"] == "int64");
 }
 
-TEST_CASE("a run as .npy or .h5 has the numbers of its CSV") {
+TEST_CASE("a run as .npy or .h5 has the numbers of its CSV" * doctest::test_suite("slow")) {
     const test::SweepFolder place;
     const auto run = [&](const std::string& name, const std::vector<std::string>& more = {}) {
         std::vector<std::string> words{"run", pendulum_file, "--until", "2", "-o", place.file(name)};

@@ -105,7 +105,8 @@ std::string claims_of(const std::vector<Check>& checks) {
 
 }  // namespace
 
-TEST_CASE("the equations of any Lagrangian hold for every method: forces, time, velocities, cyclic coordinates") {
+TEST_CASE("the equations of any Lagrangian hold for every method: forces, time, velocities, cyclic coordinates" *
+          doctest::test_suite("slow")) {
     for (const std::string& method : methods) {
         INFO(method);
         const Derivation relativistic = derive(scene_with("lagrangian = \"-sqrt(1 - x'^2) - x^2/2\"",

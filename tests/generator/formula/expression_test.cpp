@@ -419,7 +419,7 @@ TEST_CASE("the time needs a declaration") {
     CHECK(parse_with_arrays("x[1]*cos(t)").is_equal(x[0] * cos(t)));
 }
 
-TEST_CASE("what sums write out is bounded") {
+TEST_CASE("what sums write out is bounded" * doctest::test_suite("slow")) {
     const std::string message = "the formulas of the scene, their sums written out, have more than 2000000 operations";
     CHECK(error_of("sum(i = 1 .. 10^9, q)").find(message + " (i = ") != std::string::npos);
     CHECK(error_of("sum(i = 1 .. 9999, sum(j = 1 .. 9999, 0))").find(message) != std::string::npos);

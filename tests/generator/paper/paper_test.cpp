@@ -230,7 +230,8 @@ TEST_CASE("the derived midpoint rule preserves the oscillator's energy") {
               doctest::Approx(omega * omega * 2.25).epsilon(1e-13));  // measured: 2e-15
 }
 
-TEST_CASE("the figures are drawn, and figure 2 reproduces the caption's growth rate 2.50e-11") {
+TEST_CASE("the figures are drawn, and figure 2 reproduces the caption's growth rate 2.50e-11" *
+          doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     const std::vector<Figure> figures = draw_figures(folder.string(), [](const std::string&, double) {});
     REQUIRE(figures.size() == 4);

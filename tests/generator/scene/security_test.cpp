@@ -46,7 +46,8 @@ Finished attack(const std::string& command, const Pieces& pieces, const std::vec
 
 }  // namespace
 
-TEST_CASE("titles, units and events that a shell, C++, gnuplot or LaTeX would take for commands stay text") {
+TEST_CASE("titles, units and events that a shell, C++, gnuplot or LaTeX would take for commands stay text" *
+          doctest::test_suite("slow")) {
     const std::vector<std::string> texts = {
         "\"`touch pwned` $(touch pwned) ; touch pwned | touch pwned\"",
         "'''Its '; touch pwned; system('touch pwned')'''",
@@ -118,7 +119,8 @@ TEST_CASE("options are text too: they reach no shell, and a file's name no compi
     CHECK_FALSE(std::filesystem::exists(folder / "pwned"));
 }
 
-TEST_CASE("the name of a chart is no command and no option of the program that draws it") {
+TEST_CASE("the name of a chart is no command and no option of the program that draws it" *
+          doctest::test_suite("slow")) {
     const TemporaryFolder folder;
     write_text(folder / "scene.toml", Pieces().text());
     for (const std::string name :

@@ -63,7 +63,7 @@ std::string complaints(const std::string& scene, const std::string& options) {
 
 }  // namespace
 
-TEST_CASE("emitted kernels of every form fulfil the contract") {
+TEST_CASE("emitted kernels of every form fulfil the contract" * doctest::test_suite("slow")) {
     const char* const lobatto_4 = "";
     const char* const gauss_3 = "--stages 3";
     const char* const splitting = "--splitting 11";

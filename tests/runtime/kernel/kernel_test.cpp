@@ -199,7 +199,7 @@ TEST_CASE("the hand-written kernel converges at order 6 on the pendulum") {
     CHECK(std::fabs(std::log2(error(2) / error(4)) - 6) < 0.1);
 }
 
-TEST_CASE("the energy of a long run stays within its first oscillation") {
+TEST_CASE("the energy of a long run stays within its first oscillation" * doctest::test_suite("slow")) {
     Pendulum stepper = pendulum(0.2, 2, 0);
     const double energy = energy_of(stepper);
     double early = 0, late = 0;

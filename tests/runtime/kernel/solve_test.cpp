@@ -126,7 +126,7 @@ TEST_CASE("banded systems with exchanges of rows are solved to rounding") {
         }
 }
 
-TEST_CASE("a matrix is dense or banded as its groups are, in the kernel's order") {
+TEST_CASE("a matrix is dense or banded as its groups are, in the kernel's order" * doctest::test_suite("slow")) {
     CHECK(group_is_dense<Grouped<Groups, 5, 2, 0>>(1));
     CHECK_FALSE(group_is_dense<Grouped<Chain, 40, 3, 0>>(0));
     CHECK(places<Grouped<Chain, 40, 3, 0>>.offset[1] == 120 * (3 * 8 + 1));

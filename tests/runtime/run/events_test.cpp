@@ -58,7 +58,8 @@ std::vector<double> times_of_cosine(double value, double until) {
 
 }  // namespace
 
-TEST_CASE("events have the order of the steps, on positions and on velocities, by every method") {
+TEST_CASE("events have the order of the steps, on positions and on velocities, by every method" *
+          doctest::test_suite("slow")) {
     struct Row {
         std::string method, option;
         int order;
@@ -124,7 +125,7 @@ TEST_CASE("a touch of zero is no event, also on the end of a step; a passage the
 
 // Before, rounding took g across zero and back: of 12 points with h = 2.5 it made 30 events, at times 7e-14 to 7e-8
 // apart.
-TEST_CASE("a touch of zero is no event where rounding takes the function across") {
+TEST_CASE("a touch of zero is no event where rounding takes the function across" * doctest::test_suite("slow")) {
     for (const char* method : {"points = 12", "family = \"gauss\"\nstages = 6"})
         for (const double step : {0.1, 0.3, 2.5}) {
             const auto times = times_of({"x'^2/2 - x^2/2", "position = 1, velocity = 0", method, step, 20},

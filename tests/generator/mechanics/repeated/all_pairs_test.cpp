@@ -79,7 +79,8 @@ TEST_CASE("rows that are not all pairs are not taken for them") {
     CHECK_FALSE(all_pairs(of_pairs));
 }
 
-TEST_CASE("steps and Jacobians of bodies in loops, or in tables, are those of the equations") {
+TEST_CASE("steps and Jacobians of bodies in loops, or in tables, are those of the equations" *
+          doctest::test_suite("slow")) {
     for (const char* constant : {"", ", constant = true"}) {
         const Derivation derivation = derive(bodies_scene(12, constant));
         const KernelSource source = emit(derivation);
@@ -133,7 +134,7 @@ TEST_CASE("parameters may have the names that loops give to what varies") {
     CHECK(trajectory_leaves<double>(derive(scene), kernel, start.parameters, start.q, start.p, 0.001) < 4);
 }
 
-TEST_CASE("the text of a kernel does not grow with the number of pairs") {
+TEST_CASE("the text of a kernel does not grow with the number of pairs" * doctest::test_suite("slow")) {
     const auto size = [](int bodies) { return static_cast<double>(emit(derive(bodies_scene(bodies))).header.size()); };
     const double of_11 = size(11), of_14 = size(14), of_17 = size(17);
     CHECK(of_17 - of_14 < 1.2 * (of_14 - of_11));

@@ -44,7 +44,7 @@ bool same_findings(const Derivation& a, const Derivation& b) {
 
 }  // namespace
 
-TEST_CASE("kernels and findings are the same whether terms are written out or not") {
+TEST_CASE("kernels and findings are the same whether terms are written out or not" * doctest::test_suite("slow")) {
     const std::string attraction = pairs("m[i]*m[j]/sqrt({})");
     for (const std::string& terms :
          {attraction, attraction + fmt::format(" - sum(i = 1 .. {}, k*x[i]^2)", bodies),      // a trap
@@ -62,7 +62,8 @@ TEST_CASE("kernels and findings are the same whether terms are written out or no
     }
 }
 
-TEST_CASE("terms are written out where their formula does not tell what all of them depend on") {
+TEST_CASE("terms are written out where their formula does not tell what all of them depend on" *
+          doctest::test_suite("slow")) {
     const std::string attraction = pairs("m[i]*m[j]/sqrt({})");
     for (const std::string& terms :
          {pairs("-k*(x[i] - x[j])^2"),                                         // constant second derivatives
@@ -87,7 +88,7 @@ TEST_CASE("terms are written out where their formula does not tell what all of t
     CHECK(emit(derive_kernel(general)).header == emit(derive(general)).header);
 }
 
-TEST_CASE("other methods of terms that are not written out are those of all terms") {
+TEST_CASE("other methods of terms that are not written out are those of all terms" * doctest::test_suite("slow")) {
     const Scene scene = scene_with(pairs("m[i]*m[j]/sqrt({})"));
     const Derivation shortened = derive_kernel(scene);
     REQUIRE_FALSE(shortened.system.unwritten.empty());

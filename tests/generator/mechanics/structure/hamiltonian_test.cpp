@@ -59,7 +59,7 @@ double apart(const Derivation& a, const Derivation& b, std::int64_t steps) {
 
 }  // namespace
 
-TEST_CASE("steps by velocities of momenta are those of the general path") {
+TEST_CASE("steps by velocities of momenta are those of the general path" * doctest::test_suite("slow")) {
     // A top on a joint, a free body with three moments, a rotor in its bearing; with a force of the time; Gauss's
     // nodes.
     const auto library = [](const std::string& name) {
@@ -77,7 +77,7 @@ TEST_CASE("steps by velocities of momenta are those of the general path") {
     }
 }
 
-TEST_CASE("velocities of momenta are refused where the masses of bodies change") {
+TEST_CASE("velocities of momenta are refused where the masses of bodies change" * doctest::test_suite("slow")) {
     const std::string varies = "in the angular velocities of bodies the masses are not constant",
                       ball = "elbow = { type = \"ball\", bodies = [\"a\", \"b\"], point = [0, 0, 2] }\n",
                       pulled = "lagrangian = \"-a.z - b.z\"\n" + two_bodies;
