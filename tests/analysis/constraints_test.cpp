@@ -64,7 +64,7 @@ Ended run(const Scene& scene) {
     REQUIRE(ended.result.status == LOBATTO_OK);
     return ended;
 }
-std::vector<double> end_of(const Scene& scene) {
+std::vector<double> end_state(const Scene& scene) {
     return run(scene).result.q;
 }
 
@@ -76,8 +76,8 @@ double apart(const std::vector<double>& a, const std::vector<double>& b) {
 
 // The order that the errors of steps h and h/2 show.
 double order_of(const std::string& system, int points, double step, double until, const std::vector<double>& exact) {
-    const double coarse = apart(end_of(scene_of(system + method(points, step, until))), exact),
-                 fine = apart(end_of(scene_of(system + method(points, step / 2, until))), exact);
+    const double coarse = apart(end_state(scene_of(system + method(points, step, until))), exact),
+                 fine = apart(end_state(scene_of(system + method(points, step / 2, until))), exact);
     CAPTURE(coarse);
     CAPTURE(fine);
     return std::log2(coarse / fine);
@@ -130,14 +130,14 @@ TEST_CASE("two points are RATTLE, written by hand") {
 }
 
 TEST_CASE("a double pendulum of rods moves like the one in angles, with order 2s - 2" * doctest::test_suite("slow")) {
-    const std::vector<double> angles = end_of(scene_of(two_angles + method(10, 0.02, 2)));
+    const std::vector<double> angles = end_state(scene_of(two_angles + method(10, 0.02, 2)));
     const double a = angles[0], b = angles[1];
     const std::vector<double> exact{std::sin(a), std::sin(a) + std::sin(b), -std::cos(a), -std::cos(a) - std::cos(b)};
     CHECK(order_of(two_rods, 2, 0.02, 2, exact) == doctest::Approx(2).epsilon(0.05));
     CHECK(order_of(two_rods, 3, 0.05, 2, exact) == doctest::Approx(4).epsilon(0.05));
     CHECK(order_of(two_rods, 4, 0.1, 2, exact) == doctest::Approx(6).epsilon(0.06));
     CHECK(order_of(two_rods, 5, 0.1, 2, exact) == doctest::Approx(8).epsilon(0.1));
-    CHECK(apart(end_of(scene_of(two_rods + method(8, 0.05, 2))), exact) < 1e-13);
+    CHECK(apart(end_state(scene_of(two_rods + method(8, 0.05, 2))), exact) < 1e-13);
 }
 
 TEST_CASE("constraints and their rates stay at rounding") {
@@ -209,14 +209,14 @@ TEST_CASE("no frequency is told of equations without the pull of the constraints
 TEST_CASE("fixed-point iteration with constraints finds the steps that Newton's finds") {
     // A velocity that the Lagrangian holds with the factor 0 of a parameter makes the form that Newton's iteration
     // solves.
-    const std::string run = method(6, 0.05, 2);
-    const Scene by_iteration = scene_of(two_rods + run);
+    const std::string how = method(6, 0.05, 2);
+    const Scene by_iteration = scene_of(two_rods + how);
     std::string text = two_rods;
     text.replace(text.find("- y[i])"), 7, "- y[i] + none*x[i]'*x[i]^2*y[i]'*y[i]*0.5)");
-    const Scene by_newton = scene_of(text + "[parameters]\nnone = 0\n" + run);
+    const Scene by_newton = scene_of(text + "[parameters]\nnone = 0\n" + how);
     REQUIRE(build_system(by_iteration).constant_mass);
     REQUIRE(!build_system(by_newton).constant_mass);
-    const Ended one = ::run(by_iteration), other = ::run(by_newton);
+    const Ended one = run(by_iteration), other = run(by_newton);
     CHECK(apart(one.result.q, other.result.q) < 1e-13);
     CHECK(apart(one.result.p, other.result.p) < 1e-13);
     CHECK(one.result.iterations > 3 * one.result.steps_done);  // evaluations, more than Newton's of the other
@@ -230,11 +230,11 @@ TEST_CASE("a constraint that moves: a pendulum whose pivot is shaken" * doctest:
     const std::string angle =
         "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - y\"\n[definitions]\nx = \"0.3*sin(3*t) + sin(a)\"\n"
         "y = \"-cos(a)\"\n[coordinates]\na = { position = 0, velocity = 0 }\n";
-    const double a = end_of(scene_of(angle + method(10, 0.02, 3)))[0];
+    const double a = end_state(scene_of(angle + method(10, 0.02, 3)))[0];
     const std::vector<double> exact{0.3 * std::sin(9.0) + std::sin(a), -std::cos(a)};
     CHECK(order_of(shaken, 3, 0.05, 3, exact) == doctest::Approx(4).epsilon(0.06));
     CHECK(order_of(shaken, 4, 0.1, 3, exact) == doctest::Approx(6).epsilon(0.08));
-    CHECK(apart(end_of(scene_of(shaken + method(8, 0.05, 3))), exact) < 1e-13);
+    CHECK(apart(end_state(scene_of(shaken + method(8, 0.05, 3))), exact) < 1e-13);
 }
 
 TEST_CASE("a dead point that is met exactly ends the run, and all that is kept is on the constraints" *
@@ -288,12 +288,12 @@ TEST_CASE("a charge on a sphere in a magnetic field, with friction: any Lagrangi
         "x = \"sin(a)*cos(b)\"\ny = \"sin(a)*sin(b)\"\nz = \"cos(a)\"\n[coordinates]\n"
         "a = { position = 1, velocity = 0 }\nb = { position = 0, velocity = 1 }\n[forces]\na = \"-0.2*a'\"\n"
         "b = \"-0.2*sin(a)^2*b'\"\n";
-    const std::vector<double> end = end_of(scene_of(angles + method(10, 0.02, 2)));
+    const std::vector<double> end = end_state(scene_of(angles + method(10, 0.02, 2)));
     const std::vector<double> exact{std::sin(end[0]) * std::cos(end[1]), std::sin(end[0]) * std::sin(end[1]),
                                     std::cos(end[0])};
     CHECK(order_of(sphere, 3, 0.1, 2, exact) == doctest::Approx(4).epsilon(0.08));
     CHECK(order_of(sphere, 4, 0.2, 2, exact) == doctest::Approx(6).epsilon(0.1));
-    CHECK(apart(end_of(scene_of(sphere + method(8, 0.05, 2))), exact) < 1e-12);
+    CHECK(apart(end_state(scene_of(sphere + method(8, 0.05, 2))), exact) < 1e-12);
 }
 
 namespace {
@@ -335,7 +335,7 @@ TEST_CASE("a free body in a quaternion turns as Euler's equations say") {
         for (std::size_t j = 0; j < s.size(); ++j) s[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
     }
     const std::vector<double> exact(s.begin(), s.begin() + 4);
-    CHECK(apart(end_of(scene_of(body + method(6, 0.05, 3))), exact) < 1e-12);
+    CHECK(apart(end_state(scene_of(body + method(6, 0.05, 3))), exact) < 1e-12);
     CHECK(order_of(body, 3, 0.1, 3, exact) == doctest::Approx(4).epsilon(0.06));
 }
 

@@ -73,7 +73,7 @@ std::vector<std::string> command(const Subject& subject, const std::filesystem::
 
 // What the program says of the run, without what it measured of the time, and of the error: the companion of a resumed
 // run rounds otherwise.
-std::string said(const std::string& out) {
+std::string report_of(const std::string& out) {
     const std::regex own("  (time per step|resumed|trajectory|measured error) .*\n|, in .*");
     return std::regex_replace(out.substr(out.find('\n')), own, "");
 }
@@ -113,7 +113,7 @@ struct Whole {
         length = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - start);
         REQUIRE_MESSAGE(done.exit_code == 0, done.err);
         bytes = read_file(file);
-        said = ::said(done.out);
+        said = report_of(done.out);
         if (std::filesystem::exists(folder / "whole.events.csv")) events = read_file(folder / "whole.events.csv");
     }
 };
@@ -157,7 +157,7 @@ void check_kills(int kills, unsigned seed) {
         }
         ++ends;
         CHECK(read_file(torn) == whole.bytes);
-        CHECK(said(read_file(log)) == whole.said);
+        CHECK(report_of(read_file(log)) == whole.said);
         if (!whole.events.empty()) CHECK(read_file(folder / "torn.events.csv") == whole.events);
         CHECK_FALSE(std::filesystem::exists(torn + ".checkpoint"));
         CHECK_FALSE(std::filesystem::exists(torn + ".partial"));
@@ -230,7 +230,7 @@ TEST_CASE("an interrupted run keeps its file under its name, and goes on from th
     const Finished whole = run({LOBATTO_PROGRAM, "run", stopped.scene, "-o", stopped.folder / "whole.csv"});
     CHECK(read_file(stopped.out) == read_file(stopped.folder / "whole.csv"));
     CHECK(read_file(stopped.folder / "run.events.csv") == read_file(stopped.folder / "whole.events.csv"));
-    CHECK(said(done.out) == said(whole.out));
+    CHECK(report_of(done.out) == report_of(whole.out));
 }
 
 TEST_CASE("with nothing left to resume a run starts again, and says so") {

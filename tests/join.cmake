@@ -1,0 +1,23 @@
+# Writes OUTPUT: the tests of FILES (separated by commas) as one translation unit. What they include stands before them,
+# and each file is in a namespace of its own, so that helpers of two files may share a name.
+string(REPLACE "," ";" FILES "${FILES}")
+set(includes "")
+set(bodies "")
+set(number 0)
+foreach(file ${FILES})
+    file(READ ${file} text)
+    # The head: comments, includes and empty lines. Further down includes are text of kernels.
+    string(REGEX MATCH "^(//[^\n]*\n|#include [^\n]*\n|\n)*" head "${text}")
+    string(LENGTH "${head}" length)
+    string(SUBSTRING "${text}" ${length} -1 body)
+    string(REGEX MATCHALL "#include [^\n]*" found "${head}")
+    list(APPEND includes ${found})
+    string(REGEX MATCHALL "\n" lines "${head}")
+    list(LENGTH lines before)
+    math(EXPR line "${before} + 1")
+    math(EXPR number "${number} + 1")
+    string(APPEND bodies "namespace file_${number} {\n#line ${line} \"${file}\"\n${body}}\n")
+endforeach()
+list(REMOVE_DUPLICATES includes)
+list(JOIN includes "\n" includes)
+file(WRITE ${OUTPUT} "${includes}\n${bodies}")
