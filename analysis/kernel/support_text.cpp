@@ -54,6 +54,7 @@ std::vector<std::string> with_ensemble(std::vector<std::string> names) {
     names.push_back("steppers/ensemble.hpp");
     if (needed.contains("steppers/separable.hpp") || needed.contains("steppers/splitting.hpp"))
         names.push_back("iteration/ensemble_fixed_point.hpp");
+    if (needed.contains("steppers/clocked.hpp")) names.push_back("steppers/clocked_lanes.hpp");
     return names;
 }
 

@@ -66,13 +66,11 @@ struct ExportEnsemble : NoEnsemble {
     static void energy(const void* ensemble, void* value) { static_cast<const Side*>(ensemble)->energy(out(value)); }
 };
 
-#ifdef LOBATTO_REFILLED
-template <class K, int width>
-struct ExportRefilled : NoEnsemble {
+// The functions of lanes that are refilled.
+template <class K, class Side>
+struct ExportLanes : NoEnsemble {
     using real = typename K::real;
-    using Side = RefilledEnsemble<K, width>;
-    static constexpr std::int32_t lanes = width, bytes = sizeof(Side), alignment = alignof(Side);
-    static constexpr std::int32_t events_of_step = Side::Looks::most;
+    static constexpr std::int32_t lanes = Side::lanes, bytes = sizeof(Side), alignment = alignof(Side);
 
     static void refilled_prepare(void* ensemble, const void* step) {
         (new (ensemble) Side)->prepare(*static_cast<const real*>(step));
@@ -83,6 +81,27 @@ struct ExportRefilled : NoEnsemble {
             lane, static_cast<const real*>(parameters), *static_cast<const real*>(time), static_cast<const real*>(q),
             static_cast<const real*>(p)));
     }
+};
+
+template <class K, int width>
+struct ExportClocked : ExportLanes<K, ClockedEnsemble<K, width>> {
+    static void refilled_advance(void* ensemble, lobatto_refilled_advance* call) {
+        ExportEnsemble<K, width>::with(call->status, [&](Status* status) {
+            static_cast<ClockedEnsemble<K, width>*>(ensemble)->advance(*call, status);
+        });
+    }
+};
+
+template <class K, int width>
+using ExportSide = std::conditional_t<is_clocked<K>(), ExportClocked<K, width>, ExportEnsemble<K, width>>;
+
+#ifdef LOBATTO_REFILLED
+template <class K, int width>
+struct ExportRefilled : ExportLanes<K, RefilledEnsemble<K, width>> {
+    using real = typename K::real;
+    using Side = RefilledEnsemble<K, width>;
+    static constexpr std::int32_t events_of_step = Side::Looks::most;
+
     static void refilled_advance(void* ensemble, lobatto_refilled_advance* call) {
         ExportEnsemble<K, width>::with(call->status, [&](Status* status) {
             static_cast<Side*>(ensemble)->advance(call->steps, static_cast<real>(call->tolerance),
@@ -558,10 +577,10 @@ struct Export {
 template <class K, int lanes = (impacts_of<K>() + switches_of<K>() > 0) ? 0 : refilled_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportRefilled<K, lanes>>, Export<K>>;
 #elif defined(LOBATTO_ENSEMBLES)
-template <class K, int lanes = (stops_of<K>() + impacts_of<K>() + switches_of<K>() > 0)
-                                   ? 0
-                                   : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
-using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportEnsemble<K, lanes>>, Export<K>>;
+template <class K, int lanes = (stops_of<K>() + impacts_of<K>() + switches_of<K>() > 0) ? 0
+                               : is_clocked<K>()                                        ? clocked_lanes<K>()
+                                                 : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportSide<K, lanes>>, Export<K>>;
 #else
 template <class K>
 using Exported = Export<K>;

@@ -37,6 +37,7 @@
 #include "iteration/velocity_of_momentum.hpp"
 #include "steppers/clean.hpp"
 #include "steppers/clocked.hpp"
+#include "steppers/clocked_lanes.hpp"
 #include "steppers/ensemble.hpp"
 #include "steppers/events.hpp"
 #include "steppers/general.hpp"
@@ -46,6 +47,7 @@
 #include "steppers/linear.hpp"
 #include "steppers/refilled.hpp"
 #include "steppers/separable.hpp"
+#include "steppers/shortened.hpp"
 #include "steppers/splitting.hpp"
 
 #endif

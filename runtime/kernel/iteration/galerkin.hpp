@@ -74,7 +74,7 @@ struct GalerkinFixedPoint {
     V weight[parts], legendre[parts];                  // h b and pi; zero in lanes to spare
     V on_legendre[parts];                              // b pi / sum b pi^2; likewise
     V ahead[r][parts], node_time[parts];
-    real h{};
+    T h{};
     real tolerance{};             // of increments, relative; 0: to rounding
     T v[n * r];                   // velocities at the nodes of the last step
     T kappa[n];                   // of the last step
@@ -86,7 +86,8 @@ struct GalerkinFixedPoint {
     Mass mass;
     Workspace<Arrays> workspace;
 
-    void prepare(real step) {
+    // Steps may be of a length of their own in each lane.
+    void prepare(const T& step) {
         h = step;
         real square = real(0);
         for (int i = 0; i < r; ++i) square += K::b[i] * K::legendre_polynomial[i] * K::legendre_polynomial[i];
@@ -94,14 +95,15 @@ struct GalerkinFixedPoint {
             const bool is_node = i < r;
             const int node = is_node ? i : r - 1;
             for (int j = 0; j < r; ++j) {
-                put(position_map[j], i, h * K::integration[node * r + j]);
-                put(momentum_map[j], i, h * momentum_integration<K>.entry[node][j]);
-                put(ahead[j], i, K::ahead[node * r + j]);
+                put(position_map[j], i, h * T(K::integration[node * r + j]));
+                put(momentum_map[j], i, h * T(momentum_integration<K>.entry[node][j]));
+                put(ahead[j], i, T(K::ahead[node * r + j]));
             }
-            put(node_time, i, h * K::c[node]);
-            put(weight, i, is_node ? h * K::b[node] : real(0));
-            put(legendre, i, K::legendre_polynomial[node]);
-            put(on_legendre, i, is_node && has_kappa() ? K::b[node] * K::legendre_polynomial[node] / square : real(0));
+            put(node_time, i, h * T(K::c[node]));
+            put(weight, i, is_node ? h * T(K::b[node]) : T(real(0)));
+            put(legendre, i, T(K::legendre_polynomial[node]));
+            put(on_legendre, i,
+                T(is_node && has_kappa() ? K::b[node] * K::legendre_polynomial[node] / square : real(0)));
         }
     }
 
@@ -109,7 +111,8 @@ struct GalerkinFixedPoint {
     struct Shared {
         V position_map[r][parts], momentum_map[r][parts], ahead[r][parts], weight[parts], legendre[parts],
             on_legendre[parts], node_time[parts];
-        real h, tolerance;
+        T h;
+        real tolerance;
     };
     Shared shared() const {
         Shared all{};
@@ -139,7 +142,7 @@ struct GalerkinFixedPoint {
     T displacement(int c, int j) const {
         T sum = T(real(0));
         for (int i = 0; i < r; ++i) sum = fused(T(K::reach[j * r + i]), v[c * r + i], sum);
-        return T(h) * sum;
+        return h * sum;
     }
     // The memory of a step taken otherwise.
     template <class Velocity>
@@ -151,11 +154,11 @@ struct GalerkinFixedPoint {
 
 private:
     friend HamiltonIteration<GalerkinFixedPoint>;
-    static void put(V* values, int i, real x) {
+    static void put(V* values, int i, const T& x) {
         if constexpr (in_lanes)
             set_lane(values[i / width], i % width, x);
         else
-            values[i] = V(x);
+            values[i] = x;
     }
     template <class To, class From>
     LOBATTO_INLINE static void exchange(To& to, const From& from) {
@@ -228,9 +231,9 @@ private:
                 speed = largest(fastest);
             else
                 speed = fastest;
-            const T scale = fabs(T(h)) * speed + T(floor) * fabs(q[c]);
+            const T scale = fabs(h) * speed + T(floor) * fabs(q[c]);
             const T rounding = T(Limits<real>::epsilon / least) * fabs(q[c]) + T(Limits<real>::smallest);
-            a.inverse_scale[c] = fabs(T(h)) / maximum(scale, rounding);
+            a.inverse_scale[c] = fabs(h) / maximum(scale, rounding);
             kappa_now[c] = kappa[c];
         }
         if constexpr (K::angles > 0) prepare_angles(k, time, q, a);
@@ -487,6 +490,10 @@ struct LaneStepper<K, T, Form::general, stepping> {
     void follow(const ScalarFallback<K>& single, int lane) {
         follow_state(single, lane);
         fixed_point.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
+        if constexpr (K::clocked) {
+            set_lane(fixed_point.elapsed, lane, single.elapsed);
+            for (int i = 0; i < K::nodes; ++i) set_lane(fixed_point.rates[i], lane, single.rates[i]);
+        }
     }
 
 private:

@@ -11,30 +11,15 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "general.hpp"
+#include "shortened.hpp"
 
 namespace lobatto {
-
-// A time as the sum of two numbers, so that a million short steps add up.
-template <class real>
-struct LongTime {
-    real time{}, rest{};
-
-    void add(real part) {
-        const real wanted = part + rest, sum = time + wanted;
-        const real added = sum - time;
-        rest = (time - (sum - added)) + (wanted - added);
-        time = sum;
-    }
-    // What is missing to `target`.
-    real until(real target) const { return (target - time) - rest; }
-};
 
 template <class K>
 struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, Stepping::solved> {
     using Chain = Stepper<K, Form::general, Stepping::solved>;
-    using Chain::n, Chain::q, Chain::p, Chain::coefficients, Chain::step_size, Chain::elapsed, Chain::rates;
+    using Chain::n, Chain::q, Chain::p, Chain::q_before, Chain::coefficients, Chain::step_size, Chain::elapsed;
     using typename Chain::real;
-    static constexpr int trial_limit = 60, r = K::nodes;
 
     typename K::Parameters values{};                      // the last one is the energy at the start
     LongTime<real> now{}, before{};                       // of the chain: its state, and that a step ago
@@ -138,6 +123,10 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         Chain::slopes(time, position, w, Lv, Lq);
         slow_down(position, Lq);
     }
+    // What ShortenedStep asks of the last step.
+    real rate_at(int i) const { return Chain::rates[i]; }
+    const auto& node_mass() const { return Chain::fixed_point.iteration.mass; }
+
     // Of a step of the chain at the energy of (q, p).
     Status tangent(real time, const real* position, const real* momentum, real* q1, real* p1, real* T) const {
         Stepper local = *this;
@@ -165,141 +154,30 @@ private:
         }
     }
 
-    // Lagrange's polynomials on the nodes, at x; share: one over what each is at its own node.
-    static void polynomials_at(real x, const real* share, real* value) {
-        real below = real(1), above = real(1);
-        for (int j = 0; j < r; ++j) {
-            value[j] = below * share[j];
-            below *= x - K::c[j];
-        }
-        for (int j = r - 1; j >= 0; --j) {
-            value[j] *= above;
-            above *= x - K::c[j];
-        }
-    }
-    // theta at which the polynomial of the last step's rates says that `wanted` has passed: its integral is theta times
-    // the polynomial of the mean rates until each node. Newton's iteration, as far as it stays within the step.
-    real theta_of(real wanted, real theta, const real* share) const {
-        real mean[r], value[r];
-        for (int i = 0; i < r; ++i) {
-            mean[i] = K::c[i] > real(0) ? real(0) : rates[i];
-            if (K::c[i] > real(0)) {
-                for (int j = 0; j < r; ++j) mean[i] += K::integration[i * r + j] * rates[j];
-                mean[i] /= K::c[i];
-            }
-        }
-        for (int trial = 0; trial < 8; ++trial) {
-            polynomials_at(theta, share, value);
-            real until_now = real(0), rate = real(0);
-            for (int j = 0; j < r; ++j) {
-                until_now += mean[j] * value[j];
-                rate += rates[j] * value[j];
-            }
-            const real next = theta + (wanted / step_size - theta * until_now) / rate;
-            if (!(next > real(0) && next < real(1))) break;
-            const bool is_near = fabs(next - theta) <= Limits<real>::root_epsilon;
-            theta = next;
-            if (is_near) break;
-        }
-        return theta;
-    }
-
-    // Ends of the last step's start, shortened: by iterations that begin with the velocities of the polynomial of that
-    // step, or of the end before; by a stepper of their own where these fail.
-    struct Ends {
-        const Stepper& step;
-        std::conditional_t<Chain::iterates_on_velocities, GalerkinFixedPoint<K, real>, Unit> iteration;
-        real share[r], q[n], p[n], elapsed;
-        bool is_first = true;
-
-        explicit Ends(const Stepper& whole) : step(whole) {
-            for (int j = 0; j < r; ++j) {
-                share[j] = real(1);
-                for (int l = 0; l < r; ++l)
-                    if (l != j) share[j] *= K::c[j] - K::c[l];
-                share[j] = real(1) / share[j];
-            }
-            begin(iteration);
-        }
-        Status take(real theta) {
-            if (iterate(iteration, theta)) return Status::ok;
+    Status shorten_to(real target) {
+        ShortenedStep<K, real, Chain::iterates_on_velocities> end;
+        Status status = Status::not_converged;
+        const auto alone = [&](real theta) {
             Chain part;
-            Status status = part.prepare(step.values, theta * step.step_size);
-            part.tolerance = step.tolerance;
-            if (status == Status::ok) status = part.start(real(0), step.q_before, step.p_before);
+            status = part.prepare(values, theta * step_size);
+            part.tolerance = this->tolerance;
+            if (status == Status::ok) status = part.start(real(0), q_before, p_before);
             if (status == Status::ok) status = part.step();
             for (int k = 0; k < n; ++k) {
-                q[k] = part.q[k];
-                p[k] = part.p[k];
+                end.q[k] = part.q[k];
+                end.p[k] = part.p[k];
             }
-            elapsed = part.elapsed;
-            return status;
+            end.elapsed = part.elapsed;
+            return status == Status::ok;
+        };
+        if (!end.find(*this, before.until(target), before.until(now.time) + now.rest, true, alone))
+            return status == Status::ok ? Status::not_converged : status;
+        arrival_time = target;
+        for (int k = 0; k < n; ++k) {
+            arrival_q[k] = end.found_q[k];
+            arrival_p[k] = end.found_p[k];
         }
-
-    private:
-        template <class Iteration>
-        void begin(Iteration& any) {
-            if constexpr (Chain::iterates_on_velocities) {
-                any.mass = step.fixed_point.iteration.mass;
-                for (int c = 0; c < n; ++c) any.kappa[c] = real(0);
-                any.tolerance = step.tolerance;
-            }
-        }
-        template <class Iteration>
-        bool iterate(Iteration& any, real theta) {
-            if constexpr (Chain::iterates_on_velocities) {
-                for (int k = 0; k < n; ++k) {
-                    q[k] = step.q_before[k];
-                    p[k] = step.p_before[k];
-                }
-                any.prepare(theta * step.step_size);
-                if (is_first) {
-                    real value[r][r];
-                    for (int i = 0; i < r; ++i) polynomials_at(theta * K::c[i], share, value[i]);
-                    any.recall([&](int c, int i) {
-                        real sum = real(0);
-                        for (int j = 0; j < r; ++j) sum += value[i][j] * step.node_velocity(c, j);
-                        return sum;
-                    });
-                }
-                any.is_guess = true;
-                is_first = false;
-                if (any.step(step.coefficients, real(0), +q, +p, true)) {
-                    elapsed = any.elapsed;
-                    return true;
-                }
-                is_first = true;
-            }
-            (void)any, (void)theta;
-            return false;
-        }
-    };
-
-    // theta with t(theta h) = target, t monotone: Newton's iteration with dt/dtau = g, kept between two bounds.
-    Status shorten_to(real target) {
-        Ends end(*this);
-        const real wanted = before.until(target), whole = before.until(now.time) + now.rest;
-        real low = real(0), high = real(1), change = real(1), theta = theta_of(wanted, wanted / whole, end.share);
-        for (int trial = 0; trial < trial_limit; ++trial) {
-            if (!(theta > low && theta < high)) theta = low + real(0.5) * (high - low);
-            const Status status = end.take(theta);
-            if (status != Status::ok) return status;
-            const real missing = wanted - end.elapsed;
-            (is_ahead(missing) ? low : high) = theta;
-            // The change before was so small that its square is rounding.
-            const bool is_there = fabs(change) <= Limits<real>::root_epsilon;
-            change = missing / (step_size * clock_at(end.q));
-            if (is_there || fabs(change) <= real(2) * Limits<real>::epsilon || high - low <= Limits<real>::epsilon) {
-                arrival_time = target;
-                for (int k = 0; k < n; ++k) {
-                    arrival_q[k] = end.q[k];
-                    arrival_p[k] = end.p[k];
-                }
-                return Status::ok;
-            }
-            theta += change;
-        }
-        return Status::not_converged;
+        return Status::ok;
     }
 };
 

@@ -51,6 +51,16 @@ constexpr int refilled_lanes(int trajectories) {
     return ensemble_lanes<K>(trajectories);
 }
 
+// And of those with a clock (steppers/clocked_lanes.hpp): where steps are iterations over velocities.
+template <class K>
+constexpr int clocked_lanes() {
+    constexpr int native = native_lanes<typename K::real>;
+    const bool iterates = K::any_number && K::autonomous && !K::linear && constraints_of<K>() == 0;
+    return native > 1 && iterates && K::coordinates <= most_full ? native : 0;
+}
+template <class K, int width>
+struct ClockedEnsemble;
+
 template <class K, int width>
 struct Ensemble {
     using real = typename K::real;
@@ -163,6 +173,15 @@ protected:
         const Status status = single.prepare(parameters[lane], step_size);
         return status == Status::ok ? single.start(time, q, p) : status;
     }
+    // The same in the midst of a motion: one with a clock has the energy of its start among its parameters.
+    Status go_on_alone(int lane, real time, const real* q, const real* p) {
+        if constexpr (is_clocked<K>()) {
+            const Status status = single.prepare(parameters[lane], step_size);
+            return status == Status::ok ? single.start(time, q, p, single.energy_of_start()) : status;
+        } else {
+            return begin_alone(lane, time, q, p);
+        }
+    }
 
     // What becomes of the lanes that a step has not moved.
     template <class Time, class Leave>
@@ -188,13 +207,13 @@ protected:
     void start_anew(int lane, real time) {
         real q[n], p[n];
         state_of(lane, q, p);
-        if (begin_alone(lane, time, q, p) == Status::ok) motion.start(single, p, lane);
+        if (go_on_alone(lane, time, q, p) == Status::ok) motion.start(single, p, lane);
     }
 
     Status step_alone(int lane, real time) {
         real q[n], p[n];
         state_of(lane, q, p);
-        Status status = begin_alone(lane, time, q, p);
+        Status status = go_on_alone(lane, time, q, p);
         if (status == Status::ok) status = single.step();
         if (status == Status::ok) motion.follow(single, lane);
         return status;

@@ -39,6 +39,8 @@ RefilledLanes::RefilledLanes(const Kernel& kernel, const EnsembleRequest& reques
     steps_done_.resize(width);
     iterations_.resize(width);
     events_written_.resize(width);
+    records_written_.resize(width);
+    chain_steps_.resize(width);
     kernel->refilled_prepare(memory_.get(), &request.step);
 }
 
@@ -108,11 +110,14 @@ bool RefilledLanes::fill(std::size_t lane, std::int64_t number, Ended& ended) {
 void RefilledLanes::advance(std::vector<Ended>& group) {
     const double begin = processor_seconds();
     lobatto_refilled_advance call{};
-    call.steps = std::min(capacity_, chunk_.steps());
+    call.steps = kernel_->clocked != 0 ? request_.steps : std::min(capacity_, chunk_.steps());
     for (const Lane& lane : lanes_)
-        if (lane.trajectory >= 0)
+        if (lane.trajectory >= 0 && kernel_->clocked == 0)
             call.steps =
                 std::min(call.steps, request_.steps - group[static_cast<std::size_t>(lane.trajectory)].steps_done);
+    call.record_every = request_.every;
+    call.interval = request_.arrivals.interval;
+    call.end = request_.arrivals.end;
     call.tolerance = request_.tolerance;
     call.records = records_.data();
     call.capacity = capacity_;
@@ -124,12 +129,14 @@ void RefilledLanes::advance(std::vector<Ended>& group) {
     call.steps_done = steps_done_.data();
     call.iterations = iterations_.data();
     call.events_written = events_written_.data();
+    call.records_written = records_written_.data();
+    call.chain_steps = chain_steps_.data();
     kernel_->refilled_advance(memory_.get(), &call);
     std::int64_t most = 0;
     for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
         if (lanes_[lane].trajectory < 0) continue;
         Ended& ended = group[static_cast<std::size_t>(lanes_[lane].trajectory)];
-        look(lane, ended);
+        kernel_->clocked != 0 ? look_at_arrivals(lane, ended) : look(lane, ended);
         most = std::max(most, steps_done_[lane]);
         shared_.steps_gone += steps_done_[lane];
         if (ended.goes_on() && ended.steps_done < request_.steps) continue;
@@ -166,6 +173,21 @@ void RefilledLanes::look(std::size_t number, Ended& ended) {
         stop(lane, events + (events_written_[number] - 1) * (1 + columns_), ended);
     else if (ended.status != LOBATTO_OK && ended.steps_done > ended.row_step)
         keep(lane, ended, lane.last.data());
+}
+
+// The same of a lane with a clock: rows are those that are kept.
+void RefilledLanes::look_at_arrivals(std::size_t number, Ended& ended) {
+    Lane& lane = lanes_[number];
+    const std::int64_t done = ended.steps_done + steps_done_[number], steps = request_.steps;
+    const double* const rows = records_.data() + static_cast<std::int64_t>(number) * capacity_ * columns_;
+    ended.iterations += iterations_[number];
+    ended.status = static_cast<lobatto_status>(status_[number]);
+    for (std::int64_t i = 0; i < records_written_[number]; ++i) {
+        const std::int64_t next = request_.every == 0 ? steps : (ended.row_step / request_.every + 1) * request_.every;
+        ended.steps_done = std::min({next, steps, done});  // the last, of a motion that has failed, is where it is
+        keep(lane, ended, rows + i * columns_);
+    }
+    ended.steps_done = done;
 }
 
 // `row`: event number, t, q, p.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Trajectories of an ensemble in lanes that are refilled: each ends at a time of its own, at a stop or where it fails,
-// and every state of it may be looked at.
+// and every state of it may be looked at; or has a clock, and as many steps as it takes.
 #pragma once
 
 #include <memory>
@@ -35,6 +35,7 @@ private:
     bool fill(std::size_t lane, std::int64_t number, Ended& ended);
     void advance(std::vector<Ended>& group);
     void look(std::size_t lane, Ended& ended);
+    void look_at_arrivals(std::size_t lane, Ended& ended);
     void stop(Lane& lane, const double* row, Ended& ended) const;
     void keep(const Lane& lane, Ended& ended, const double* row, bool is_possible = true) const;
     double energy(const Lane& lane, const double* row) const;
@@ -49,7 +50,7 @@ private:
     EnsembleStart start_;
     std::vector<double> records_, events_;
     std::vector<std::int32_t> status_;
-    std::vector<std::int64_t> steps_done_, iterations_, events_written_;
+    std::vector<std::int64_t> steps_done_, iterations_, events_written_, records_written_, chain_steps_;
     Chunk chunk_;
 };
 
