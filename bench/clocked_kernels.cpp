@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 
 #include "analysis/gradients.hpp"
@@ -37,6 +38,61 @@ Effort run_chain(LoadedStepper<double>& stepper, double until, double tolerance,
     return {true, static_cast<long>(steps), static_cast<long>(evaluations)};
 }
 
+// The same of trajectories side by side: a lane takes the next one when one has ended.
+Effort run_chains(const lobatto_kernel& kernel, double h, double until, double tolerance, std::int64_t most_steps,
+                  std::vector<Trajectory>& trajectories) {
+    const auto lanes = static_cast<std::size_t>(kernel.lanes), n = static_cast<std::size_t>(kernel.coordinates);
+    const auto alignment = static_cast<std::size_t>(kernel.ensemble_alignment);
+    const std::size_t bytes = (static_cast<std::size_t>(kernel.ensemble_bytes) + alignment - 1) / alignment * alignment;
+    const std::unique_ptr<void, void (*)(void*)> ensemble(std::aligned_alloc(alignment, bytes), std::free);
+    kernel.refilled_prepare(ensemble.get(), &h);
+    std::vector<double> rows(lanes * (1 + 2 * n));
+    std::vector<std::int32_t> status(lanes, LOBATTO_UNSUPPORTED);
+    std::vector<std::int64_t> done(lanes), iterations(lanes), written(lanes), steps(lanes), steps_of(lanes);
+    std::vector<Trajectory*> in_lane(lanes, nullptr);
+    lobatto_refilled_advance call{};
+    call.steps = call.capacity = 1;
+    call.tolerance = tolerance;
+    call.interval = call.end = until;
+    call.records = rows.data();
+    call.status = status.data();
+    call.steps_done = done.data();
+    call.iterations = iterations.data();
+    call.records_written = written.data();
+    call.chain_steps = steps.data();
+    Effort all{true, 0, 0};
+    std::size_t next = 0, ended = 0;
+    while (ended < trajectories.size()) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            if (in_lane[lane] != nullptr || next == trajectories.size()) continue;
+            Trajectory& start = trajectories[next++];
+            const double time = 0;
+            status[lane] = kernel.refilled_fill(ensemble.get(), static_cast<std::int32_t>(lane), nullptr, &time,
+                                                start.q.data(), start.p.data());
+            if (status[lane] != LOBATTO_OK) return {};
+            in_lane[lane] = &start;
+            steps_of[lane] = 0;
+        }
+        kernel.refilled_advance(ensemble.get(), &call);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            if (in_lane[lane] == nullptr) continue;
+            steps_of[lane] += steps[lane];
+            if (status[lane] != LOBATTO_OK || steps_of[lane] > most_steps) return {};
+            all.steps += static_cast<long>(steps[lane]);
+            all.evaluations += static_cast<long>(
+                gradients_of(kernel, static_cast<double>(iterations[lane]), static_cast<double>(steps[lane])));
+            if (done[lane] == 0) continue;
+            const double* const row = rows.data() + lane * (1 + 2 * n) + 1;
+            in_lane[lane]->q.assign(row, row + n);
+            in_lane[lane]->p.assign(row + n, row + 2 * n);
+            in_lane[lane] = nullptr;
+            status[lane] = LOBATTO_UNSUPPORTED;
+            ++ended;
+        }
+    }
+    return all;
+}
+
 // How long T lasts in the time of the clock: with steps a quarter as long each until that no longer changes.
 double span_of(const Problem& problem, const Kernel& kernel) {
     constexpr double settled = 1e-3, most = 30;  // times the fewest steps
@@ -59,16 +115,18 @@ double span_of(const Problem& problem, const Kernel& kernel) {
 }
 
 Contestant contestant_of(const Problem& problem, const std::string& clock, Method method, double tolerance,
-                         const Kernel& kernel, double span) {
+                         const Kernel& kernel, double span, std::int64_t together) {
     const auto stepper = std::make_shared<LoadedStepper<double>>(kernel);
     const auto run = [stepper, tolerance, span, until = problem.until, masses = masses_of(problem)](
                          double setting, std::vector<Trajectory>& trajectories) -> Effort {
         change_momenta(masses, trajectories, std::multiplies<>());
+        const lobatto_kernel& table = stepper->kernel().table();
         if (stepper->prepare({}, span / setting) != LOBATTO_OK) return {};
         const auto most = static_cast<std::int64_t>(4 * setting);  // other trajectories of an ensemble take others
-        const Effort effort = one_by_one(trajectories, [&](Trajectory& trajectory) {
-            return run_chain(*stepper, until, tolerance, most, trajectory);
-        });
+        const Effort effort = table.lanes > 0 ? run_chains(table, span / setting, until, tolerance, most, trajectories)
+                                              : one_by_one(trajectories, [&](Trajectory& trajectory) {
+                                                    return run_chain(*stepper, until, tolerance, most, trajectory);
+                                                });
         change_momenta(masses, trajectories, std::divides<>());
         return effort;
     };
@@ -76,7 +134,9 @@ Contestant contestant_of(const Problem& problem, const std::string& clock, Metho
         fmt::format("{}, clock {}{}", method.name(), clock, tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
     Contestant contestant{name, method.order(), true, true, Ladder::steps, run};
     contestant.fewest_steps = problem.fewest_chain_steps;
-    contestant.cold_start = [&problem, method, clock] { return cold_start_seconds(problem, method, 0, clock); };
+    contestant.cold_start = [&problem, method, together, clock] {
+        return cold_start_seconds(problem, method, together, clock);
+    };
     return contestant;
 }
 
@@ -90,16 +150,16 @@ std::vector<Method> methods_with_clock(bool few) {
 
 }  // namespace
 
-Contestants clocked_contestants(const Problem& problem, bool few) {
+Contestants clocked_contestants(const Problem& problem, bool few, std::int64_t together) {
     Contestants contestants;
     const std::vector<double> all = {0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7}, some = {0, 1e-12, 1e-10, 1e-8};
     for (const std::string& clock : problem.clocks) {
         const std::vector<Method> methods = methods_with_clock(few);
-        const std::vector<Kernel> kernels = kernels_of(problem, methods, 0, clock);
-        const double span = span_of(problem, kernels.back());
+        const std::vector<Kernel> kernels = kernels_of(problem, methods, together, clock);
+        const double span = span_of(problem, kernels_of(problem, {methods.back()}, 0, clock).front());
         for (std::size_t i = 0; i < methods.size(); ++i)
             for (const double tolerance : few ? some : all)
-                contestants.push_back(contestant_of(problem, clock, methods[i], tolerance, kernels[i], span));
+                contestants.push_back(contestant_of(problem, clock, methods[i], tolerance, kernels[i], span, together));
     }
     return contestants;
 }

@@ -6,8 +6,8 @@
 
 namespace lobatto::bench {
 
-// Of several methods and tolerances with each clock of the problem; none where it has no clock. An ensemble's
-// trajectories go one after another. `few`: of some methods.
-Contestants clocked_contestants(const Problem& problem, bool few);
+// Of several methods and tolerances with each clock of the problem; none where it has no clock. `few`: of some methods;
+// `together`: how many trajectories go side by side; 0: one alone.
+Contestants clocked_contestants(const Problem& problem, bool few, std::int64_t together);
 
 }  // namespace lobatto::bench

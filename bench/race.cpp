@@ -174,8 +174,9 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
 #endif
     if (!options.peers_only) {
         say(race, "kernels");
-        enter(clocked_contestants(problem, options.quick));
-        enter(kernel_contestants(problem, options.quick, trajectories > 1 ? trajectories : 0));
+        const int together = trajectories > 1 ? trajectories : 0;
+        enter(clocked_contestants(problem, options.quick, together));
+        enter(kernel_contestants(problem, options.quick, together));
     }
     const auto is_wanted = [&](const Contestant& contestant) {
         const auto holds = [&](const std::string& word) { return contestant.method.find(word) != std::string::npos; };

@@ -73,8 +73,11 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
                                           tally.failed() == 0 ? "" : fmt::format(", {} failed", tally.failed())));
     if (is_one) {
         const EnsembleRequest& request = study.first_setting().request;
-        print_row("steps", fmt::format("{} each, h = {:.6g}, to t = {:.6g}", request.steps, request.step,
-                                       static_cast<double>(request.steps) * request.step));
+        print_row("steps", scene.clock
+                               ? fmt::format("h = {:.6g} in the time of the clock {}, to t = {:.6g}", request.step,
+                                             scene.clock->text, time_after(request, request.steps))
+                               : fmt::format("{} each, h = {:.6g}, to t = {:.6g}", request.steps, request.step,
+                                             static_cast<double>(request.steps) * request.step));
     }
     if (const CudaDevice* const device = study.device(); device != nullptr)
         print_row("device",
@@ -83,7 +86,10 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
         print_row("threads",
                   fmt::format("{}, {} each", times.threads,
                               times.lanes == 0 ? "one trajectory at a time" : counted(times.lanes, "lane", "lanes")));
-    if (times.steps_done > 0) {
+    if (scene.clock && tally.trajectories() > 0) {
+        const auto count = static_cast<double>(tally.trajectories());
+        print_row("time", duration(times.processor_seconds / count) + " of a processor, for one trajectory");
+    } else if (times.steps_done > 0) {
         const auto steps = static_cast<double>(times.steps_done);
         print_row("speed", fmt::format("{:.3g} steps per second", steps / times.seconds));
         if (study.device() == nullptr)

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -248,6 +249,39 @@ TEST_CASE("sweeps of scenes with a clock measure their errors") {
         {LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.3,0.9,0.97", "-o", folder / "sweep.csv"});
     INFO(finished.err);
     CHECK(finished.exit_code == 0);
+}
+
+TEST_CASE("a row of a sweep with a clock is the end of a run, for any number of threads") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", kepler(0.5, "points = 8\nclock = \"r^(3/2)\"", "step = 0.6\nuntil = 50"));
+    const auto table_of = [&](const std::string& threads) {
+        const test::Finished finished =
+            test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.3:0.9:19", "--every", "7", "-o",
+                       folder / "sweep.csv", "--threads", threads});
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        return test::read_file(folder / "sweep.csv");
+    };
+    const std::string table = table_of("1");
+    CHECK(table_of("2") == table);
+    int compared = 0;
+    for (const std::string e : {"0.3", "0.6", "0.9"}) {
+        REQUIRE(test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "--set", "e=" + e, "-o", folder / "run.csv",
+                           "--quiet"})
+                    .exit_code == 0);
+        const std::vector<double> end = read_trajectory(folder / "run.csv").rows.back();
+        std::istringstream lines(table);
+        for (std::string line; std::getline(lines, line);) {
+            std::istringstream fields(line);
+            std::vector<std::string> row;
+            for (std::string field; std::getline(fields, field, ',');) row.push_back(field);
+            // trajectory, e, status, steps, t, x, y, p_x, p_y, ...
+            if (row.size() < 9 || row[4] != "50" || std::fabs(std::stod(row[1]) - std::stod(e)) > 1e-15) continue;
+            ++compared;
+            for (std::size_t k = 0; k < 4; ++k) CHECK(std::fabs(std::stod(row[5 + k]) - end[1 + k]) < 1e-11);
+        }
+    }
+    CHECK(compared == 3);
 }
 
 TEST_CASE("a clock that does not stay positive ends the run, and says so") {
