@@ -11,6 +11,7 @@
 #include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/kernel/device_kernel.hpp"
 #include "analysis/kernel/kernel_of.hpp"
+#include "analysis/motion.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto::bench {
@@ -61,7 +62,7 @@ void print_rates(const Row& row, const std::shared_ptr<const CudaDevice>& device
     EnsembleRequest alone = request, there = request;
     alone.threads = 1;
     there.device = device_kernel_of(derived.source, Precision::double_, device);
-    const CudaFunction& function = *there.device->function;
+    const CudaFunction& function = *there.device->alike;
     const int blocks = function.resident(DeviceKernel::block);
     fmt::print("\n{}: {}, h = {}, {} registers, {} threads on each of {} multiprocessors\n\n", row.name,
                scene.method.name(), row.step, function.registers(), blocks * DeviceKernel::block,
@@ -81,6 +82,59 @@ void print_rates(const Row& row, const std::shared_ptr<const CudaDevice>& device
     }
 }
 
+// The map of flips (docs/flips.md): size x size starts at rest, each until it turns over or t = 100.
+EnsembleRequest flips_of(const Scene& scene, std::int64_t size) {
+    EnsembleRequest request;
+    request.count = size * size;
+    request.start = [size](std::int64_t index, EnsembleStart& start) {
+        const auto angle = [size](std::int64_t i) {
+            return -3 + 6 * static_cast<double>(i) / static_cast<double>(size - 1);
+        };
+        start.q = {angle(index / size), angle(index % size)};
+        start.rate = {0, 0};
+    };
+    request.from_velocities = true;
+    request.step = scene.evaluate(scene.run.step, "the step").to_double();
+    request.steps = steps_of(scene).count;
+    request.stops = true;
+    return request;
+}
+
+struct Flips {
+    double rate = 0;  // trajectories in a second
+    std::int64_t flipped = 0, steps = 0;
+};
+Flips flips_in(const Kernel& kernel, EnsembleRequest request) {
+    Flips flips;
+    request.sink = [&](const EnsembleTrajectory& trajectory) { flips.flipped += trajectory.stop >= 0 ? 1 : 0; };
+    const EnsembleResult result = integrate(kernel, request);
+    flips.rate = static_cast<double>(result.trajectories) / result.seconds;
+    flips.steps = result.steps_done;
+    return flips;
+}
+
+void print_flips(const std::shared_ptr<const CudaDevice>& device) {
+    const Scene scene = read_scene(LOBATTO_SOURCE_DIR "/scenes/flips.toml");
+    const DerivedKernel derived = derived_kernel(scene, {});
+    const Kernel kernel = ensemble_kernel_of(derived.source, Precision::double_, 1 << 20, nullptr, true);
+    EnsembleRequest alone = flips_of(scene, 100), there = flips_of(scene, 100);
+    alone.threads = 1;
+    const double one = flips_in(kernel, alone).rate, all = flips_in(kernel, flips_of(scene, 400)).rate;
+    there.device = device_kernel_of(derived.source, Precision::double_, device, nullptr, true);
+    fmt::print("\nThe map of flips: {}, h = {}, {} registers; one core {:.3g} trajectories/s, {} cores {:.3g}\n\n",
+               scene.method.name(), there.step, there.device->alike->registers(), one, thread_count(0), all);
+    fmt::print("| map | flips | steps | {}, trajectories/s | times one core | times all |\n|---|---|---|---|---|---|\n",
+               device->name());
+    for (const std::int64_t size : {100, 200, 1000, 2000}) {
+        EnsembleRequest map = flips_of(scene, size);
+        map.device = there.device;
+        const Flips flips = flips_in(kernel, map);
+        fmt::print("| {0} x {0} | {1} | {2:.3g} | {3:.3g} | {4:.1f} | {5:.1f} |\n", size, flips.flipped,
+                   static_cast<double>(flips.steps), flips.rate, flips.rate / one, flips.rate / all);
+        std::fflush(stdout);
+    }
+}
+
 }  // namespace
 
 void print_device_rates() {
@@ -94,16 +148,13 @@ void print_device_rates() {
     }
     if (!missing.empty()) {
         fmt::print(
-            "Not measured here: the rates of P1 to P4 with 10^3 to 10^7 trajectories on a GPU, beside one and all "
-            "cores; "
-            "registers and occupancy there.\nWhat is missing: {}.\n",
+            "Not measured here: the rates of P1 to P4 with 10^3 to 10^7 trajectories, and of the map of flips, on a "
+            "GPU, beside one and all cores; registers and occupancy there.\nWhat is missing: {}.\n",
             missing);
         return;
     }
     for (const Row& row : rows) print_rates(row, device);
-    fmt::print(
-        "\nThe fractal of flips is not among them: stops are found by the processor alone. Shares of the peak are not "
-        "measured.\n");
+    print_flips(device);
 }
 
 }  // namespace lobatto::bench

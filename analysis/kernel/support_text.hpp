@@ -17,6 +17,7 @@ extern const std::vector<SupportPart> support_parts;
 extern const std::string_view kernel_abi_h_text;             // runtime/kernel/abi.h
 extern const std::string_view kernel_export_hpp_text;        // runtime/kernel/export.hpp
 extern const std::string_view kernel_device_lanes_hpp_text;  // runtime/kernel/device_lanes.hpp
+extern const std::string_view kernel_device_host_hpp_text;   // runtime/kernel/device_host.hpp
 
 // The named parts and those that they include, as one file. Throws std::logic_error for a name that is none.
 std::string support_text(const std::vector<std::string>& names);

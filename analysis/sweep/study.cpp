@@ -130,7 +130,8 @@ void SweepStudy::choose_device() {
 void SweepStudy::put_on_device(Setting& setting) const {
     if (!device_) return;
     std::string compiled;
-    setting.request.device = device_kernel_of(*setting.source, setting.scene.method.numbers, device_, &compiled);
+    setting.request.device =
+        device_kernel_of(*setting.source, setting.scene.method.numbers, device_, &compiled, !scene_.run.stops.empty());
     setting.compiled += "+" + compiled;
 }
 

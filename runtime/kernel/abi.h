@@ -211,9 +211,13 @@ typedef struct lobatto_device_call {
     uint64_t* words;
     int64_t room, lanes;           /* lanes that fit, and that there are */
     int64_t target;                /* steps since the start to reach, of each lane whose status is LOBATTO_OK */
+    int64_t most;                  /* steps of a lane in this launch */
     int64_t* steps;                /* since the start, one a lane; in and out, as the others */
     int64_t* iterations;           /* since the start */
-    int32_t* status;               /* LOBATTO_NOT_CONVERGED: `retake` takes the step */
+    int32_t* status;               /* LOBATTO_NOT_CONVERGED: `retake` takes the step; LOBATTO_STOPPED: looks at it */
+    const int32_t* order;          /* lanes of this launch, `lanes` of them; null: all */
+    int32_t alike;                 /* whether all lanes have the same parameters */
+    int32_t watches;               /* whether stops end trajectories */
     double start_time[2], step[2]; /* numbers of the kernel, in their first bytes */
 } lobatto_device_call;
 
@@ -225,15 +229,18 @@ typedef struct lobatto_device_lanes {
     int32_t first_moving, moving;           /* of these, which steps change and `state` reads */
     int32_t shared_bytes, shared_alignment; /* of what all lanes of one step size share */
     int32_t host_bytes, host_alignment;     /* of room for the functions below, one a thread */
+    int32_t columns;                        /* of `row` below; 0: the kernel has no stops */
     /* Lanes first, ..., last - 1 at their starts; arrays are lane-major, as of ensembles. */
     void (*place)(void* host, lobatto_device_call* call, int64_t first, int64_t last, const void* parameters,
-                  const void* q, const void* p, double tolerance);
+                  const void* q, const void* p, double tolerance, void* energy);
     void (*shared)(const lobatto_device_call* call, int64_t lane,
                    void* shared); /* of any lane placed with LOBATTO_OK */
     /* What a launch does, on the host. */
     void (*advance)(lobatto_device_call* call, const void* shared, int64_t first, int64_t last);
-    /* From the step that failed to the target; parameters of this lane. */
-    void (*retake)(void* host, lobatto_device_call* call, int64_t lane, const void* parameters, double tolerance);
+    /* From the step that failed to the target; parameters of this lane. Of a kernel with stops that step alone, or a
+     * look at it; `row` of a lane that has ended: event number or -1, t, q, p, energy of its last state. */
+    void (*retake)(void* host, lobatto_device_call* call, int64_t lane, const void* parameters, double tolerance,
+                   void* row);
     void (*state)(void* host, const lobatto_device_call* call, int64_t first, int64_t last, void* q, void* p,
                   void* energy); /* energy: one a lane; not a number without one */
 } lobatto_device_lanes;

@@ -33,16 +33,19 @@ TEST_CASE("nvcc compiles the kernels of all forms, in double and float, to code 
     }
     const test::TemporaryFolder folder;
     const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
-    const auto check = [](const KernelSource& source, Precision numbers, const std::string& architecture) {
+    const auto check = [](const KernelSource& source, Precision numbers, const std::string& architecture,
+                          bool stops = false) {
         CAPTURE(source.name);
         CAPTURE(architecture);
-        const DeviceLibrary host = DeviceLibrary::load(compile(host_side_of(source, numbers)).object, source.digest);
+        const DeviceLibrary host =
+            DeviceLibrary::load(compile(host_side_of(source, numbers, stops)).object, source.digest);
         REQUIRE(host.has_lanes());
-        const DeviceTranslation translation = device_side_of(source, architecture, host);
+        const DeviceTranslation translation = device_side_of(source, architecture, host, stops);
         const Compiled made = compile_for_device(translation);
         CHECK_FALSE(made.from_cache);
         CHECK(std::filesystem::file_size(made.object) > 1000);
-        CHECK(test::read_file(made.object).find("lobatto_advance_lanes") != std::string::npos);
+        for (const char* name : {DeviceKernel::name_of_lanes, DeviceKernel::name_of_alike, DeviceKernel::name_of_move})
+            CHECK(test::read_file(made.object).find(name) != std::string::npos);
         CHECK(compile_for_device(translation).from_cache);
     };
     for (const char* name : {"pendulum", "kepler", "double_pendulum", "harmonic_oscillator"})
@@ -50,4 +53,5 @@ TEST_CASE("nvcc compiles the kernels of all forms, in double and float, to code 
     check(source_of("henon_heiles", Precision::double_, 6), Precision::double_, "sm_80");
     check(source_of("driven_damped_pendulum", Precision::double_), Precision::double_, "sm_80");
     check(source_of("pendulum", Precision::single), Precision::single, "sm_80");
+    check(source_of("flips", Precision::double_), Precision::double_, "sm_90", true);
 }

@@ -44,10 +44,12 @@ struct EnsembleFixedPoint : StageMap<K, T> {
         real enough, part, least;
     };
 
-    // The same for all trajectories of one step size. Where a trajectory's numbers are taken into the map, it is not.
+    // The same for all trajectories of one step size. Where a trajectory's numbers are taken into the map, it is so of
+    // those with the same parameters.
     struct Shared {
-        std::conditional_t<absorbs, Unit, typename Tables::Map> map;
-        std::conditional_t<absorbs, Unit, T> reach;
+        typename Tables::Map map[maps];
+        std::conditional_t<absorbs, T[n], Unit> diagonal;
+        T reach;
         T node_time[parts], weight[parts], arrival[parts];
         real h;
         Measure settled, near;
@@ -96,10 +98,10 @@ struct EnsembleFixedPoint : StageMap<K, T> {
 
     Shared shared() const {
         Shared all{};
-        if constexpr (!absorbs) {
-            all.map = this->map[0];
-            all.reach = reach;
-        }
+        for (int c = 0; c < maps; ++c) all.map[c] = this->map[c];
+        if constexpr (absorbs)
+            for (int c = 0; c < n; ++c) all.diagonal[c] = diagonal[c];
+        all.reach = reach;
         for (int i = 0; i < parts; ++i) {
             all.node_time[i] = node_time[i];
             all.weight[i] = weight[i];
@@ -110,11 +112,14 @@ struct EnsembleFixedPoint : StageMap<K, T> {
         all.near = near;
         return all;
     }
+    template <bool alike>
     LOBATTO_INLINE void take(const Shared& all) {
-        if constexpr (!absorbs) {
-            this->map[0] = all.map;
+        if constexpr (alike || !absorbs) {
+            for (int c = 0; c < maps; ++c) this->map[c] = all.map[c];
             reach = all.reach;
         }
+        if constexpr (alike && absorbs)
+            for (int c = 0; c < n; ++c) diagonal[c] = all.diagonal[c];
         for (int i = 0; i < parts; ++i) {
             node_time[i] = all.node_time[i];
             weight[i] = all.weight[i];
@@ -437,10 +442,13 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
     EnsembleFixedPoint<K, T> fixed_point;
 
     Shared shared() const { return fixed_point.shared(); }
-    LOBATTO_INLINE void take(const Shared& all) { fixed_point.take(all); }
+    template <bool alike>
+    LOBATTO_INLINE void take(const Shared& all) {
+        fixed_point.template take<alike>(all);
+    }
 
-    const T& position(int c) const { return q[c]; }
-    const T* rates() const { return u; }
+    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
+    LOBATTO_DEVICE const T* rates() const { return u; }
     void prepare(const ScalarFallback<K>& single, int lane) {
         fixed_point.prepare(single.coefficients, single.step_size, lane);
     }

@@ -465,10 +465,13 @@ struct LaneStepper<K, T, Form::general, stepping> {
     GalerkinFixedPoint<K, T> fixed_point;
 
     Shared shared() const { return fixed_point.shared(); }
-    LOBATTO_INLINE void take(const Shared& all) { fixed_point.take(all); }
+    template <bool>
+    LOBATTO_INLINE void take(const Shared& all) {
+        fixed_point.take(all);
+    }
 
-    const T& position(int c) const { return q[c]; }
-    const T* rates() const { return p; }
+    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
+    LOBATTO_DEVICE const T* rates() const { return p; }
     void prepare(const ScalarFallback<K>& single, int) { fixed_point.prepare(single.step_size); }
     void set_tolerance(real tolerance) { fixed_point.tolerance = tolerance; }
     void start(const ScalarFallback<K>& single, const real*, int lane) {

@@ -74,7 +74,7 @@ constexpr int switches_of() {
 // all of y is of one size, and second differences vary by less than a factor of two, so that nothing narrow is there:
 // a parabola falls between its samples by an eighth of what these differ by. For numbers, or Packs of them.
 template <int pieces, class T>
-inline auto is_no_dip(const T* y, int i, const T& largest) {
+LOBATTO_DEVICE inline auto is_no_dip(const T* y, int i, const T& largest) {
     using real = real_of<T>;
     const int middle = i < 2 ? 2 : i > pieces - 2 ? pieces - 2 : i;
     const auto bend = [&](int j) { return y[j - 1] - T(real(2)) * y[j] + y[j + 1]; };
@@ -186,8 +186,8 @@ struct Events : SampledFunction<typename K::real> {
     }
 
     // The sample at the end of piece j, and which piece ends at or next to sample i.
-    static constexpr int sample_at(int j) { return j == 0 ? 0 : j == pieces ? grid_size - 1 : j + 1; }
-    static constexpr int piece_at(int i) { return i < 2 ? 0 : i > grid_size - 3 ? pieces : i - 1; }
+    LOBATTO_DEVICE static constexpr int sample_at(int j) { return j == 0 ? 0 : j == pieces ? grid_size - 1 : j + 1; }
+    LOBATTO_DEVICE static constexpr int piece_at(int i) { return i < 2 ? 0 : i > grid_size - 3 ? pieces : i - 1; }
 
     // Before each step: the state that it starts from.
     void keep(const S& stepper) {

@@ -4,8 +4,8 @@
 //
 // refill(motion, single, p, lane) begins at the start of `single`. displacements(...) gives what the positions of the
 // step are made of: with the basis of the form's Stepper, q(theta) = q_before + sum_j value_j(theta) moved_j. momenta
-// and velocities are those at its end; velocities answers in which lanes they are known. lend_state gives one lane's
-// state, lend_step one lane's step from the state that was lent.
+// are those of rates; velocities those at its end: velocities answers in which lanes they are known. lend_state gives
+// one lane's state, lend_step one lane's step from the state that was lent.
 #ifndef LOBATTO_KERNEL_LENT_STEPS_HPP
 #define LOBATTO_KERNEL_LENT_STEPS_HPP
 
@@ -26,11 +26,11 @@ struct LentVelocity {
     static constexpr int n = K::coordinates;
 
     template <class Given>
-    static void momenta(const Motion& motion, const Given& k, T* momentum) {
-        K::momentum(k, motion.rates(), momentum);
+    static void momenta(const T* rates, const Given& k, T* momentum) {
+        K::momentum(k, rates, momentum);
     }
     template <class Given>
-    static ActiveMask velocities(const Motion& motion, const Given&, const T&, T* velocity) {
+    LOBATTO_LANE static ActiveMask velocities(const Motion& motion, const Given&, const T&, T* velocity) {
         for (int c = 0; c < n; ++c) velocity[c] = motion.rates()[c];
         return ActiveMask(true);
     }
@@ -60,6 +60,14 @@ struct LentStep<K, T, Form::separable, Stepping::solved> : LentVelocity<K, T> {
     using LentVelocity<K, T>::n;
     static constexpr int s = K::points, m = s - 2, basis = s;
 
+    struct Table {  // of K, for indices that are no constants: a device has no address of K's own
+        real c[s]{}, A[m > 0 ? m*m : 1]{};
+        constexpr Table() {
+            for (int i = 0; i < s; ++i) c[i] = K::c[i];
+            for (int i = 0; i < m * m; ++i) A[i] = K::A[i];
+        }
+    };
+
     // A trajectory that begins in the midst of others has a memory as they do: of a constant acceleration.
     template <class Single>
     static void refill(Motion& motion, const Single& single, const real* momentum, int lane) {
@@ -69,16 +77,17 @@ struct LentStep<K, T, Form::separable, Stepping::solved> : LentVelocity<K, T> {
             single.u, [&](int, int c) { return W0[c]; }, [&](int, int c) { return single.q[c]; }, lane);
     }
     template <class Given>
-    static void displacements(const Motion& motion, const Given&, const T&, const T* q_before, const T* u_before,
-                              T (*moved)[n]) {
+    LOBATTO_LANE static void displacements(const Motion& motion, const Given&, const T&, const T* q_before,
+                                           const T* u_before, T (*moved)[n]) {
+        static constexpr Table table{};
         const real h = motion.fixed_point.h;
         for (int c = 0; c < n; ++c) {
             const T* const W = motion.fixed_point.w + c * s;
             const T drift = fused(T(-h * K::b[0]), W[0], u_before[c]);
             moved[0][c] = T(real(0));
             for (int i = 0; i < m; ++i) {
-                T sum = T(K::c[i + 1]) * drift;
-                for (int j = 0; j < m; ++j) sum = fused(T(-h * K::A[i * m + j]), W[j + 1], sum);
+                T sum = T(table.c[i + 1]) * drift;
+                for (int j = 0; j < m; ++j) sum = fused(T(-h * table.A[i * m + j]), W[j + 1], sum);
                 moved[i + 1][c] = T(h) * sum;
             }
             moved[s - 1][c] = motion.position(c) - q_before[c];
@@ -106,8 +115,8 @@ struct LentStep<K, T, Form::separable, Stepping::composition> : LentVelocity<K, 
         motion.start(single, momentum, lane);
     }
     template <class Given>
-    static void displacements(const Motion& motion, const Given& k, const T& time, const T* q_before, const T* u_before,
-                              T (*moved)[n]) {
+    LOBATTO_LANE static void displacements(const Motion& motion, const Given& k, const T& time, const T* q_before,
+                                           const T* u_before, T (*moved)[n]) {
         const T h = T(motion.h);
         T q[n], start[n], end[n];
         for (int c = 0; c < n; ++c) q[c] = motion.position(c);
@@ -140,8 +149,8 @@ struct LentMomentum {
         motion.start(single, momentum, lane);
     }
     template <class Given>
-    static void momenta(const Motion& motion, const Given&, T* momentum) {
-        for (int c = 0; c < n; ++c) momentum[c] = motion.rates()[c];
+    static void momenta(const T* rates, const Given&, T* momentum) {
+        for (int c = 0; c < n; ++c) momentum[c] = rates[c];
     }
 };
 
@@ -155,18 +164,38 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
     using typename LentMomentum<K, T>::Motion;
     using LentMomentum<K, T>::n;
     using ActiveMask = decltype(T() < T());
-    static constexpr int r = K::nodes, basis = ScalarFallback<K>::basis;
+    static constexpr int r = K::nodes, basis = ScalarFallback<K>::basis, controls = basis - 1;
+
+    struct Table {  // as above
+        real reach[controls * r]{};
+        int row[K::mass_entries]{}, column[K::mass_entries]{};
+        constexpr Table() {
+            for (int i = 0; i < controls * r; ++i) reach[i] = K::reach[i];
+            for (int e = 0; e < K::mass_entries; ++e) {
+                row[e] = K::mass_row[e];
+                column[e] = K::mass_column[e];
+            }
+        }
+    };
 
     template <class Given>
-    static void displacements(const Motion& motion, const Given&, const T&, const T*, const T*, T (*moved)[n]) {
+    LOBATTO_LANE static void displacements(const Motion& motion, const Given&, const T&, const T*, const T*,
+                                           T (*moved)[n]) {
+        static constexpr Table table{};
         for (int c = 0; c < n; ++c) {
             moved[0][c] = T(real(0));
-            for (int j = 0; j < basis - 1; ++j) moved[j + 1][c] = motion.fixed_point.displacement(c, j);
+            for (int j = 0; j < controls; ++j) {
+                T sum = T(real(0));
+                for (int i = 0; i < r; ++i)
+                    sum = fused(T(table.reach[j * r + i]), motion.fixed_point.v[c * r + i], sum);
+                moved[j + 1][c] = T(motion.fixed_point.h) * sum;
+            }
         }
     }
     // By Newton's iteration from the velocity of the last node (D27). The lanes in which it has converged.
     template <class Given>
-    static ActiveMask velocities(const Motion& motion, const Given& k, const T& time, T* velocity) {
+    LOBATTO_LANE static ActiveMask velocities(const Motion& motion, const Given& k, const T& time, T* velocity) {
+        static constexpr Table table{};
         T change = T(real(0)), size = T(real(0));
         for (int c = 0; c < n; ++c) velocity[c] = motion.fixed_point.v[c * r + r - 1];
         for (int iteration = 0; iteration < 3; ++iteration) {
@@ -175,7 +204,7 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
             Formulas<K>::legendre(k, time, static_cast<const T*>(q), static_cast<const T*>(velocity), +residual,
                                   +packed);
             for (int i = 0; i < n * n; ++i) M[i] = T(real(0));
-            for (int e = 0; e < K::mass_entries; ++e) M[K::mass_row[e] * n + K::mass_column[e]] = packed[e];
+            for (int e = 0; e < K::mass_entries; ++e) M[table.row[e] * n + table.column[e]] = packed[e];
             factor_symmetric<n>(M);
             for (int c = 0; c < n; ++c) residual[c] = motion.rates()[c] - residual[c];
             solve_symmetric<n>(M, residual);

@@ -228,6 +228,7 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     struct Shared {};  // the map is of a trajectory's parameters
 
     Shared shared() const { return {}; }
+    template <bool>
     LOBATTO_INLINE void take(const Shared&) {}
     const T& position(int c) const { return q[c]; }
     const T* rates() const { return p; }

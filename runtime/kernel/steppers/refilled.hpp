@@ -17,25 +17,13 @@
 
 namespace lobatto {
 
-// Looks at the steps of lanes.
-template <class K, int width>
-struct LaneWatch {
+// Where the functions of events are sampled in a step, and there the basis of its polynomial.
+template <class K>
+struct SamplePlaces {
     using real = typename K::real;
-    using T = Pack<real, width>;
-    using ActiveMask = decltype(T() < T());
-    using Alone = FallbackKernel<K>;
-    using S = WatchedStepper<Alone>;
-    using Motion = LaneStepper<K, T>;
-    using Step = LentStep<K, T>;
-    using Sampled = Events<Alone>;
-    static constexpr int n = K::coordinates, basis = Step::basis, places = Sampled::grid_size;
-    static constexpr int pieces = Sampled::pieces;
-    static constexpr int most = Watch<Alone>::most, columns = Watch<Alone>::columns;
-
-    T last[K::events];  // of each function the last value that was not zero
-    T moved[basis][n];  // the step's polynomial, in the basis of its form
-    S single;           // to which a step is lent
-    Watch<Alone>* watch = nullptr;
+    using S = WatchedStepper<FallbackKernel<K>>;
+    using Sampled = Events<FallbackKernel<K>>;
+    static constexpr int places = Sampled::grid_size, basis = S::basis;
     real grid[places], value[places][basis], slope[places][basis];
 
     void prepare() {
@@ -44,14 +32,27 @@ struct LaneWatch {
             S::basis_at(grid[i], value[i], slope[i]);
         }
     }
-    void start(const ScalarFallback<K>& started, int lane) {
-        for (int e = 0; e < K::events; ++e) set_lane(last[e], lane, started.event_values[e]);
-    }
+};
+
+// The functions of events in the steps of lanes.
+template <class K, int width>
+struct LaneSamples {
+    using real = typename K::real;
+    using T = Pack<real, width>;
+    using ActiveMask = decltype(T() < T());
+    using Motion = LaneStepper<K, T>;
+    using Step = LentStep<K, T>;
+    using Sampled = Events<FallbackKernel<K>>;
+    static constexpr int n = K::coordinates, basis = SamplePlaces<K>::basis, places = SamplePlaces<K>::places;
+    static constexpr int pieces = Sampled::pieces;
+
+    T last[K::events];  // of each function the last value that was not zero
+    T moved[basis][n];  // the step's polynomial, in the basis of its form
 
     // The lanes in which something may have happened: in step number `gone` since `begun`, of length h, from `before`.
     template <class Given>
-    ActiveMask restless(const Motion& motion, const Given& k, const T& begun, const T& gone, real h, const T* q_before,
-                        const T* rate_before) {
+    LOBATTO_LANE ActiveMask restless(const SamplePlaces<K>& at, const Motion& motion, const Given& k, const T& begun,
+                                     const T& gone, real h, const T* q_before, const T* rate_before) {
         Step::displacements(motion, k, begun + gone * T(h), q_before, rate_before, moved);
         T y[places][K::events];
         for (int i = 0; i < places; ++i) {
@@ -59,13 +60,13 @@ struct LaneWatch {
             for (int c = 0; c < n; ++c) {
                 T position = T(real(0)), rate = T(real(0));
                 for (int j = 0; j < basis; ++j) {
-                    position = fused(T(value[i][j]), moved[j][c], position);
-                    rate = fused(T(slope[i][j]), moved[j][c], rate);
+                    position = fused(T(at.value[i][j]), moved[j][c], position);
+                    rate = fused(T(at.slope[i][j]), moved[j][c], rate);
                 }
                 q[c] = q_before[c] + position;
                 velocity[c] = rate / T(h);
             }
-            Formulas<K>::event(k, begun + (gone + T(grid[i])) * T(h), static_cast<const T*>(q),
+            Formulas<K>::event(k, begun + (gone + T(at.grid[i])) * T(h), static_cast<const T*>(q),
                                static_cast<const T*>(velocity), +y[i]);
         }
         T q[n], velocity[n], end[K::events];
@@ -77,28 +78,8 @@ struct LaneWatch {
         return !quiet;
     }
 
-    // What happened in the step of `lane` that was lent: of its last step all but the state before. Adds rows as Watch.
-    template <class Lend>
-    Status look(const typename K::Parameters& parameters, real h, const Lend& lend, int lane, real* rows,
-                std::int64_t& count) {
-        const Status status = single.prepare(parameters, h);
-        if (status != Status::ok) return status;
-        single.parameters = parameters;
-        if (watch == nullptr) watch = new Watch<Alone>(single);
-        lend(single, *watch);
-        for (int e = 0; e < K::events; ++e) single.event_values[e] = lane_of(last[e], lane);
-        const Status found = watch->look(single, rows, count);
-        for (int e = 0; e < K::events; ++e) set_lane(last[e], lane, single.event_values[e]);
-        return found;
-    }
-    // After each call of the host.
-    void rest() {
-        delete watch;
-        watch = nullptr;
-    }
-
 private:
-    ActiveMask is_quiet(int e, const T (*samples)[K::events], const T& end) const {
+    LOBATTO_LANE ActiveMask is_quiet(int e, const T (*samples)[K::events], const T& end) const {
         const ActiveMask is_above = last[e] > T(real(0));
         const auto with_sign = [&](const T& g) LOBATTO_FORMULA { return select(is_above, g, -g); };
         ActiveMask quiet = is_above | (last[e] < T(real(0)));
@@ -120,6 +101,46 @@ private:
         }
         return quiet & (with_sign(end) > T(Limits<real>::root_epsilon) * largest) &
                (with_sign(end) <= T(Limits<real>::largest));
+    }
+};
+
+// Looks at the steps of lanes.
+template <class K, int width>
+struct LaneWatch : LaneSamples<K, width> {
+    using Samples = LaneSamples<K, width>;
+    using Samples::last;
+    using typename Samples::real;
+    using Alone = FallbackKernel<K>;
+    using S = WatchedStepper<Alone>;
+    static constexpr int most = Watch<Alone>::most, columns = Watch<Alone>::columns;
+
+    S single;  // to which a step is lent
+    Watch<Alone>* watch = nullptr;
+    SamplePlaces<K> at;
+
+    void prepare() { at.prepare(); }
+    void start(const ScalarFallback<K>& started, int lane) {
+        for (int e = 0; e < K::events; ++e) set_lane(last[e], lane, started.event_values[e]);
+    }
+
+    // What happened in the step of `lane` that was lent: of its last step all but the state before. Adds rows as Watch.
+    template <class Lend>
+    Status look(const typename K::Parameters& parameters, real h, const Lend& lend, int lane, real* rows,
+                std::int64_t& count) {
+        const Status status = single.prepare(parameters, h);
+        if (status != Status::ok) return status;
+        single.parameters = parameters;
+        if (watch == nullptr) watch = new Watch<Alone>(single);
+        lend(single, *watch);
+        for (int e = 0; e < K::events; ++e) single.event_values[e] = lane_of(last[e], lane);
+        const Status found = watch->look(single, rows, count);
+        for (int e = 0; e < K::events; ++e) set_lane(last[e], lane, single.event_values[e]);
+        return found;
+    }
+    // After each call of the host.
+    void rest() {
+        delete watch;
+        watch = nullptr;
     }
 };
 
@@ -203,8 +224,8 @@ struct RefilledEnsemble : Ensemble<K, width> {
             if (any(active & !moved)) this->retry(active & !moved, time, evaluations, leave);
             if constexpr (has_events) {
                 if (events != nullptr) {
-                    const ActiveMask restless =
-                        active & looks.restless(motion, coefficients, begun, gone, step_size, q_before, rate_before);
+                    const ActiveMask restless = active & looks.restless(looks.at, motion, coefficients, begun, gone,
+                                                                        step_size, q_before, rate_before);
                     for (int lane = 0; any(restless) && lane < width; ++lane) {
                         if (!restless[lane]) continue;
                         const Status found =
@@ -227,7 +248,7 @@ struct RefilledEnsemble : Ensemble<K, width> {
         }
     }
 
-private:
+protected:
     void place(int lane, real time, const real* p) {
         coefficients_of[lane] = single.coefficients;
         set_coefficients<K>(coefficients, lane, single.coefficients);
@@ -241,7 +262,7 @@ private:
     // Into the rows of all lanes, `stride` apart.
     void record(const T& time, real* row, std::int64_t stride) const {
         T momentum[n];
-        Step::momenta(motion, coefficients, momentum);
+        Step::momenta(motion.rates(), coefficients, momentum);
         for (int lane = 0; lane < width; ++lane, row += stride) {
             row[0] = lane_of(time, lane);
             for (int c = 0; c < n; ++c) {

@@ -392,12 +392,13 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
     };
 
     Shared shared() const { return {composition, h}; }
+    template <bool>
     LOBATTO_INLINE void take(const Shared& all) {
         composition = all.composition;
         h = all.h;
     }
-    const T& position(int c) const { return q[now][c]; }
-    const T* rates() const { return u[now]; }
+    LOBATTO_DEVICE const T& position(int c) const { return q[now][c]; }
+    LOBATTO_DEVICE const T* rates() const { return u[now]; }
     void prepare(const ScalarFallback<K>& single, int) {
         composition = single.composition;
         h = single.step_size;

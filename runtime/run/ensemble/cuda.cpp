@@ -4,6 +4,8 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -111,6 +113,7 @@ std::shared_ptr<const CudaDevice> CudaDevice::open() {
     const std::shared_ptr<CudaDevice> opened(new CudaDevice);
     opened->driver_ = load_driver();
     const CudaDriver& driver = *opened->driver_;
+    ::setenv("CUDA_DEVICE_MAX_CONNECTIONS", "32", 0);  // else several queues wait for each other
     const auto refuse = [](const std::string& reason) { throw MachineError(reason + otherwise); };
     if (const int result = driver.init(0); result != 0)
         refuse("NVIDIA's driver finds no GPU that it can use: " + driver.error(result) +
@@ -137,7 +140,18 @@ std::shared_ptr<const CudaDevice> CudaDevice::open() {
 }
 
 CudaDevice::~CudaDevice() {
-    if (context_ != nullptr) driver_->context_release(device_);
+    if (context_ == nullptr) return;
+    if (driver_->context_set(context_) == 0) {
+        release_spare();
+        for (void* const stream : streams_) driver_->stream_destroy(stream);
+    }
+    driver_->context_release(device_);
+}
+
+void CudaDevice::release_spare() const {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [bytes, address] : spare_) driver_->release(address);
+    spare_.clear();
 }
 
 void CudaDevice::use() const {
@@ -157,6 +171,8 @@ std::size_t CudaDevice::free_memory() const {
     use();
     std::size_t free = 0, total = 0;
     check(driver_->memory_info(&free, &total), "does not tell how much memory is free");
+    const std::lock_guard lock(mutex_);
+    for (const auto& [bytes, address] : spare_) free += bytes;
     return free;
 }
 
@@ -187,21 +203,44 @@ int CudaFunction::resident(int threads) const {
 
 CudaQueue::CudaQueue(std::shared_ptr<const CudaDevice> device) : device_(std::move(device)) {
     device_->use();
-    device_->check(device_->driver_->stream_create(&stream_, queue_of_its_own), "has no queue left");
+    {
+        const std::lock_guard lock(device_->mutex_);
+        if (!device_->streams_.empty()) {
+            stream_ = device_->streams_.back();
+            device_->streams_.pop_back();
+        }
+    }
+    if (stream_ == nullptr)
+        device_->check(device_->driver_->stream_create(&stream_, queue_of_its_own), "has no queue left");
 }
 
 CudaQueue::~CudaQueue() {
     if (device_->driver_->context_set(device_->context_) != 0) return;
     device_->driver_->stream_wait(stream_);
-    for (const CudaDriver::Address address : memory_) device_->driver_->release(address);
-    device_->driver_->stream_destroy(stream_);
+    const std::lock_guard lock(device_->mutex_);
+    device_->streams_.push_back(stream_);
+    device_->spare_.insert(memory_.begin(), memory_.end());
 }
 
 void* CudaQueue::allocate(std::size_t bytes) {
     CudaDriver::Address address = 0;
     device_->use();
-    device_->check(device_->driver_->allocate(&address, bytes), "cannot hold the trajectories");
-    memory_.push_back(address);
+    {
+        const std::lock_guard lock(device_->mutex_);
+        if (const auto found = device_->spare_.find(bytes); found != device_->spare_.end()) {
+            address = found->second;
+            device_->spare_.erase(found);
+        }
+    }
+    if (address == 0) {
+        int result = device_->driver_->allocate(&address, bytes);
+        if (result == out_of_memory) {
+            device_->release_spare();
+            result = device_->driver_->allocate(&address, bytes);
+        }
+        device_->check(result, "cannot hold the trajectories");
+    }
+    memory_.emplace_back(bytes, address);
     return reinterpret_cast<void*>(address);
 }
 

@@ -5,7 +5,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -24,7 +26,7 @@ public:
     const std::string& name() const { return name_; }                  // "NVIDIA H200"
     const std::string& architecture() const { return architecture_; }  // "sm_90"
     int multiprocessors() const { return multiprocessors_; }
-    std::size_t free_memory() const;  // bytes
+    std::size_t free_memory() const;  // bytes, what queues left behind with them
 
 private:
     friend class CudaFunction;
@@ -38,6 +40,11 @@ private:
     void* context_ = nullptr;
     std::string name_, architecture_;
     int multiprocessors_ = 0;
+    // What queues have left, for the next ones: making it, and giving it back, holds up all that goes on on the device.
+    mutable std::mutex mutex_;
+    mutable std::multimap<std::size_t, std::uint64_t> spare_;  // memory, by bytes
+    mutable std::vector<void*> streams_;
+    void release_spare() const;
 };
 
 // A function of a cubin.
@@ -77,7 +84,7 @@ public:
 private:
     std::shared_ptr<const CudaDevice> device_;
     void* stream_ = nullptr;
-    std::vector<std::uint64_t> memory_;
+    std::vector<std::pair<std::size_t, std::uint64_t>> memory_;  // bytes, address
 };
 
 }  // namespace lobatto

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <memory>
-#include <thread>
 
 #include "runtime/run/ensemble/ended.hpp"
 
@@ -12,9 +12,13 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::int64_t most_lanes = 65536;   // fill a device of 132 multiprocessors with 15 warps each
-constexpr std::int64_t most_kept = 1 << 24;  // numbers of kept states
-constexpr std::int64_t few_lanes = 256;      // for so few no thread is worth its start
+// Of all workers together: four times what fills a device of 132 multiprocessors with 15 warps each, so that it has
+// something to do while some of them begin and end their trajectories.
+constexpr std::int64_t lanes_of_all = 1 << 18, bytes_of_all = 1 << 30;
+constexpr std::int64_t kept_of_all = 1 << 26;  // numbers of kept states
+constexpr std::int64_t most_lanes = 1 << 16;   // of a worker
+constexpr std::int64_t few_lanes = 1024;       // for so few no worker is worth its start
+constexpr std::int64_t most_workers = 16;
 
 // Memory may begin anywhere.
 void* aligned(std::vector<std::byte>& room, std::int32_t bytes, std::int32_t alignment) {
@@ -26,50 +30,60 @@ void* aligned(std::vector<std::byte>& room, std::int32_t bytes, std::int32_t ali
 
 }  // namespace
 
-std::int64_t device_room(const Kernel& kernel, const EnsembleRequest& request, std::int64_t workers) {
+DeviceShares::DeviceShares(const Kernel& kernel, const EnsembleRequest& request) {
     const lobatto_device_lanes& lanes = *request.device->host.operator->();
+    workers = std::clamp<std::int64_t>(request.count / few_lanes, 1,
+                                       std::min<std::int64_t>(thread_count(request.threads), most_workers));
     const auto bytes =
-        static_cast<std::int64_t>(lanes.words) * 8 + 20 + 8 * (kernel->parameters + 4 * kernel->coordinates);
-    const auto free = static_cast<std::int64_t>(request.device->function->device()->free_memory());
-    const std::int64_t most = std::min(
-        {most_lanes, most_kept / (rows_kept(request) * (2 + 2 * kernel->coordinates)), free / (2 * workers * bytes)});
-    const std::int64_t block = DeviceKernel::block;
-    const std::int64_t wanted = std::min(most, (request.count + workers - 1) / workers);
-    return std::max(block, (wanted + block - 1) / block * block);
+        static_cast<std::int64_t>(lanes.words) * 9 + 32 + 8 * (kernel->parameters + 4 * kernel->coordinates);
+    const auto free = static_cast<std::int64_t>(request.device->alike->device()->free_memory());
+    const std::int64_t kept = rows_kept(request) * (2 + 2 * kernel->coordinates);
+    const std::int64_t most = std::max<std::int64_t>(
+        std::min({most_lanes, lanes_of_all / workers, std::min(bytes_of_all, free / 2) / (workers * bytes),
+                  kept_of_all / ((workers + 2) * kept)}),
+        1);
+    // All take the same number of groups, of the same size.
+    const std::int64_t rounds = (request.count + workers * most - 1) / (workers * most);
+    const std::int64_t wanted = (request.count + workers * rounds - 1) / (workers * rounds);
+    room = (wanted + DeviceKernel::block - 1) / DeviceKernel::block * DeviceKernel::block;
 }
 
-DeviceTrajectories::DeviceTrajectories(const Kernel& kernel, const EnsembleRequest& request, std::int64_t room,
-                                       int threads)
+DeviceTrajectories::DeviceTrajectories(const Kernel& kernel, const EnsembleRequest& request, std::int64_t room)
     : kernel_(kernel),
       device_(request.device),
       tolerance_(request.tolerance),
       room_(room),
-      threads_(std::max(threads, 1)),
-      queue_(device_->function->device()),
+      queue_(device_->alike->device()),
       words_(static_cast<std::size_t>(device_->host->words * room)),
-      steps_(static_cast<std::size_t>(room)),
-      iterations_(static_cast<std::size_t>(room)),
-      status_(static_cast<std::size_t>(room)),
-      rooms_(static_cast<std::size_t>(threads_)) {
-    here_ = {words_.data(), room, room, 0, steps_.data(), iterations_.data(), status_.data(), {}, {}};
+      progress_(bytes_of_words(3)) {
+    const auto lanes = static_cast<std::size_t>(room);
+    steps_ = {reinterpret_cast<std::int64_t*>(progress_.data()), lanes};
+    iterations_ = {reinterpret_cast<std::int64_t*>(progress_.data() + bytes_of_words(1)), lanes};
+    status_ = {reinterpret_cast<std::int32_t*>(progress_.data() + bytes_of_words(2)), lanes};
+    energy_.resize(static_cast<std::size_t>(room * kernel_->real_bytes));
+    rows_.resize(static_cast<std::size_t>(device_->host->columns * room));
+    here_.words = words_.data();
+    here_.room = here_.lanes = room;
+    here_.steps = steps_.data();
+    here_.iterations = iterations_.data();
+    here_.status = status_.data();
+    here_.watches = request.stops ? 1 : 0;
     there_ = here_;
-    there_.words = static_cast<std::uint64_t*>(queue_.allocate(bytes_of_words(device_->host->words)));
-    there_.steps = static_cast<std::int64_t*>(queue_.allocate(bytes_of_words(1)));
-    there_.iterations = static_cast<std::int64_t*>(queue_.allocate(bytes_of_words(1)));
-    there_.status = static_cast<std::int32_t*>(queue_.allocate(bytes_of_words(1)));
+    batch_ = std::max<std::int64_t>(room / 8, DeviceKernel::block);
+    packed_.resize(static_cast<std::size_t>(device_->host->words * batch_));
+    const std::int64_t words = device_->host->words * room;
+    auto* const memory =  // the rows, the progress, the order, lanes together
+        static_cast<std::uint64_t*>(queue_.allocate(8 * (static_cast<std::size_t>(words + 4 * room) + packed_.size())));
+    there_.words = memory;
+    there_.steps = reinterpret_cast<std::int64_t*>(memory + words);
+    there_.iterations = there_.steps + room;
+    there_.status = reinterpret_cast<std::int32_t*>(there_.steps + 2 * room);
+    there_order_ = memory + words + 3 * room;
+    there_packed_ = memory + words + 4 * room;
 }
 
-template <class Use>
-void DeviceTrajectories::share(std::int64_t count, std::int64_t few, const Use& use) {
-    const std::int64_t threads = std::clamp<std::int64_t>(count / few, 1, threads_);
-    const auto part = [&](std::int64_t thread) {
-        void* const host =
-            aligned(rooms_[static_cast<std::size_t>(thread)], device_->host->host_bytes, device_->host->host_alignment);
-        use(host, count * thread / threads, count * (thread + 1) / threads);
-    };
-    std::vector<std::jthread> others;
-    for (std::int64_t thread = 1; thread < threads; ++thread) others.emplace_back(part, thread);
-    part(0);
+void* DeviceTrajectories::host() {
+    return aligned(host_, device_->host->host_bytes, device_->host->host_alignment);
 }
 
 // As the kernel has them.
@@ -83,6 +97,8 @@ DeviceTrajectories::Bytes DeviceTrajectories::numbers(const std::vector<double>&
 void DeviceTrajectories::prepare(const std::vector<double>& parameters, const std::vector<double>& step,
                                  std::int32_t*) {
     parameters_ = numbers(parameters);
+    const std::ptrdiff_t one = std::ssize(parameters_) / room_;
+    here_.alike = std::equal(parameters_.begin() + one, parameters_.end(), parameters_.begin()) ? 1 : 0;
     const Bytes h = numbers(step);
     std::memcpy(here_.step, h.data(), h.size());
 }
@@ -94,51 +110,63 @@ void DeviceTrajectories::start(double time, const std::vector<double>& q, const 
     const Bytes begin = numbers(parts), positions = numbers(q), momenta = numbers(p);
     std::memcpy(here_.start_time, begin.data(), begin.size());
     here_.target = 0;
-    share(room_, few_lanes, [&](void* host, std::int64_t first, std::int64_t last) {
-        device_->host->place(host, &here_, first, last, parameters_.data(), positions.data(), momenta.data(),
-                             tolerance_);
-    });
+    device_->host->place(host(), &here_, 0, room_, parameters_.data(), positions.data(), momenta.data(), tolerance_,
+                         energy_.data());
     const auto good = std::find(status_.begin(), status_.end(), LOBATTO_OK);
     if (good != status_.end())
         device_->host->shared(&here_, good - status_.begin(),
                               aligned(shared_, device_->host->shared_bytes, device_->host->shared_alignment));
     std::copy(status_.begin(), status_.end(), status);
     upload(true);
-    Bytes read_q(positions.size()), read_p(momenta.size());
-    read_state(read_q, read_p);
 }
 
 void DeviceTrajectories::upload(bool with_words) {
     if (with_words) queue_.upload(there_.words, here_.words, bytes_of_words(device_->host->words));
-    queue_.upload(there_.steps, here_.steps, bytes_of_words(1));
-    queue_.upload(there_.iterations, here_.iterations, bytes_of_words(1));
-    queue_.upload(there_.status, here_.status, bytes_of_words(1) / 2);
+    queue_.upload(there_.steps, progress_.data(), bytes_of_words(3));
     queue_.wait();
 }
 
+// The lanes of `order_`.
 void DeviceTrajectories::launch() {
     lobatto_device_call call = there_;
     call.target = here_.target;
+    call.most = here_.most;
+    call.alike = here_.alike;
+    if (std::ssize(order_) < room_) {
+        call.lanes = std::ssize(order_);
+        queue_.upload(there_order_, order_.data(), order_.size() * sizeof(std::int32_t));
+        call.order = static_cast<const std::int32_t*>(there_order_);
+    }
     std::copy(std::begin(here_.step), std::end(here_.step), call.step);
     std::copy(std::begin(here_.start_time), std::end(here_.start_time), call.start_time);
     void* arguments[] = {&call, aligned(shared_, device_->host->shared_bytes, device_->host->shared_alignment)};
-    queue_.launch(*device_->function, room_, DeviceKernel::block, arguments);
-    queue_.download(here_.steps, there_.steps, bytes_of_words(1));
-    queue_.download(here_.iterations, there_.iterations, bytes_of_words(1));
-    queue_.download(here_.status, there_.status, bytes_of_words(1) / 2);
+    queue_.launch(here_.alike != 0 ? *device_->alike : *device_->lanes, call.lanes, DeviceKernel::block, arguments);
+    queue_.download(progress_.data(), there_.steps, bytes_of_words(3));
 }
 
-void DeviceTrajectories::advance(const EnsembleRequest&, std::int64_t steps, std::int32_t* status,
+// Where a kernel has stops, lanes that were looked at stay behind the others until all have to arrive.
+void DeviceTrajectories::advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status,
                                  std::int64_t* steps_done, std::int64_t* iterations) {
-    const std::vector<std::int32_t> status_before = status_;
-    const std::vector<std::int64_t> steps_before = steps_, iterations_before = iterations_;
+    const std::vector<std::int64_t> steps_before(steps_.begin(), steps_.end()),
+        iterations_before(iterations_.begin(), iterations_.end());
     here_.target += steps;
-    launch();
-    std::vector<std::int64_t> failed;
-    for (std::size_t lane = 0; lane < status_.size(); ++lane)
-        if (status_before[lane] == LOBATTO_OK && status_[lane] == LOBATTO_NOT_CONVERGED)
-            failed.push_back(static_cast<std::int64_t>(lane));
-    if (!failed.empty()) retake(failed);
+    here_.most = has_stops() ? steps : std::numeric_limits<std::int64_t>::max();
+    arrives_ = here_.target == request.steps || (request.every != 0 && here_.target % request.every == 0);
+    ended_.clear();
+    do {
+        order_.clear();
+        for (std::size_t lane = 0; lane < status_.size(); ++lane)
+            if (status_[lane] == LOBATTO_OK && steps_[lane] < here_.target)
+                order_.push_back(static_cast<std::int32_t>(lane));
+        if (order_.empty()) break;
+        launch();
+        std::vector<std::int32_t> waiting;
+        for (const std::int32_t lane : order_)
+            if (const std::int32_t its = status_[static_cast<std::size_t>(lane)];
+                its == LOBATTO_NOT_CONVERGED || (has_stops() && its != LOBATTO_OK))
+                waiting.push_back(lane);
+        if (!waiting.empty()) retake(waiting);
+    } while (has_stops() && arrives_);
     for (std::size_t lane = 0; lane < status_.size(); ++lane) {
         status[lane] = status_[lane];
         steps_done[lane] = steps_[lane] - steps_before[lane];
@@ -146,34 +174,75 @@ void DeviceTrajectories::advance(const EnsembleRequest&, std::int64_t steps, std
     }
 }
 
-// The lanes whose iterations failed go on here, as those of the processor do: by Newton's iteration.
-void DeviceTrajectories::retake(const std::vector<std::int64_t>& failed) {
-    queue_.download(here_.words, there_.words, bytes_of_words(device_->host->words));
-    const auto one = static_cast<std::ptrdiff_t>(kernel_->parameters) * kernel_->real_bytes;
-    share(std::ssize(failed), 1, [&](void* host, std::int64_t first, std::int64_t last) {
-        for (std::int64_t i = first; i < last; ++i) {
-            const std::int64_t lane = failed[static_cast<std::size_t>(i)];
-            device_->host->retake(host, &here_, lane, parameters_.data() + lane * one, tolerance_);
-        }
-    });
-    upload(true);
+// The lanes whose iterations failed go on here, as those of the processor do: by Newton's iteration. So do lanes whose
+// step may hold a stop, after a look at it.
+void DeviceTrajectories::retake(const std::vector<std::int32_t>& waiting) {
+    const std::int64_t all = std::ssize(waiting);
+    for (std::int64_t first = 0; first < all; first += batch_)
+        retake(waiting.data() + first, std::min(batch_, all - first));
+    upload(false);
 }
 
-void DeviceTrajectories::read_state(Bytes& q, Bytes& p) {
-    energy_.resize(static_cast<std::size_t>(room_ * kernel_->real_bytes));
-    share(room_, few_lanes, [&](void* host, std::int64_t first, std::int64_t last) {
-        device_->host->state(host, &here_, first, last, q.data(), p.data(), energy_.data());
-    });
+void DeviceTrajectories::retake(const std::int32_t* waiting, std::int64_t count) {
+    const auto one = static_cast<std::ptrdiff_t>(kernel_->parameters) * kernel_->real_bytes;
+    const std::size_t bytes = 8 * static_cast<std::size_t>(device_->host->words * count);
+    queue_.upload(there_order_, waiting, static_cast<std::size_t>(count) * sizeof(std::int32_t));
+    move(count, false);
+    queue_.download(packed_.data(), there_packed_, bytes);
+    std::vector<std::int64_t> steps, iterations;
+    std::vector<std::int32_t> status;
+    for (std::int64_t i = 0; i < count; ++i) {
+        steps.push_back(here_.steps[waiting[i]]);
+        iterations.push_back(here_.iterations[waiting[i]]);
+        status.push_back(here_.status[waiting[i]]);
+    }
+    lobatto_device_call packed = here_;
+    packed.words = packed_.data();
+    packed.room = packed.lanes = count;
+    packed.steps = steps.data();
+    packed.iterations = iterations.data();
+    packed.status = status.data();
+    for (std::int64_t i = 0; i < count; ++i) {
+        const std::int32_t lane = waiting[i];
+        device_->host->retake(host(), &packed, i, parameters_.data() + lane * one, tolerance_, row_of(lane));
+        here_.steps[lane] = packed.steps[i];
+        here_.iterations[lane] = packed.iterations[i];
+        here_.status[lane] = packed.status[i];
+        if (packed.status[i] != LOBATTO_OK) ended_.push_back(lane);
+    }
+    queue_.upload(there_packed_, packed_.data(), bytes);
+    move(count, true);
+    queue_.wait();
+}
+
+// The lanes of the order that is on the device.
+void DeviceTrajectories::move(std::int64_t count, bool back) {
+    lobatto_device_call call = there_;
+    call.lanes = count;
+    call.order = static_cast<const std::int32_t*>(there_order_);
+    std::int64_t words = device_->host->words, goes_back = back ? 1 : 0;
+    void* arguments[] = {&call, &there_packed_, &words, &goes_back};
+    queue_.launch(*device_->move, count, DeviceKernel::block, arguments);
 }
 
 void DeviceTrajectories::state(std::vector<double>& q, std::vector<double>& p) {
-    const std::int64_t first = device_->host->first_moving, moving = device_->host->moving;
-    queue_.download(here_.words + first * room_, there_.words + first * room_, bytes_of_words(moving));
-    const auto count = static_cast<std::int64_t>(room_) * kernel_->coordinates;
-    Bytes positions(static_cast<std::size_t>(count * kernel_->real_bytes)), momenta(positions.size());
-    read_state(positions, momenta);
-    kernel_->to_parts(positions.data(), count, q.data());
-    kernel_->to_parts(momenta.data(), count, p.data());
+    if (arrives_ || !has_stops()) {
+        const std::int64_t first = device_->host->first_moving, moving = device_->host->moving;
+        queue_.download(here_.words + first * room_, there_.words + first * room_, bytes_of_words(moving));
+        const std::int64_t count = room_ * kernel_->coordinates;
+        Bytes positions(static_cast<std::size_t>(count * kernel_->real_bytes)), momenta(positions.size());
+        device_->host->state(host(), &here_, 0, room_, positions.data(), momenta.data(), energy_.data());
+        kernel_->to_parts(positions.data(), count, q.data());
+        kernel_->to_parts(momenta.data(), count, p.data());
+    }
+    if (!has_stops()) return;
+    const std::int64_t n = kernel_->coordinates;  // in double: rows: event, t, q, p, energy
+    for (const std::int32_t lane : ended_) {
+        const double* const row = row_of(lane);
+        std::copy_n(row + 2, n, q.begin() + lane * n);
+        std::copy_n(row + 2 + n, n, p.begin() + lane * n);
+        std::memcpy(energy_.data() + static_cast<std::size_t>(lane) * sizeof(double), row + 2 + 2 * n, sizeof(double));
+    }
 }
 
 void DeviceTrajectories::energy(const std::vector<double>&, const std::vector<double>&,

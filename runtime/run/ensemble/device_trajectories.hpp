@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "runtime/build/device_library.hpp"
@@ -16,19 +17,28 @@ namespace lobatto {
 // A kernel for a device.
 struct DeviceKernel {
     static constexpr int block = 64;  // threads; LOBATTO_DEVICE_BLOCK of the text
-    static constexpr const char* function_name = "lobatto_advance_lanes";
+    static constexpr const char *name_of_lanes = "lobatto_advance_lanes", *name_of_alike = "lobatto_advance_alike",
+                                *name_of_move = "lobatto_move_lanes";
 
     DeviceLibrary host;
-    std::shared_ptr<const CudaFunction> function;
+    // Of any trajectories, and of those with the same parameters, whose common numbers need no registers.
+    std::shared_ptr<const CudaFunction> lanes, alike;
+    std::shared_ptr<const CudaFunction> move;  // lanes together, for the host, and back
 };
 
-// How many trajectories of a request stand on the device at a time, for each of `workers`.
-std::int64_t device_room(const Kernel& kernel, const EnsembleRequest& request, std::int64_t workers);
+// How a request is shared: so many workers, each with a queue of its own and room for so many trajectories at a time.
+// While some begin and end theirs, the device takes the steps of others.
+struct DeviceShares {
+    std::int64_t workers = 1, room = 0;
+    DeviceShares(const Kernel& kernel, const EnsembleRequest& request);
+};
 
 class DeviceTrajectories : public Trajectories {
 public:
-    // `threads`: of the host, for what is done there.
-    DeviceTrajectories(const Kernel& kernel, const EnsembleRequest& request, std::int64_t room, int threads);
+    // Short, so that workers take turns on the device also in a sweep of a tenth of a second.
+    static constexpr double seconds_of_launch = 0.01;
+
+    DeviceTrajectories(const Kernel& kernel, const EnsembleRequest& request, std::int64_t room);
     int width() const override { return static_cast<int>(room_); }
     void prepare(const std::vector<double>& parameters, const std::vector<double>& step, std::int32_t* status) override;
     void start(double time, const std::vector<double>& q, const std::vector<double>& p, std::int32_t* status) override;
@@ -36,31 +46,41 @@ public:
                  std::int64_t* iterations) override;
     void state(std::vector<double>& q, std::vector<double>& p) override;
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
+    int stop(std::size_t lane) const override { return static_cast<int>(row_of(static_cast<std::int64_t>(lane))[0]); }
+    double stop_time(std::size_t lane) const override { return row_of(static_cast<std::int64_t>(lane))[1]; }
 
 private:
     using Bytes = std::vector<std::byte>;
-    // use(room of the host's side, first, last) in threads, each with `few` of `count` at least.
-    template <class Use>
-    void share(std::int64_t count, std::int64_t few, const Use& use);
+    void* host();  // room of the host's side
     Bytes numbers(const std::vector<double>& values) const;
-    void read_state(Bytes& q, Bytes& p);
     void upload(bool with_words);
     void launch();
-    void retake(const std::vector<std::int64_t>& failed);
+    void retake(const std::vector<std::int32_t>& waiting);
+    void retake(const std::int32_t* waiting, std::int64_t count);
+    void move(std::int64_t count, bool back);
+    bool has_stops() const { return device_->host->columns > 0; }
+    double* row_of(std::int64_t lane) { return rows_.data() + lane * device_->host->columns; }
+    const double* row_of(std::int64_t lane) const { return rows_.data() + lane * device_->host->columns; }
     std::size_t bytes_of_words(std::int64_t words) const { return static_cast<std::size_t>(8 * words * room_); }
 
     Kernel kernel_;
     std::shared_ptr<const DeviceKernel> device_;
     double tolerance_;
     std::int64_t room_;
-    int threads_;
     CudaQueue queue_;
-    std::vector<std::uint64_t> words_;  // here; those that move are up to date after read_state alone
-    std::vector<std::int64_t> steps_, iterations_;
-    std::vector<std::int32_t> status_;
+    std::vector<std::uint64_t> words_;     // here; those that move are up to date after `state` alone
+    Bytes progress_;  // of each lane its steps, then iterations, then statuses
+    std::span<std::int64_t> steps_, iterations_;
+    std::span<std::int32_t> status_;
     lobatto_device_call here_{}, there_{};  // the same, with addresses of the host and of the device
-    Bytes parameters_, shared_, energy_;
-    std::vector<Bytes> rooms_;  // of the host's side, one a thread
+    Bytes parameters_, shared_, energy_, host_;
+    void *there_order_, *there_packed_;
+    std::int64_t batch_;                 // lanes that the host takes at a time,
+    std::vector<std::uint64_t> packed_;  // their words
+    std::vector<std::int32_t> order_;    // of the lanes of a launch
+    bool arrives_ = true;                // all lanes are at the target
+    std::vector<std::int32_t> ended_;    // in the last call, with their last rows:
+    std::vector<double> rows_;
 };
 
 }  // namespace lobatto

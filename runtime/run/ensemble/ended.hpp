@@ -49,10 +49,13 @@ struct Shared {
 // How many steps go between two looks at the interruption.
 class Chunk {
 public:
+    static constexpr double usual = 0.02;
+    explicit Chunk(double seconds = usual) : wanted_(seconds) {}
     std::int64_t steps() const { return steps_; }
     void took(std::int64_t steps, double seconds);
 
 private:
+    double wanted_;
     std::int64_t steps_ = 256;
 };
 

@@ -38,9 +38,9 @@ struct Plan {
     Plan(const Kernel& kernel, const EnsembleRequest& request) {
         threads = thread_count(request.threads);
         if (request.device) {
-            // While the device takes the steps of one group, the processor prepares another.
-            threads = std::min<std::int64_t>(2, request.count > 2 * DeviceKernel::block ? threads : 1);
-            group_size = device_room(kernel, request, threads);
+            const DeviceShares shares(kernel, request);
+            threads = shares.workers;
+            group_size = shares.room;
             groups = (request.count + group_size - 1) / group_size;
             window = threads + 1;
             return;
@@ -66,9 +66,10 @@ public:
           n_(static_cast<std::size_t>(kernel->coordinates)),
           parts_(static_cast<std::size_t>(kernel->parts)),
           step_(request.whole_step.empty() ? as_parts({request.step}, parts_) : request.whole_step),
-          single_(kernel) {
+          single_(kernel),
+          chunk_(request.device ? DeviceTrajectories::seconds_of_launch : Chunk::usual) {
         if (request.device)
-            lanes_ = std::make_unique<DeviceTrajectories>(kernel, request, room, thread_count(request.threads) / 2);
+            lanes_ = std::make_unique<DeviceTrajectories>(kernel, request, room);
         else if (kernel->lanes > 0)
             lanes_ = std::make_unique<LaneTrajectories>(kernel);
         else if (kernel->real_kind != LOBATTO_DOUBLE)
@@ -149,7 +150,7 @@ private:
     }
 
     void keep(std::size_t lane, Ended& ended) const {
-        ended.keep(request_, ended.stop >= 0 ? lanes_->stop_time() : time_after(request_, ended.steps_done),
+        ended.keep(request_, ended.stop >= 0 ? lanes_->stop_time(lane) : time_after(request_, ended.steps_done),
                    q_.data() + lane * n_ * parts_, p_.data() + lane * n_ * parts_, n_, energy_.data() + lane * parts_,
                    parts_);
     }
@@ -187,7 +188,8 @@ private:
         lanes_->advance(request_, steps, status_.data(), steps_done_.data(), iterations_.data());
         const bool kept_here = next == request_.steps || (request_.every != 0 && next % request_.every == 0);
         bool reads = kept_here;
-        for (std::size_t lane = 0; lane < ended.size(); ++lane) reads = reads || status_[lane] != ended[lane].status;
+        for (std::size_t lane = 0; lane < ended.size(); ++lane)
+            reads = reads || (ended[lane].goes_on() && status_[lane] != ended[lane].status);
         if (reads) {
             lanes_->state(q_, p_);
             lanes_->energy(q_, p_, energy_);
@@ -198,7 +200,7 @@ private:
             trajectory.status = static_cast<lobatto_status>(status_[lane]);
             if (trajectory.status == LOBATTO_STOPPED) {
                 trajectory.status = LOBATTO_OK;
-                trajectory.stop = lanes_->stop();
+                trajectory.stop = lanes_->stop(lane);
             }
             trajectory.steps_done += steps_done_[lane];
             trajectory.iterations += iterations_[lane];
@@ -243,11 +245,19 @@ public:
         return closed_ || group >= groups_ ? std::nullopt : std::optional(group);
     }
     void put(std::int64_t number, EndedTogether&& group) {
+        std::optional<EndedTogether> spent;
         {
             const std::lock_guard lock(mutex_);
             slot(number) = std::move(group);
+            spent.swap(spent_);
         }
         news_.notify_one();
+    }
+    // The caller's: a group that it has done with. A worker frees it, which takes as long as handing it over, unless
+    // one is waiting for that.
+    void give_back(EndedTogether&& group) {
+        const std::lock_guard lock(mutex_);
+        if (!spent_) spent_ = std::move(group);
     }
     void fail(std::exception_ptr error) {
         {
@@ -293,6 +303,7 @@ private:
     std::mutex mutex_;
     std::condition_variable room_, news_;
     std::vector<std::optional<EndedTogether>> slots_;
+    std::optional<EndedTogether> spent_;
     std::int64_t handed_over_ = 0;
     std::exception_ptr error_;
     bool closed_ = false;
@@ -337,7 +348,7 @@ double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
     const Plan plan(kernel, request);
     const double rows = static_cast<double>(rows_kept(request)) * static_cast<double>(plan.group_size);
     const int parts = kernel->parts > 1 ? 1 + kernel->parts : 1;
-    return sizeof(double) * parts * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 1);
+    return sizeof(double) * parts * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 2);
 }
 
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
@@ -389,7 +400,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
         request.progress(shared.steps_gone);
     };
     for (std::int64_t number = 0; number < plan.groups && !result.interrupted; ++number) {
-        const EndedTogether group = window.next(meanwhile);
+        EndedTogether group = window.next(meanwhile);
         result.processor_seconds += group.processor_seconds;
         for (const Ended& ended : group.trajectories) {
             const EnsembleTrajectory trajectory = view(request.first + result.trajectories, ended);
@@ -399,6 +410,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
             result.iterations += trajectory.iterations;
             if (request.sink) request.sink(trajectory);
         }
+        window.give_back(std::move(group));
         result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);
         meanwhile();
     }

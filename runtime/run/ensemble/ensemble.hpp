@@ -75,7 +75,7 @@ struct EnsembleRequest {
     std::int64_t every = 0;                                 // keep every such state; 0: the last one alone
     bool stops = false;                                     // the kernel's stops end trajectories
     std::function<std::unique_ptr<Reducer>()> reducer;      // one a thread; nothing: none. Of kernels without lanes
-    std::shared_ptr<const DeviceKernel> device;             // takes the steps; nothing: the processor. Without stops,
+    std::shared_ptr<const DeviceKernel> device;             // takes the steps; nothing: the processor. Without
                                                             // reducer and clock
     int threads = 0;                                        // that compute; 0: as many as the machine runs at once
     std::function<void(const EnsembleTrajectory&)> sink;    // in the order of the indices, in the thread of the caller

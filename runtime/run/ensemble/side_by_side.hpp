@@ -2,7 +2,7 @@
 // Trajectories of an ensemble that take their steps together: in the lanes of a kernel, or a single one.
 //
 // All arrays are lane-major, status is one a lane (abi.h); numbers are sums of doubles, `parts` each (NumberStepper),
-// which is one double in lanes. Stops and reductions are of single trajectories.
+// which is one double in lanes. Stops are of single trajectories and of those on a device, reductions of single ones.
 #pragma once
 
 #include <memory>
@@ -29,8 +29,8 @@ public:
     virtual void energy(const std::vector<double>& q, const std::vector<double>& p,
                         std::vector<double>& energy) const = 0;
     // Of a trajectory that was stopped: by which event, and when.
-    virtual int stop() const { return -1; }
-    virtual double stop_time() const { return 0; }
+    virtual int stop(std::size_t) const { return -1; }
+    virtual double stop_time(std::size_t) const { return 0; }
     // From the start on everything is handed to the reducer; its values.
     virtual void reduce(const EnsembleStart&) {}
     virtual std::vector<double> reduced() { return {}; }
@@ -46,8 +46,8 @@ public:
                  std::int64_t* iterations) override;
     void state(std::vector<double>& q, std::vector<double>& p) override;
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
-    int stop() const override { return stop_; }
-    double stop_time() const override { return time_; }
+    int stop(std::size_t) const override { return stop_; }
+    double stop_time(std::size_t) const override { return time_; }
     void reduce(const EnsembleStart& start) override;
     std::vector<double> reduced() override { return reducer_->values(); }
 
@@ -73,8 +73,8 @@ public:
                  std::int64_t* iterations) override;
     void state(std::vector<double>& q, std::vector<double>& p) override;
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
-    int stop() const override { return stop_; }
-    double stop_time() const override { return time_[0]; }
+    int stop(std::size_t) const override { return stop_; }
+    double stop_time(std::size_t) const override { return time_[0]; }
 
 private:
     NumberStepper stepper_;

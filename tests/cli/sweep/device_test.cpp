@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include <filesystem>
+#include <sstream>
 
 #include "runtime/build/cuda_compiler.hpp"
 #include "tests/cli/sweep/tables.hpp"
@@ -48,8 +49,9 @@ std::string scene_file(const std::string& name) {
     return LOBATTO_SOURCE_DIR "/scenes/" + name + ".toml";
 }
 
-// The table of one sweep on the device has the bytes of that on the processor. What is said of failures agrees too.
-void check_same_bytes(const std::string& scene, const std::vector<std::string>& words, int exit_code = 0) {
+// The table of one sweep on the device has the bytes of that on the processor: these. What is said of failures agrees
+// too.
+std::string check_same_bytes(const std::string& scene, const std::vector<std::string>& words, int exit_code = 0) {
     CAPTURE(scene);
     CAPTURE(fmt::format("{}", fmt::join(words, " ")));
     const test::SweepFolder place;
@@ -63,6 +65,33 @@ void check_same_bytes(const std::string& scene, const std::vector<std::string>& 
     CHECK(test::read_file(place.file("cpu.csv")) == test::read_file(place.file("cuda.csv")));
     const auto before_path = [&](const std::string& text) { return text.substr(0, text.find("What was computed")); };
     CHECK(before_path(ends[0].err) == before_path(ends[1].err));
+    return test::read_file(place.file("cuda.csv"));
+}
+
+// A scene of ours that stops there.
+std::string stopped_scene(const test::SweepFolder& place, const std::string& name, const std::string& stop) {
+    std::string text = test::read_file(scene_file(name));
+    const std::string run = "[run]\n";
+    text.insert(text.find(run) + run.size(), "stop = " + stop + "\n");
+    test::write_text(place.file(name + ".toml"), text);
+    return place.file(name + ".toml");
+}
+
+// How many rows have something but 0 in the column `stop`.
+int stopped_rows(const std::string& table) {
+    std::istringstream lines(table);
+    int column = -1, count = 0;
+    for (std::string line; std::getline(lines, line);) {
+        if (line.empty() || line[0] == '#') continue;
+        std::istringstream fields(line);
+        std::string field;
+        for (int i = 0; std::getline(fields, field, ','); ++i)
+            if (column < 0 && field == "stop")
+                column = i;
+            else if (i == column && field != "0" && field != "stop")
+                ++count;
+    }
+    return count;
 }
 
 }  // namespace
@@ -71,6 +100,9 @@ TEST_SUITE("slow") {
     TEST_CASE("states of all forms on the device have the bits of the processor's lanes after 200 steps") {
         const FakeDevice device;
         check_same_bytes(pendulum_file, {"--vary", "q=0.1:3:300", "--vary", "omega=1,2", "--steps", "200"});
+        // Several workers, each with a queue of its own, and groups that are handed over in order.
+        check_same_bytes(pendulum_file,
+                         {"--vary", "q=0.1:3:4500", "--steps", "40", "--unmeasured", "--threads", "4"});
         check_same_bytes(scene_file("kepler"), {"--vary", "y'=1.5:2.2:70", "--steps", "200", "--unmeasured"});
         check_same_bytes(scene_file("double_pendulum"), {"--vary", "a=0.1:3:70", "--steps", "200", "--unmeasured"});
         check_same_bytes(scene_file("harmonic_oscillator"),
@@ -93,6 +125,27 @@ TEST_SUITE("slow") {
                          {"--vary", "a=0.1:3:70", "--step", "0.3", "--steps", "200", "--unmeasured"}, 3);
         check_same_bytes(scene_file("kepler"),
                          {"--vary", "y'=0.1:2.2:70", "--step", "0.1", "--steps", "200", "--unmeasured"}, 3);
+    }
+
+    TEST_CASE("trajectories that end at a stop on the device are those of the processor, in all forms") {
+        const FakeDevice device;
+        const test::SweepFolder place;
+        const std::vector<std::string> map{"--vary",  "a=-3:3:12", "--vary",           "b=-3:3:12",
+                                           "--until", "40",        "--beyond-horizon", "--unmeasured"};
+        CHECK(stopped_rows(check_same_bytes(scene_file("flips"), map)) > 50);
+        // With a companion, which does not stop, and parameters that differ.
+        const std::string pendulum = stopped_scene(place, "pendulum", R"(["q = -1", "q' = 4"])");
+        CHECK(stopped_rows(
+                  check_same_bytes(pendulum, {"--vary", "q=0.5:2.9:20", "--vary", "omega=1,2", "--until", "20"})) > 20);
+        CHECK(stopped_rows(check_same_bytes(
+                  pendulum, {"--vary", "q=0.5:2.9:70", "--until", "8", "--every", "7", "--unmeasured"})) > 20);
+        const std::string star = stopped_scene(place, "henon_heiles", R"("x = 0.25")");
+        CHECK(stopped_rows(check_same_bytes(star, {"--splitting", "6", "--random", "70", "--draw",
+                                                   "y ~ uniform(-0.3, 0.3)", "--steps", "300"})) > 5);
+        // Steps that the processor takes by Newton's iteration, some of which fail, between stops.
+        const std::string failing = stopped_scene(place, "double_pendulum", R"(["b = pi", "b = -pi"])");
+        CHECK(stopped_rows(check_same_bytes(
+                  failing, {"--vary", "a=0.1:3:70", "--step", "0.3", "--steps", "200", "--unmeasured"})) > 5);
     }
 
     TEST_CASE("a device that is lost ends the sweep, its finished rows stay, and --resume goes on to the same bytes") {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <initializer_list>
 
 #include "runtime/kernel/abi.h"
@@ -23,6 +24,13 @@ long number(const char* name, long otherwise) {
     const char* const text = std::getenv(name);
     return text == nullptr ? otherwise : std::atol(text);
 }
+// A function of a "cubin": lanes move together and back, or advance, those that have the same parameters or any.
+struct Function {
+    const lobatto_device_lanes* (*table)();
+    bool is_alike, is_move;
+};
+std::deque<Function> functions;
+
 template <class T>
 T* here(T* there) {
     return reinterpret_cast<T*>(reinterpret_cast<std::uint64_t>(there) & ~on_device);
@@ -99,9 +107,13 @@ int cuModuleUnload(void* module) {
     return 0;
 }
 int cuModuleGetFunction(void** function, void* module, const char* name) {
-    if (std::strcmp(name, "lobatto_advance_lanes") != 0) return 500;
-    *function = ::dlsym(module, "lobatto_device_lanes_table");
-    return *function == nullptr ? 500 : 0;
+    const bool is_alike = std::strcmp(name, "lobatto_advance_alike") == 0,
+               is_move = std::strcmp(name, "lobatto_move_lanes") == 0;
+    void* const table = ::dlsym(module, "lobatto_device_lanes_table");
+    if (table == nullptr || (!is_alike && !is_move && std::strcmp(name, "lobatto_advance_lanes") != 0)) return 500;
+    functions.push_back({reinterpret_cast<const lobatto_device_lanes* (*)()>(table), is_alike, is_move});
+    *function = &functions.back();
+    return 0;
 }
 int cuFuncGetAttribute(int* value, int, void*) {
     *value = 128;
@@ -123,8 +135,9 @@ int cuStreamSynchronize(void*) {
 }
 int cuLaunchKernel(void* function, unsigned blocks, unsigned, unsigned, unsigned threads, unsigned, unsigned, unsigned,
                    void*, void** arguments, void**) {
-    if (++launches == number("FAKE_CUDA_LOST", 0)) return 719;
+    const auto& chosen = *static_cast<const Function*>(function);
     lobatto_device_call call = *static_cast<lobatto_device_call*>(arguments[0]);
+    if (!chosen.is_move && ++launches == number("FAKE_CUDA_LOST", 0)) return 719;
     if (static_cast<std::int64_t>(blocks) * threads < call.lanes) return 1;
     for (const void* pointer : {static_cast<const void*>(call.words), static_cast<const void*>(call.steps),
                                 static_cast<const void*>(call.iterations), static_cast<const void*>(call.status)})
@@ -133,7 +146,20 @@ int cuLaunchKernel(void* function, unsigned blocks, unsigned, unsigned, unsigned
     call.steps = here(call.steps);
     call.iterations = here(call.iterations);
     call.status = here(call.status);
-    reinterpret_cast<const lobatto_device_lanes* (*)()>(function)()->advance(&call, arguments[1], 0, call.lanes);
+    if (call.order != nullptr) call.order = here(call.order);
+    if (chosen.is_move) {
+        std::uint64_t* const packed = here(*static_cast<std::uint64_t**>(arguments[1]));
+        const std::int64_t words = *static_cast<std::int64_t*>(arguments[2]);
+        for (std::int64_t word = 0; word < words; ++word)
+            for (std::int64_t i = 0; i < call.lanes; ++i) {
+                std::uint64_t &row = call.words[word * call.room + call.order[i]],
+                              &other = packed[word * call.lanes + i];
+                *static_cast<std::int64_t*>(arguments[3]) != 0 ? row = other : other = row;
+            }
+        return 0;
+    }
+    if ((call.alike != 0) != chosen.is_alike) return 1;
+    chosen.table()->advance(&call, arguments[1], 0, call.lanes);
     return 0;
 }
 int cuGetErrorName(int error, const char** text) {
