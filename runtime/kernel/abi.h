@@ -92,8 +92,8 @@ typedef struct lobatto_refilled_advance {
     void* events;     /* room for rows as of lobatto_advance, event_capacity a lane; null: none are sought */
     int64_t event_capacity; /* at least events_of_step */
     /* Of kernels with a clock, as of lobatto_advance: `steps` is the number of the arrival with which a lane ends, and
-     * rows are of arrivals: of those whose number is a multiple of record_every (0: of none), of the one at the end, and
-     * of the last before a failure. No events are sought. */
+     * rows are of arrivals: of those whose number is a multiple of record_every (0: of none), of the one at the end,
+     * and of the last before a failure. No events are sought. */
     int64_t record_every;
     double interval, end;
     /* in and out */
@@ -195,8 +195,9 @@ typedef struct lobatto_kernel {
     void (*ensemble_energy)(const void* ensemble, void* energy); /* H, one a lane; null without energy */
 
     /* In a library for trajectories that end at times of their own or are looked at after every step, and with a clock,
-     * instead of the five functions above: a lane takes a trajectory when the one before has ended. refilled_prepare is the first
-     * call; a lane that was never filled has no status LOBATTO_OK. refilled_advance returns when a lane has ended. */
+     * instead of the five functions above: a lane takes a trajectory when the one before has ended. refilled_prepare is
+     * the first call; a lane that was never filled has no status LOBATTO_OK. refilled_advance returns when a lane has
+     * ended. */
     void (*refilled_prepare)(void* ensemble, const void* step);
     int32_t (*refilled_fill)(void* ensemble, int32_t lane, const void* parameters, const void* time, const void* q,
                              const void* p);
