@@ -73,6 +73,7 @@ void check_numbers(const Scene& scene) {
 
 void StudyTimes::add(const StudyTimes& more) {
     interrupted = interrupted || more.interrupted;
+    trajectories += more.trajectories;
     steps_done += more.steps_done;
     processor_seconds += more.processor_seconds;
     seconds += more.seconds;
@@ -246,8 +247,8 @@ StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink
         const EnsembleResult result = integrate(*current_->kernel, request);
         steps_gone += request.count * request.steps;
         first += request.count;
-        times.add({result.interrupted, result.steps_done, result.processor_seconds, result.seconds, result.threads,
-                   (*current_->kernel)->lanes == 0 && !device_ ? 0 : result.lanes});
+        times.add({result.interrupted, result.trajectories, result.steps_done, result.processor_seconds, result.seconds,
+                   result.threads, (*current_->kernel)->lanes == 0 && !device_ ? 0 : result.lanes});
     }
     return times;
 }

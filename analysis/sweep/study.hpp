@@ -35,7 +35,7 @@ struct StudyOptions {
 // What it took to compute trajectories.
 struct StudyTimes {
     bool interrupted = false;
-    std::int64_t steps_done = 0;
+    std::int64_t trajectories = 0, steps_done = 0;
     double processor_seconds = 0, seconds = 0;
     int threads = 0, lanes = 0;
     void add(const StudyTimes& more);

@@ -86,8 +86,8 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
         print_row("threads",
                   fmt::format("{}, {} each", times.threads,
                               times.lanes == 0 ? "one trajectory at a time" : counted(times.lanes, "lane", "lanes")));
-    if (scene.clock && tally.trajectories() > 0) {
-        const auto count = static_cast<double>(tally.trajectories());
+    if (scene.clock && times.steps_done > 0) {
+        const auto count = static_cast<double>(times.trajectories);
         print_row("time", duration(times.processor_seconds / count) + " of a processor, for one trajectory");
     } else if (times.steps_done > 0) {
         const auto steps = static_cast<double>(times.steps_done);

@@ -20,7 +20,8 @@ struct ClockedEnsemble : Ensemble<K, width> {
         Base::step_size, Base::steps;
     using typename Base::real, typename Base::T, typename Base::ActiveMask;
     static constexpr int columns = 1 + 2 * n;
-    static constexpr std::int64_t most_steps = 4096;  // of the chain in one call
+    static constexpr std::int64_t most_steps = 4096;     // of the chain in one call
+    static constexpr std::int64_t most_skipped = 65536;  // times that lanes leave arrivals nobody asks for, likewise
     // To shorten a step takes about as long as two steps, for one lane as for all. So lanes wait for each other.
     static constexpr int most_waited = 2 * width;
 
@@ -76,13 +77,19 @@ struct ClockedEnsemble : Ensemble<K, width> {
             status[lane] = why;
             active.set(lane, false);
             has_left = true;
-            if (arrived[lane] > recorded[lane]) arrive_alone(call, lane, passed, q_passed, p_passed, arrived[lane]);
+            if (arrived[lane] > recorded[lane] &&
+                arrive_alone(call, lane, passed, q_passed, p_passed, arrived[lane]) != Status::ok)
+                arrived[lane] = recorded[lane];  // the last good row
         };
         int waited = 0;  // steps, of all lanes together
         T gone = T(real(0));
-        for (std::int64_t taken = 0; any(active) && !has_left && taken < most_steps;) {
+        for (std::int64_t taken = 0, skipped = 0;
+             any(active) && !has_left && taken < most_steps && skipped < most_skipped;) {
             ActiveMask arriving = active & !is_ahead(now.until(target));
-            if (any(arriving) && skip(call, arriving)) continue;
+            if (any(arriving) && skip(call, arriving)) {
+                ++skipped;
+                continue;
+            }
             const ActiveMask moving = active & !arriving;
             if (any(arriving) && (!any(moving) || waited >= most_waited)) {
                 has_left = arrive(call, arriving, leave) || has_left;

@@ -43,7 +43,7 @@ DeviceShares::DeviceShares(const Kernel& kernel, const EnsembleRequest& request)
                   kept_of_all / ((workers + 2) * kept)}),
         1);
     // All take the same number of groups, of the same size.
-    const std::int64_t rounds = (request.count + workers * most - 1) / (workers * most);
+    const std::int64_t rounds = std::max<std::int64_t>(1, (request.count + workers * most - 1) / (workers * most));
     const std::int64_t wanted = (request.count + workers * rounds - 1) / (workers * rounds);
     room = (wanted + DeviceKernel::block - 1) / DeviceKernel::block * DeviceKernel::block;
 }

@@ -18,7 +18,7 @@
 
 namespace lobatto {
 
-struct DeviceKernel;  // runtime/run/device_trajectories.hpp
+struct DeviceKernel;  // runtime/run/ensemble/device_trajectories.hpp
 
 // Where a trajectory begins.
 struct EnsembleStart {

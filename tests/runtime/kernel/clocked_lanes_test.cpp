@@ -138,7 +138,8 @@ TEST_CASE("a trajectory with a clock in a lane arrives at the times at which it 
         CHECK(lanes->lanes > 1);
         double worst = 0;
         // Arrivals after several steps, and several in each step; more of them than there is room for in a call.
-        for (const auto& [steps, every] : {std::pair{5, 0}, {61, 13}, {700, 1}}) {
+        for (const auto& asked : {std::pair{5, 0}, {61, 13}, {700, 1}}) {
+            const int steps = asked.first, every = asked.second;
             CAPTURE(steps);
             const auto reference = shown(one, request_of(motion, 0, 21, steps, every)),
                        found = shown(lanes, request_of(motion, 0, 21, steps, every));
