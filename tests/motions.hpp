@@ -4,11 +4,15 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "analysis/kernel/kernel_of.hpp"
 #include "runtime/build/library.hpp"
+#include "runtime/run/ensemble/ensemble.hpp"
 #include "tests/scenes/scenes.hpp"
 
 namespace lobatto::test {
@@ -156,6 +160,29 @@ LoadedStepper<real> started(const Kernel& kernel, const Motion& motion, double s
     const auto q = converted<real>(motion.q);
     REQUIRE(stepper.start(0, q, stepper.momentum(0, q, converted<real>(motion.v))) == LOBATTO_OK);
     return stepper;
+}
+
+// The starts of an ensemble around one: parameters vary by 2 %, positions by of_q, velocities by of_rate at most.
+inline EnsembleStart start_around(const std::vector<double>& parameters, const std::vector<double>& q,
+                                  const std::vector<double>& v, std::int64_t index, double of_q, double of_rate) {
+    const auto i = static_cast<double>(index);
+    EnsembleStart start{parameters, q, v};
+    for (std::size_t k = 0; k < parameters.size(); ++k) start.parameters[k] *= 1 + 0.02 * std::sin(i + double(k));
+    for (std::size_t k = 0; k < q.size(); ++k) start.q[k] += of_q * std::cos(3 * i + double(k));
+    for (std::size_t k = 0; k < q.size(); ++k) start.rate[k] += of_rate * std::sin(2 * i + double(k));
+    return start;
+}
+
+// The largest difference relative to the largest number of b, in units of epsilon; of numbers `first` and after.
+inline double distance_in_epsilon(const std::vector<double>& a, const std::vector<double>& b, std::size_t first = 0) {
+    REQUIRE(a.size() == b.size());
+    double most = 0, size = 0;
+    for (std::size_t i = first; i < a.size(); ++i) {
+        if (std::isnan(a[i] - b[i])) return HUGE_VAL;
+        most = std::fmax(most, std::fabs(a[i] - b[i]));
+        size = std::fmax(size, std::fabs(b[i]));
+    }
+    return most == 0 ? 0 : most / size / std::numeric_limits<double>::epsilon();
 }
 
 }  // namespace lobatto::test

@@ -101,7 +101,7 @@ typedef struct lobatto_refilled_advance {
                         done */
     /* out */
     int64_t *steps_done, *iterations, *events_written;
-    int64_t *records_written, *chain_steps; /* with a clock; elsewhere each step has a row */
+    int64_t *records_written, *chain_steps; /* with a clock (else each step has a row); the latter may be null */
 } lobatto_refilled_advance;
 
 typedef struct lobatto_kernel {

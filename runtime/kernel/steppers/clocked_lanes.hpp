@@ -104,7 +104,7 @@ struct ClockedEnsemble : Ensemble<K, width> {
         for (int lane = 0; lane < width; ++lane) {
             call.steps_done[lane] += arrived[lane];
             call.iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
-            call.chain_steps[lane] = static_cast<std::int64_t>(gone[lane]);
+            if (call.chain_steps != nullptr) call.chain_steps[lane] = static_cast<std::int64_t>(gone[lane]);
         }
     }
 

@@ -68,8 +68,8 @@ private:
     double tolerance_;
     std::int64_t room_;
     CudaQueue queue_;
-    std::vector<std::uint64_t> words_;     // here; those that move are up to date after `state` alone
-    Bytes progress_;  // of each lane its steps, then iterations, then statuses
+    std::vector<std::uint64_t> words_;  // here; those that move are up to date after `state` alone
+    Bytes progress_;                    // of each lane its steps, then iterations, then statuses
     std::span<std::int64_t> steps_, iterations_;
     std::span<std::int32_t> status_;
     lobatto_device_call here_{}, there_{};  // the same, with addresses of the host and of the device

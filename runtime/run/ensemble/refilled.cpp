@@ -40,7 +40,6 @@ RefilledLanes::RefilledLanes(const Kernel& kernel, const EnsembleRequest& reques
     iterations_.resize(width);
     events_written_.resize(width);
     records_written_.resize(width);
-    chain_steps_.resize(width);
     kernel->refilled_prepare(memory_.get(), &request.step);
 }
 
@@ -130,7 +129,6 @@ void RefilledLanes::advance(std::vector<Ended>& group) {
     call.iterations = iterations_.data();
     call.events_written = events_written_.data();
     call.records_written = records_written_.data();
-    call.chain_steps = chain_steps_.data();
     kernel_->refilled_advance(memory_.get(), &call);
     std::int64_t most = 0;
     for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {

@@ -50,7 +50,7 @@ private:
     EnsembleStart start_;
     std::vector<double> records_, events_;
     std::vector<std::int32_t> status_;
-    std::vector<std::int64_t> steps_done_, iterations_, events_written_, records_written_, chain_steps_;
+    std::vector<std::int64_t> steps_done_, iterations_, events_written_, records_written_;
     Chunk chunk_;
 };
 

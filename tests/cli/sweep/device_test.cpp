@@ -101,8 +101,7 @@ TEST_SUITE("slow") {
         const FakeDevice device;
         check_same_bytes(pendulum_file, {"--vary", "q=0.1:3:300", "--vary", "omega=1,2", "--steps", "200"});
         // Several workers, each with a queue of its own, and groups that are handed over in order.
-        check_same_bytes(pendulum_file,
-                         {"--vary", "q=0.1:3:4500", "--steps", "40", "--unmeasured", "--threads", "4"});
+        check_same_bytes(pendulum_file, {"--vary", "q=0.1:3:4500", "--steps", "40", "--unmeasured", "--threads", "4"});
         check_same_bytes(scene_file("kepler"), {"--vary", "y'=1.5:2.2:70", "--steps", "200", "--unmeasured"});
         check_same_bytes(scene_file("double_pendulum"), {"--vary", "a=0.1:3:70", "--steps", "200", "--unmeasured"});
         check_same_bytes(scene_file("harmonic_oscillator"),

@@ -65,28 +65,15 @@ std::vector<double> alone(const Kernel& kernel, const TestMotion& motion, std::i
     return all;
 }
 
-// Starts around the motion's own; parameters too, each a little different.
 Starts around(const TestMotion& motion) {
     return [&motion](std::int64_t index, EnsembleStart& start) {
-        const auto i = static_cast<double>(index);
-        start = {motion.parameters, motion.q, motion.v};
-        for (std::size_t k = 0; k < start.parameters.size(); ++k)
-            start.parameters[k] *= 1 + 0.02 * std::sin(i + double(k));
-        for (std::size_t k = 0; k < start.q.size(); ++k) start.q[k] += 0.05 * std::cos(3 * i + double(k));
-        for (std::size_t k = 0; k < start.q.size(); ++k) start.rate[k] += 0.05 * std::sin(2 * i + double(k));
+        start = start_around(motion.parameters, motion.q, motion.v, index, 0.05, 0.05);
     };
 }
 
-// The largest difference relative to the largest number, in units of epsilon.
+// Of t, q, p: of states alone.
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
-    REQUIRE(a.size() == b.size());
-    double most = 0, size = 0;
-    for (std::size_t i = 1; i < a.size(); ++i) {
-        if (std::isnan(a[i] - b[i])) return HUGE_VAL;
-        most = std::fmax(most, std::fabs(a[i] - b[i]));
-        size = std::fmax(size, std::fabs(b[i]));
-    }
-    return most / size / 2.220446049250313e-16;
+    return distance_in_epsilon(a, b, 1);
 }
 
 struct InLanes {

@@ -64,21 +64,16 @@ Derivation derivation_of(const Watched& watched) {
                                              "]\n[output]\nenergy = true\nevents = [" + watched.events + "]\n")));
 }
 
-// Starts around the motion's own, of different energy; parameters too.
-void start_of(const Watched& watched, std::int64_t index, EnsembleStart& start) {
+EnsembleStart start_of(const Watched& watched, std::int64_t index) {
     const TestMotion& motion = watched.motion;
-    const auto i = static_cast<double>(index);
-    start = {motion.parameters, motion.q, motion.v};
-    for (std::size_t k = 0; k < start.parameters.size(); ++k) start.parameters[k] *= 1 + 0.02 * std::sin(i + double(k));
-    for (std::size_t k = 0; k < start.q.size(); ++k) start.q[k] += 0.1 * std::cos(3 * i + double(k));
-    for (std::size_t k = 0; k < start.q.size(); ++k) start.rate[k] += watched.kick * std::sin(2 * i + double(k));
+    return start_around(motion.parameters, motion.q, motion.v, index, 0.1, watched.kick);
 }
 
 EnsembleRequest request_of(const Watched& watched, std::int64_t first, std::int64_t count, std::int64_t every = 0) {
     EnsembleRequest request;
     request.first = first;
     request.count = count;
-    request.start = [&watched](std::int64_t index, EnsembleStart& start) { start_of(watched, index, start); };
+    request.start = [&watched](std::int64_t index, EnsembleStart& start) { start = start_of(watched, index); };
     request.from_velocities = true;
     request.time = 0.5;
     request.step = watched.motion.step;
@@ -104,17 +99,6 @@ std::vector<Shown> shown(const Kernel& kernel, EnsembleRequest request) {
     };
     integrate(kernel, request);
     return all;
-}
-
-double distance(const std::vector<double>& a, const std::vector<double>& b) {
-    REQUIRE(a.size() == b.size());
-    double most = 0, size = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        if (std::isnan(a[i] - b[i])) return HUGE_VAL;
-        most = std::fmax(most, std::fabs(a[i] - b[i]));
-        size = std::fmax(size, std::fabs(b[i]));
-    }
-    return size == 0 ? most : most / size / std::numeric_limits<double>::epsilon();
 }
 
 const std::string turns = "\"q = 3\", \"q = -3\"", splitting = "family = \"splitting\"\nstages = ";
@@ -169,7 +153,7 @@ TEST_CASE("a trajectory in a refilled lane meets what it meets alone, when and w
             stopped += found[i].stop >= 0 ? 1 : 0;
             for (const auto part : {&Shown::rows, &Shown::energies, &Shown::recorded}) {
                 REQUIRE((found[i].*part).size() == (reference[i].*part).size());
-                worst = std::fmax(worst, distance(found[i].*part, reference[i].*part));
+                worst = std::fmax(worst, distance_in_epsilon(found[i].*part, reference[i].*part));
             }
         }
         CHECK(worst <= watched.bound);
@@ -205,7 +189,7 @@ TEST_CASE("a trajectory that fails stands beside others that are stopped, and ch
     const Kernel one = alone(watched), lanes = refilled(watched);
     EnsembleRequest request = request_of(watched, 0, 60);
     request.start = [&](std::int64_t index, EnsembleStart& start) {
-        start_of(watched, index, start);
+        start = start_of(watched, index);
         if (index == 5) start.q[0] = std::nan("");
         if (index == 9) start.rate[1] = std::numeric_limits<double>::infinity();
     };
