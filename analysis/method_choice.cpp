@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "generator/formula/source.hpp"
+#include "generator/mechanics/clock/automatic_clock.hpp"
 
 namespace lobatto {
 
@@ -26,9 +27,24 @@ void check_choice(const MethodChoice& choice) {
         throw InputError("unknown numbers; there are " + precision_list());
     if (choice.arithmetic && *choice.arithmetic != "clean" && *choice.arithmetic != "plain")
         throw InputError(fmt::format("unknown arithmetic '{}'; there are \"plain\" and \"clean\"", *choice.arithmetic));
+    if (choice.clock && *choice.clock != "none" && *choice.clock != "auto")
+        throw InputError(
+            fmt::format("unknown clock '{}'; there are \"none\", which means equal steps, and \"auto\"; a formula is "
+                        "written into the scene, as `clock` under [method]",
+                        *choice.clock));
     if (!choice.tolerance) return;
     const std::string complaint = tolerance_complaint(*choice.tolerance, fmt::format("{}", *choice.tolerance));
     if (!complaint.empty()) throw InputError(complaint);
+}
+
+Scene with_clock(const std::string& word, Scene scene) {
+    if (word == "none") return with_equal_steps(std::move(scene));
+    const bool has_own = scene.clock && scene.clock->is_automatic;
+    if (!has_own && (!scene.inputs().empty() || !has_automatic_clock(scene)))
+        throw InputError(scene.path +
+                         ": there is no clock \"auto\": it needs a motion that keeps its energy, without constraints, "
+                         "impacts and inputs, and a term of the Lagrangian that grows without bound, such as 1/r");
+    return with_automatic_clock(std::move(scene));
 }
 
 }  // namespace
@@ -45,6 +61,7 @@ void MethodChoice::apply(Scene& scene) const {
     if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
     if (numbers) method.numbers = *precision_of(*numbers);
     need_digits_for(method.numbers);
+    if (clock) scene = with_clock(*clock, std::move(scene));
     if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
     if (tolerance) {
         if (method.arithmetic == StepArithmetic::clean)

@@ -35,6 +35,7 @@ void lobatto_choice::show_settings() {
     settings.tolerance = found.tolerance.value_or(0);
     settings.arithmetic = word(found.arithmetic);
     settings.numbers = word(found.numbers);
+    settings.clock = word(found.clock);
     settings.step = word(found.step);
     settings.until = word(found.until);
     settings.every = found.every.value_or(0);

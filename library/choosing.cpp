@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The cheapest method and step that keep a promise, for run() and compile(); and what is proved of a scene.
+// What accuracy costs, the cheapest method and step that keep a promise, and what is proved of a scene.
 #include <fmt/format.h>
 
+#include "analysis/tradeoff/exploration.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
 #include "library/whole.hpp"
 #include "runtime/error.hpp"
@@ -12,8 +13,9 @@ namespace {
 
 constexpr double least_budget = 1, most_budget = 86400;  // seconds
 
-Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
+Settings settings_of(const FoundChoice& found, const Settings& given) {
     Settings settings = given;
+    const lobatto::Choice& choice = found.choice;
     const Candidate& candidate = choice.measurement.candidate;
     const int points = candidate.member.points;
     switch (candidate.member.family) {
@@ -30,6 +32,8 @@ Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
     if (candidate.tolerance > 0) settings.tolerance = candidate.tolerance;
     settings.arithmetic = candidate.member.arithmetic == StepArithmetic::clean ? "clean" : "plain";
     settings.numbers = precision_name(candidate.member.precision);
+    if (choice.clock != (found.scene.clock ? found.scene.clock->text : ""))
+        settings.clock = word_of(candidate.member.clock);
     settings.step = fmt::format("{}", choice.step());
     settings.until = fmt::format("{}", choice.until);
     return settings;
@@ -38,9 +42,11 @@ Settings settings_of(const lobatto::Choice& choice, const Settings& given) {
 // The method and its step are what is looked for.
 void refuse_method(const Settings& settings) {
     const bool names_method = settings.points || settings.stages || settings.splitting || settings.tolerance ||
-                              !settings.arithmetic.empty() || !settings.numbers.empty() || !settings.step.empty();
+                              !settings.arithmetic.empty() || !settings.numbers.empty() || !settings.clock.empty() ||
+                              !settings.step.empty();
     if (names_method)
-        throw lobatto::InputError("tune chooses the method, its numbers and the step; leave them out of the settings");
+        throw lobatto::InputError(
+            "tune chooses the method, its numbers, the clock and the step; leave them out of the settings");
 }
 
 }  // namespace
@@ -57,6 +63,19 @@ ChangedScene measurable(const Scene& scene, const Settings& settings, const std:
     refuse_jumps(scenes.written, command);
     apply(overrides_of(settings), scenes.changed);
     return scenes;
+}
+
+Explored explored(const ChangedScene& scene, const ExperimentRequest& request) {
+    Explored found;
+    try {
+        found.experiment = std::make_unique<Experiment>(scene.written, scene.changed, request);
+        explore(*found.experiment);
+    } catch (const Interrupted&) {
+        found.interrupted = true;
+    } catch (const lobatto::ComputationError& failure) {
+        throw lobatto::ComputationError(fmt::format("{}: {}", scene.changed.path, failure.what()));
+    }
+    return found;
 }
 
 FoundChoice choice_for(const Scene& scene, const Settings& settings, const ChoiceRequest& request) {
@@ -82,7 +101,6 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
         ChoiceRequest request;
         request.error = error;
         request.seconds = budget;
-        request.tries_clocks = false;  // settings have no clock: the scene's own
         volatile int is_interrupted = 0;
         request.interrupted = &is_interrupted;
         if (progress)
@@ -90,9 +108,10 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
                 if (!progress(what)) is_interrupted = 1;
             };
         try {
-            const lobatto::Choice found = choice_for(scene, settings, request).choice;
+            const FoundChoice chosen = choice_for(scene, settings, request);
+            const lobatto::Choice& found = chosen.choice;
             Choice choice;
-            choice.settings = settings_of(found, settings);
+            choice.settings = settings_of(chosen, settings);
             choice.method = found.measurement.candidate.member.method().name();
             choice.step = found.step();
             choice.until = found.until;

@@ -66,6 +66,7 @@ inline Settings settings_of(const lobatto_settings* given) {
     if (given->tolerance != 0) settings.tolerance = given->tolerance;
     put(settings.arithmetic, given->arithmetic);
     put(settings.numbers, given->numbers);
+    put(settings.clock, given->clock);
     put(settings.step, given->step);
     put(settings.until, given->until);
     if (given->every != 0) settings.every = given->every;

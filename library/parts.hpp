@@ -50,6 +50,8 @@ std::pair<std::string, std::string> named_value(const std::string& argument);
 void refuse_values(const Settings& settings, const std::string& what);
 // The scene, by another method; values are set later, because one kernel serves all of them.
 lobatto::Scene with_method(const Scene& scene, const Settings& settings);
+// One that no file has: what was read, changed in memory.
+Scene scene_of(lobatto::Scene changed);
 
 // With their initial positions and their values.
 std::vector<Variable> coordinates_of(const lobatto::Scene& scene);

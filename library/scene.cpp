@@ -18,9 +18,10 @@ std::recursive_mutex& algebra() {
 }
 
 MethodChoice method_of(const Settings& settings) {
-    MethodChoice choice{settings.points, settings.stages, settings.splitting, settings.tolerance, {}, {}};
+    MethodChoice choice{settings.points, settings.stages, settings.splitting, settings.tolerance, {}, {}, {}};
     if (!settings.arithmetic.empty()) choice.arithmetic = settings.arithmetic;
     if (!settings.numbers.empty()) choice.numbers = settings.numbers;
+    if (!settings.clock.empty()) choice.clock = settings.clock;
     return choice;
 }
 
@@ -102,8 +103,8 @@ std::size_t index_of(const std::vector<Variable>& parameters, const std::string&
 
 namespace {
 
-std::shared_ptr<const Scene::Parts> parts_of(const Source& source) {
-    auto parts = std::make_shared<Scene::Parts>(Scene::Parts{read_scene(source), {}, {}, {}, {}, 0, 0});
+std::shared_ptr<const Scene::Parts> parts_of(lobatto::Scene read) {
+    auto parts = std::make_shared<Scene::Parts>(Scene::Parts{std::move(read), {}, {}, {}, {}, 0, 0});
     const lobatto::Scene& scene = parts->scene;
     parts->coordinates = coordinates_of(scene);
     parts->parameters = parameters_of(scene);
@@ -116,11 +117,15 @@ std::shared_ptr<const Scene::Parts> parts_of(const Source& source) {
 
 }  // namespace
 
-Scene::Scene(const std::string& path) : parts_(in_algebra([&] { return parts_of(Source::read(path)); })) {}
+Scene::Scene(const std::string& path) : parts_(in_algebra([&] { return parts_of(read_scene(Source::read(path))); })) {}
 Scene::Scene(std::shared_ptr<const Parts> parts) : parts_(std::move(parts)) {}
 
+Scene scene_of(lobatto::Scene changed) {
+    return in_algebra([&] { return Scene(parts_of(std::move(changed))); });
+}
+
 Scene Scene::from_text(const std::string& text, const std::string& path) {
-    return in_algebra([&] { return Scene(parts_of(Source(path, text))); });
+    return in_algebra([&] { return Scene(parts_of(read_scene(Source(path, text)))); });
 }
 
 const std::string& Scene::path() const {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "analysis/kernel/support_text.hpp"
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constraints.hpp"
@@ -49,6 +51,30 @@ StabilityReport stability_of(const Scene& scene, const Settings& settings) {
             "method alone: lobatto stability --splitting {}",
             changed.path, changed.method.points));
     return stability_report(changed, overrides_of(settings));
+}
+
+lobatto::Scene for_roundoff(const Scene& scene, const Settings& settings) {
+    lobatto::Scene changed = with_method(scene, settings);
+    refuse_clock(changed, "lobatto roundoff");
+    refuse_constraints(changed, "lobatto roundoff");
+    refuse_impacts(changed, "lobatto roundoff");
+    MethodChoice::require_double(changed, "roundoff");
+    if (changed.method.family == Family::splitting)
+        throw lobatto::InputError(changed.path +
+                                  ": `lobatto roundoff` compares plain arithmetic with clean, which splitting methods "
+                                  "do not have; choose Lobatto (--points 8) or Gauss (--stages 4)");
+    const Overrides overrides = overrides_of(settings);
+    apply(overrides, changed);
+    changed.method.arithmetic = StepArithmetic::clean;
+    changed.method.tolerance = 0;
+    step_of(changed, overrides);  // refuses one that makes no sense
+    return changed;
+}
+
+RoundoffResult roundoff_of(lobatto::Scene scene, const RoundoffRequest& request) {
+    return roundoff_growth(
+        std::move(scene), request.steps, request.trajectories, request.reference, request.interrupted,
+        request.progress ? request.progress : [](std::int64_t) {});
 }
 
 Proof proof_of(const Scene& scene, const Settings& settings, const Heard& say) {

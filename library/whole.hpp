@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What is found, written, chosen and proved of a scene, with all that is known of it: lobatto.hpp hands out what is
-// worth a promise, the command line prints the rest too. Both come here, so there is one way.
+// What is found, written, measured, chosen and proved of a scene, with all that is known of it: lobatto.hpp hands out
+// what is worth a promise, the command line prints the rest too. Both come here, so there is one way.
 //
 // These throw what the parts of the program throw; callers stand in in_algebra() or guarded() (parts.hpp).
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
+#include "analysis/accuracy/roundoff_growth.hpp"
 #include "analysis/checked_scene.hpp"
 #include "analysis/proof/proof.hpp"
 #include "analysis/stability/report.hpp"
 #include "analysis/tradeoff/choice.hpp"
+#include "analysis/tradeoff/experiment.hpp"
 #include "generator/describe/describe.hpp"
 #include "generator/pipeline.hpp"
 #include "library/parts.hpp"
@@ -32,6 +35,18 @@ PlainSource plainly_emitted(const Scene& scene, const Settings& settings);
 
 StabilityReport stability_of(const Scene& scene, const Settings& settings);
 
+// The scene whose rounding is measured, in clean arithmetic, with the values of settings.
+lobatto::Scene for_roundoff(const Scene& scene, const Settings& settings);
+// `scene`: of for_roundoff. The rest is that of roundoff_growth().
+struct RoundoffRequest {
+    std::int64_t steps = 100000;
+    int trajectories = 16;
+    bool reference = true;
+    const volatile int* interrupted = nullptr;
+    std::function<void(std::int64_t)> progress;
+};
+RoundoffResult roundoff_of(lobatto::Scene scene, const RoundoffRequest& request);
+
 // `say` hears what is being checked, and about which part of all work is behind.
 using Heard = std::function<void(const std::string&, double)>;
 Proof proof_of(const Scene& scene, const Settings& settings, const Heard& say = {});
@@ -42,6 +57,12 @@ struct ChangedScene {
 };
 // For what measures a scene: `command` says that walls have no place there.
 ChangedScene measurable(const Scene& scene, const Settings& settings, const std::string& command);
+// What accuracy costs, over the family.
+struct Explored {
+    std::unique_ptr<Experiment> experiment;  // none where it was interrupted before its reference was known
+    bool interrupted = false;
+};
+Explored explored(const ChangedScene& scene, const ExperimentRequest& request);
 // Seconds that measuring may take: InputError where they are no time. `written`: as errors show it.
 void check_budget(double seconds, const std::string& written);
 

@@ -70,6 +70,8 @@ lob::Settings settings_of(const py::kwargs& given) {
             settings.arithmetic = text(value);
         else if (name == "numbers")
             settings.numbers = text(value);
+        else if (name == "clock")
+            settings.clock = text(value);
         else if (name == "step")
             settings.step =
                 py::isinstance<py::str>(value) ? text(value) : text(py::repr(py::float_(value.cast<double>())));
@@ -83,8 +85,8 @@ lob::Settings settings_of(const py::kwargs& given) {
                                                                : text(py::repr(py::float_(formula.cast<double>()))));
         else
             throw py::type_error("unknown setting '" + name +
-                                 "'; there are points, stages, splitting, tolerance, arithmetic, numbers, step, until, "
-                                 "every and set");
+                                 "'; there are points, stages, splitting, tolerance, arithmetic, numbers, clock, step, "
+                                 "until, every and set");
     }
     return settings;
 }
@@ -98,6 +100,7 @@ py::dict dict_of(const lob::Settings& settings) {
     if (settings.every) dict["every"] = *settings.every;
     for (const auto& [name, value] : {std::pair("arithmetic", settings.arithmetic),
                                       {"numbers", settings.numbers},
+                                      {"clock", settings.clock},
                                       {"step", settings.step},
                                       {"until", settings.until}})
         if (!value.empty()) dict[name] = value;

@@ -317,12 +317,11 @@ void symplecticity_on_constraints(std::vector<ProofRow>& rows, const Kernel& exa
 }
 
 // A clock is another Lagrangian, whose steps are equal.
-Scene scene_to_prove(const Scene& written, const MethodChoice& method) {
-    Scene scene = in_clock_time(written);
+Scene scene_to_prove(const Scene& chosen) {
+    Scene scene = in_clock_time(chosen);
     scene.clock.reset();
-    method.apply(scene);
-    if (written.clock && scene.method.numbers != Precision::double_)
-        scene.source.fail(written.clock->at,
+    if (chosen.clock && scene.method.numbers != Precision::double_)
+        scene.source.fail(chosen.clock->at,
                           "with a clock `lobatto verify` proves steps in double, but numbers are \"" +
                               precision_name(scene.method.numbers) + "\"; remove the clock, or give --numbers double");
     scene.outputs.energy = true;
@@ -360,7 +359,9 @@ void energies(std::vector<ProofRow>& rows, const Kernel& kernel, const Kernel& e
 Proof prove(const Scene& written, const MethodChoice& method,
             const std::function<void(const std::string&, double)>& say) {
     say("deriving and compiling", 0);
-    const Scene scene = scene_to_prove(written, method);
+    Scene chosen = written;
+    method.apply(chosen);
+    const Scene scene = scene_to_prove(chosen);
     const Precision numbers = scene.method.numbers;
     const bool with_tangent = scene.outputs.tangent;
     const ExactStart exact_start(scene);
@@ -386,8 +387,8 @@ Proof prove(const Scene& written, const MethodChoice& method,
     const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
     const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
     const std::size_t of_steps = rows.size();
-    if (written.clock)
-        rows.push_back({"steps, from here on", "of the clock " + written.clock->text, "equal in its time", true, ""});
+    if (chosen.clock)
+        rows.push_back({"steps, from here on", "of the clock " + chosen.clock->text, "equal in its time", true, ""});
     if (scene.is_cut()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
     say("checking steps", 0.45);
     taken_steps(rows, derivation, kernel, exact_kernel, start, exact, say);

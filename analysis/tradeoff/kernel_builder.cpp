@@ -12,20 +12,11 @@ namespace lobatto {
 
 namespace {
 
-Scene with_equal_steps(Scene scene) {
-    scene.clock.reset();
-    scene.outputs.interval = 0;
-    return scene;
-}
-
 // Nothing where there is none, or it is not positive at the start.
-std::optional<Derivation> with_automatic_clock(Scene scene) {
+std::optional<Derivation> derive_with_automatic_clock(const Scene& scene) {
     if (!has_automatic_clock(scene)) return std::nullopt;
-    scene.clock = Clock();
-    scene.clock->text = word_of(StepClock::automatic);
-    scene.clock->is_automatic = true;
     try {
-        return derive(scene);
+        return derive(with_automatic_clock(scene));
     } catch (const InputError&) {
         return std::nullopt;
     }
@@ -44,7 +35,7 @@ KernelBuilder::KernelBuilder(const Scene& scene, bool tries_clocks) {
     if (tries_clocks) {
         allowed_.insert(StepClock::none);
         if (std::optional<Derivation> automatic;
-            own != StepClock::automatic && (automatic = with_automatic_clock(equal)))
+            own != StepClock::automatic && (automatic = derive_with_automatic_clock(equal)))
             allowed_.insert(derivations_.emplace(StepClock::automatic, std::move(*automatic)).first->first);
     }
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)

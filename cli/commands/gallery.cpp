@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
@@ -15,8 +14,7 @@
 #include "cli/print/gallery_picture.hpp"
 #include "cli/print/progress.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/pipeline.hpp"
-#include "library/parts.hpp"
+#include "library/opened_run.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -47,20 +45,33 @@ std::vector<std::string> all_scenes() {
     return scenes;
 }
 
-MotionRows run(const std::string& path, const Kernel& kernel, TrajectoryRequest request) {
+// A motion, with what a smaller one is made of.
+struct Motion {
     MotionRows states;
-    states.n = kernel->coordinates;
-    request.sink = [&](const Records& records) {
-        states.rows.insert(states.rows.end(), records.rows, records.rows + records.count * records.columns);
+    bool is_closed;  // no force, nothing from the time: it goes on for ever as it began
+};
+
+Motion motion_of(const api::Scene& scene) {
+    api::RunOptions options;
+    options.measure = false;
+    api::OpenedRun run(scene, options);
+    const Outline& outline = run.prepared().outline;
+    Motion motion{{static_cast<int>(run.request().q.size()), {}},
+                  outline.system.autonomous && !outline.system.has_forces() && !run.scene().is_cut()};
+    api::OpenedRun::Listeners listeners;
+    listeners.states = [&](const Records& records) {
+        motion.states.rows.insert(motion.states.rows.end(), records.rows,
+                                  records.rows + records.count * records.columns);
     };
-    const TrajectoryResult result = integrate(kernel, request);
-    if (result.status != LOBATTO_OK) throw ComputationError(fmt::format("{}: {}", path, explain_stop(result, request)));
-    return states;
+    listeners.events = [](const EventRecords&) {};
+    run.go(listeners);
+    if (const RunVerdict verdict = run.verdict(); !verdict.failure.empty())
+        throw ComputationError(fmt::format("{}: {}", scene.path(), verdict.failure));
+    return motion;
 }
 
 // The same motion begun nearer to the middle between its ends.
-std::vector<MotionRows> smaller_motions(const std::string& path, const Kernel& kernel, const TrajectoryRequest& request,
-                                        const MotionRows& states) {
+std::vector<MotionRows> smaller_motions(const Scene& scene, const MotionRows& states) {
     double low = states.q(0, 0), high = low;
     for (std::size_t i = 0; i < states.count(); ++i) {
         low = std::min(low, states.q(i, 0));
@@ -69,32 +80,31 @@ std::vector<MotionRows> smaller_motions(const std::string& path, const Kernel& k
     const double middle = (low + high) / 2;
     std::vector<MotionRows> smaller;
     for (const double share : smaller_ones) {
-        TrajectoryRequest nearer = request;
-        nearer.q[0] = middle + share * (request.q[0] - middle);
-        nearer.p[0] = share * request.p[0];
-        smaller.push_back(run(path, kernel, nearer));
+        Scene nearer = scene;
+        nearer.start = Start::momentum;
+        nearer.initial_position[0] = middle + share * (states.q(0, 0) - middle);
+        nearer.initial_rate[0] = share * states.p(0, 0);
+        smaller.push_back(motion_of(api::scene_of(nearer)).states);
     }
     return smaller;
 }
 
-Picture picture_of_scene(Scene& scene) {
-    const Steps steps = steps_of(scene);
-    const bool smooth = steps.count < smooth_below && shape_of(scene) != Shape::waterfall;
-    Outputs outputs;  // the motion alone
+// The motion alone, with states between its steps where these make curves smooth.
+Outputs pictured(const Scene& scene) {
+    const bool smooth = steps_of(scene).count < smooth_below && shape_of(scene) != Shape::waterfall;
+    Outputs outputs;
     outputs.energy = outputs.tangent = outputs.momenta = false;
     outputs.every = smooth ? 1 : scene.outputs.every;
     outputs.dense = smooth ? 4 : 0;
-    scene.outputs = outputs;
-    const Derivation derivation = derive(scene);
-    const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
-    LoadedStepper<double> stepper(kernel);
-    const TrajectoryRequest request = request_of(scene, steps.count, stepper);
-    const MotionRows states = run(scene.path, kernel, request);
-    const auto& forces = derivation.system.outer_force;
-    const bool nested =
-        !scene.is_cut() && shape_of(scene) == Shape::phase && derivation.system.autonomous && forces.front().is_zero();
-    return picture_of(scene, states,
-                      nested ? smaller_motions(scene.path, kernel, request, states) : std::vector<MotionRows>{});
+    return outputs;
+}
+
+Picture picture_of_scene(const api::Scene& read) {
+    Scene scene = read.parts().scene;
+    scene.outputs = pictured(scene);
+    const Motion motion = motion_of(api::scene_of(scene));
+    const bool nested = motion.is_closed && !scene.clock && shape_of(scene) == Shape::phase;
+    return picture_of(scene, motion.states, nested ? smaller_motions(scene, motion.states) : std::vector<MotionRows>{});
 }
 
 void gallery(const GalleryCommand& options) {
@@ -110,17 +120,18 @@ void gallery(const GalleryCommand& options) {
     for (const std::string& path : paths) {
         progress.show(&path - paths.data());
         try {
-            Scene scene = api::Scene(path).parts().scene;
+            const api::Scene scene(path);
             const Picture picture = picture_of_scene(scene);
-            draw(options.folder, scene.name, picture.script, picture.width, picture.height);
-            const std::string svg = scene.name + ".svg";
+            draw(options.folder, scene.name(), picture.script, picture.width, picture.height);
+            const std::string svg = scene.name() + ".svg";
             const auto bytes = fs::file_size(fs::path(options.folder) / svg);
-            drawn.push_back({path, scene.title, picture.caption, (fs::path(options.folder) / svg).generic_string()});
+            drawn.push_back({path, scene.title(), picture.caption, (fs::path(options.folder) / svg).generic_string()});
             if (!options.json)
                 fmt::print("{:<44}{:>4} kB  {}\n", (fs::path(options.folder) / svg).generic_string(),
                            (bytes + 999) / 1000, picture.caption);
-            page += fmt::format("\n## [{}]({})\n{}\n\n![{}]({})\n", scene.title,
-                                fs::relative(path, options.folder).generic_string(), picture.caption, scene.title, svg);
+            page +=
+                fmt::format("\n## [{}]({})\n{}\n\n![{}]({})\n", scene.title(),
+                            fs::relative(path, options.folder).generic_string(), picture.caption, scene.title(), svg);
         } catch (const MachineError&) {
             throw;
         } catch (const api::MachineError&) {

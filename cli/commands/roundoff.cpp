@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include "analysis/accuracy/roundoff_growth.hpp"
 #include "analysis/motion.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
@@ -16,11 +15,7 @@
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/formula/source.hpp"
-#include "generator/mechanics/clock/clock.hpp"
-#include "generator/mechanics/constraints/constraints.hpp"
-#include "generator/mechanics/constraints/impacts.hpp"
-#include "library/parts.hpp"
+#include "library/whole.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -98,29 +93,17 @@ void print(const RoundoffResult& result) {
 }
 
 void roundoff(const RoundoffCommand& options) {
-    const api::Settings settings = settings_of(options.method, options.overrides);
-    Scene scene = api::with_method(api::Scene(options.scene), settings);
-    refuse_clock(scene, "lobatto roundoff");
-    refuse_constraints(scene, "lobatto roundoff");
-    refuse_impacts(scene, "lobatto roundoff");
-    MethodOption::require_double(scene, "roundoff");
-    if (scene.method.family == Family::splitting)
-        throw InputError(scene.path +
-                         ": `lobatto roundoff` compares plain arithmetic with clean, which splitting methods "
-                         "do not have; choose Lobatto (--points 8) or Gauss (--stages 4)");
-    apply(api::overrides_of(settings), scene);
-    scene.method.arithmetic = StepArithmetic::clean;
-    scene.method.tolerance = 0;
+    Scene scene = api::for_roundoff(api::Scene(options.scene), settings_of(options.method, options.overrides));
     const std::string name = scene.method.name(), path = scene.path;
-    const double step = step_of(scene, options.overrides).to_double();
+    const double step = step_of(scene).to_double();
     const std::string folder = output_folder(options.output, result_name(scene.path) + "_roundoff"),
                       table = folder + "/roundoff.csv";
     keep_scene(path, table);
     const Interruption interruption;
     std::optional<Progress> progress(std::in_place, options.steps * options.trajectories);
     const RoundoffResult result =
-        roundoff_growth(std::move(scene), options.steps, options.trajectories, !options.no_reference,
-                        Interruption::flag(), [&](std::int64_t done) { progress->show(done); });
+        api::roundoff_of(std::move(scene), {options.steps, options.trajectories, !options.no_reference,
+                                            Interruption::flag(), [&](std::int64_t done) { progress->show(done); }});
     progress.reset();
     const auto say = [&](const std::string& text) {
         if (!options.json) fmt::print("{}", text);

@@ -69,8 +69,8 @@ std::string text_of_splitting(const Method& method) {
 void show_members(const StabilityCommand& options) {
     if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
         throw InputError("--chart, --step and --set belong to a scene; name one");
-    if (options.method.tolerance || options.method.arithmetic)
-        throw InputError("--tolerance and --arithmetic belong to a scene; name one");
+    if (options.method.tolerance || options.method.arithmetic || options.method.numbers || options.method.clock)
+        throw InputError("--tolerance, --arithmetic, --numbers and --clock belong to a scene; name one");
     const std::optional<Method> member = options.method.member();
     if (member && member->family == Family::splitting) {
         if (options.json) throw InputError("--json is of Lobatto and Gauss, whose limits are exact; leave it out");

@@ -2,8 +2,6 @@
 // lobatto tradeoff: what accuracy costs on a scene, measured over the family.
 #include <fmt/format.h>
 
-#include <optional>
-
 #include "analysis/tradeoff/exploration.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/budget.hpp"
@@ -37,8 +35,9 @@ void write(const std::string& path, const std::string& text) {
 
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
-    const auto [written, scene] =
+    const api::ChangedScene scenes =
         api::measurable(api::Scene(options.scene), settings_of({}, options.overrides), "lobatto tradeoff");
+    const Scene& scene = scenes.changed;
     end_of(scene);
     const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
 
@@ -50,16 +49,7 @@ void tradeoff(const TradeoffOptions& options) {
     request.first = first_of_tour();
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
-    bool interrupted = false;
-    std::optional<Experiment> begun;
-    try {
-        begun.emplace(written, scene, request);
-        explore(*begun);
-    } catch (const Interrupted&) {
-        interrupted = true;
-    } catch (const ComputationError& failure) {
-        throw ComputationError(fmt::format("{}: {}", scene.path, failure.what()));
-    }
+    const auto [begun, interrupted] = api::explored(scenes, request);
     say.clear();
     if (interrupted && (!begun || begun->store().all().empty())) {
         tell("lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");

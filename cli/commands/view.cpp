@@ -82,6 +82,23 @@ Beside beside_of(const std::string& text) {
     return beside;
 }
 
+// The method of `options`, unless this names another.
+MethodChoice method_of(const Beside& beside, const MethodChoice& options, const api::Scene& scene) {
+    MethodChoice method = options;
+    if (beside.method.member()) {
+        method.points = beside.method.points;
+        method.stages = beside.method.stages;
+        method.splitting = beside.method.splitting;
+    }
+    try {
+        Scene other = scene.parts().scene;
+        method.apply(other);
+    } catch (const InputError& error) {
+        throw InputError(std::string("--beside: ") + error.what());
+    }
+    return method;
+}
+
 std::vector<Viewed> motions_of(const ViewCommand& options) {
     const std::size_t count = options.scenes.size() * (1 + options.beside.size());
     if (count > most_motions)
@@ -94,24 +111,18 @@ std::vector<Viewed> motions_of(const ViewCommand& options) {
         if (done >= steps) progress.reset();
     };
     for (const std::string& path : options.scenes) {
-        const Scene scene = api::with_method(api::Scene(path), settings_of(options.method));
-        MethodOption::require_double(scene, "view");
-        const std::string label =
-            options.scenes.size() > 1 || options.beside.empty() ? scene.title : scene.method.name();
-        progress.reset();
-        all.push_back(viewed_motion(scene, options.overrides, label, numbers_on_page / count, show_progress));
+        const api::Scene scene(path);
+        const auto add = [&](const MethodChoice& method, const Overrides& overrides, bool is_alone) {
+            progress.reset();
+            all.push_back(
+                viewed_motion(scene, settings_of(method, overrides), is_alone, numbers_on_page / count, show_progress));
+        };
+        add(options.method, options.overrides, options.scenes.size() > 1 || options.beside.empty());
         for (const std::string& text : options.beside) {
             const Beside beside = beside_of(text);
-            Scene other = scene;
-            try {
-                beside.method.apply(other);
-            } catch (const InputError& error) {
-                throw InputError(std::string("--beside: ") + error.what());
-            }
             Overrides overrides = options.overrides;
             if (!beside.step.empty()) overrides.step = beside.step;
-            progress.reset();
-            all.push_back(viewed_motion(other, overrides, other.method.name(), numbers_on_page / count, show_progress));
+            add(method_of(beside, options.method, scene), overrides, false);
         }
     }
     return all;

@@ -39,6 +39,9 @@ void MethodOption::add_to(Command& command) {
         .checked_by([](const std::string& text) {
             return precision_of(text) ? "" : "unknown numbers; there are " + precision_list();
         });
+    command.option("--clock", clock, "Equal steps, or those of the clock that follows from the Lagrangian")
+        .shown_as("CLOCK")
+        .one_of(std::vector<std::string>{"none", "auto"});
 }
 
 }  // namespace lobatto

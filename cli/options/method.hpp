@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The method on the command line, instead of the scene's: --points, --stages or --splitting, --tolerance or
-// --arithmetic, --numbers.
+// --arithmetic, --numbers, --clock.
 #pragma once
 
 #include <utility>

@@ -27,6 +27,7 @@ api::Settings settings_of(const MethodChoice& method, const Overrides& overrides
                            method.tolerance,
                            method.arithmetic.value_or(""),
                            method.numbers.value_or(""),
+                           method.clock.value_or(""),
                            {},
                            overrides.step,
                            overrides.until,

@@ -8,15 +8,12 @@
 #include <map>
 #include <set>
 
-#include "analysis/accuracy/watch/energy_watch.hpp"
-#include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "analysis/tape.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/view/figures.hpp"
 #include "generator/formula/source.hpp"
-#include "generator/pipeline.hpp"
-#include "runtime/error.hpp"
+#include "library/opened_run.hpp"
 
 namespace lobatto {
 
@@ -28,9 +25,9 @@ constexpr std::size_t most_plotted = 6, most_events = 2000;
 const char* const kind_names[] = {"point", "line", "spring", "circle"};
 
 // The states of a run; long ones keep every second when there are too many, again and again.
-class States {
+class ShownStates {
 public:
-    States(std::size_t columns, std::size_t most) : columns_(columns), most_(std::max<std::size_t>(most, 16)) {}
+    ShownStates(std::size_t columns, std::size_t most) : columns_(columns), most_(std::max<std::size_t>(most, 16)) {}
 
     void add(const Records& records) {
         for (std::int64_t i = 0; i < records.count; ++i, ++seen_) {
@@ -140,9 +137,8 @@ std::vector<ViewFigure> figures_in(const std::vector<DrawnFigure>& figures, Chan
     return all;
 }
 
-// The curves that [view] names, or the first coordinates, those of one unit together; a phase portrait; the energy.
-// `energy_change`: of motions that conserve it.
-void add_curves(Viewed& viewed, const Scene& scene, Channels& channels, const std::optional<GiNaC::ex>& energy_change) {
+// The curves that [view] names, or the first coordinates, those of one unit together; a phase portrait.
+void add_curves(Viewed& viewed, const Scene& scene, Channels& channels) {
     ViewMotion& motion = viewed.motion;
     std::map<std::string, ViewChart> by_unit;
     std::vector<std::string> order;
@@ -166,10 +162,13 @@ void add_curves(Viewed& viewed, const Scene& scene, Channels& channels, const st
     motion.curves.push_back({"phase", fmt::format("p_{0} over {0}", first.name),
                              channels.of(scene.outputs.momenta_of_kept.front()), false, channels.of(first.position)});
     viewed.charts.push_back({"phase portrait", {"phase"}, true});
-    if (scene.outputs.energy) {
-        curve("energy", energy_change ? "H - H(0)" : "H", energy_change.value_or(scene.outputs.energy_of_kept));
-        viewed.charts.push_back({energy_change ? "energy error" : "energy", {"energy"}});
-    }
+}
+
+// `change`: of motions that conserve it.
+void add_energy(Viewed& viewed, const Scene& scene, Channels& channels, const std::optional<GiNaC::ex>& change) {
+    viewed.motion.curves.push_back(
+        {"energy", change ? "H - H(0)" : "H", channels.of(change.value_or(scene.outputs.energy_of_kept))});
+    viewed.charts.push_back({change ? "energy error" : "energy", {"energy"}});
 }
 
 // What a run keeps so that it looks smooth: states between steps, or arrivals of a clock.
@@ -190,7 +189,7 @@ void fill_steps(Scene& scene, std::size_t most_frames) {
     scene.outputs = outputs;
 }
 
-std::vector<std::vector<double>> frames_of(const States& states, const LoadedStepper<double>& stepper,
+std::vector<std::vector<double>> frames_of(const ShownStates& states, const LoadedStepper<double>& stepper,
                                            const TrajectoryRequest& request) {
     const std::size_t n = request.q.size();
     const double energy_start = states.row(0)[1 + 2 * n];
@@ -211,33 +210,38 @@ std::vector<std::vector<double>> frames_of(const States& states, const LoadedSte
 
 }  // namespace
 
-Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers,
+Viewed viewed_motion(const api::Scene& written, const api::Settings& settings, bool is_alone, std::size_t most_numbers,
                      const std::function<void(std::int64_t, std::int64_t)>& progress) {
     Viewed viewed;
+    Scene kept = api::with_method(written, settings);
+    Scene scene = kept;
+    MethodChoice::require_double(scene, "view");
+    apply(api::overrides_of(settings), scene);
     viewed.title = scene.title.empty() ? scene.name : scene.title;
-    apply(overrides, scene);
     const GiNaC::symbol energy_change;
     Channels channels(scene, variables_of(scene, energy_change));
     scene.outputs.energy = true;
     const std::vector<DrawnFigure> figures = figures_of(scene);
     viewed.motion.figures = figures_in(figures, channels);
     viewed.motion.is_profile = figures.front().profile;
-    add_curves(viewed, scene, channels,
-               derive_kernel(scene).conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
-    const std::size_t most_frames = std::clamp<std::size_t>(most_numbers / channels.count(), 64, 36000);
+    add_curves(viewed, scene, channels);
+    const std::size_t with_energy = channels.count() + 1,
+                      most_frames = std::clamp<std::size_t>(most_numbers / with_energy, 64, 36000);
     fill_steps(scene, most_frames);
 
-    const Derivation derivation = derive_kernel(scene);
-    const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
-    LoadedStepper<double> stepper(kernel);
-    TrajectoryRequest request = request_of(scene, steps_of(scene, overrides).count, stepper);
-    States states(1 + 2 * request.q.size(), most_frames);
-    EnergyWatch energy(derivation, kernel);
-    request.sink = [&](const Records& records) {
-        states.add(records);
-        energy.observe(records);
-    };
-    request.events = [&](const EventRecords& events) {
+    kept.outputs = scene.outputs;
+    api::RunOptions values;
+    values.set = settings.set;
+    values.step = settings.step;
+    values.until = settings.until;
+    values.measure = false;
+    api::OpenedRun run(api::scene_of(kept), values);
+    add_energy(viewed, scene, channels,
+               run.prepared().outline.conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
+    ShownStates states(1 + 2 * run.request().q.size(), most_frames);
+    api::OpenedRun::Listeners listeners;
+    listeners.states = [&](const Records& records) { states.add(records); };
+    listeners.events = [&](const EventRecords& events) {
         for (std::int64_t i = 0; i < events.count && viewed.motion.events.size() < most_events; ++i) {
             const double* const row = events.rows + i * events.columns;
             if (row[0] < static_cast<double>(scene.reported().size()))
@@ -245,20 +249,25 @@ Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string&
         }
     };
     const Interruption interruption;
-    request.interrupted = interruption.flag();
-    request.progress = [&](std::int64_t done) { progress(done, request.steps); };
-    const TrajectoryResult result = integrate(kernel, request);
+    listeners.interrupted = interruption.flag();
+    listeners.progress = [&](std::int64_t done) { progress(done, run.request().steps); };
+    const TrajectoryResult& result = run.go(listeners);
     viewed.is_interrupted = result.interrupted;
     states.finish();
-    if (result.status != LOBATTO_OK)
-        viewed.failure = "the motion on the page ends early: " + explain_stop(result, request);
-    else if (const std::string wrong = energy.departure(derivation, kernel, request); !wrong.empty())
-        viewed.failure = "the motion on the page is wrong: " + wrong;
+    if (const std::string failure = run.verdict().failure; !failure.empty())
+        viewed.failure = (result.status != LOBATTO_OK ? "the motion on the page ends early: "
+                                                      : "the motion on the page is wrong: ") +
+                         failure;
 
+    const std::string method = scene.method.name();
+    const TrajectoryRequest& request = run.request();
+    LoadedStepper<double> stepper(run.prepared().plain);
+    if (stepper.prepare(request.parameters, request.step) == LOBATTO_OK)
+        stepper.start(request.time, request.q, request.p);
     ViewMotion& motion = viewed.motion;
-    motion.label = label;
-    motion.note = fmt::format("{}h = {:.4g}{}", label == scene.method.name() ? "" : scene.method.name() + ", ",
-                              request.step, scene.clock ? " in the time of a clock" : "");
+    motion.label = is_alone ? viewed.title : method;
+    motion.note = fmt::format("{}h = {:.4g}{}", motion.label == method ? "" : method + ", ", request.step,
+                              scene.clock ? " in the time of a clock" : "");
     for (std::size_t i = 0; i < states.count(); ++i) motion.times.push_back(states.row(i)[0]);
     motion.channels = channels.values(frames_of(states, stepper, request));
     for (const Event& event : scene.reported()) motion.event_names.push_back(event.text);

@@ -7,10 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/method_choice.hpp"
-#include "analysis/overrides.hpp"
 #include "cli/view/page.hpp"
-#include "generator/scene/scene.hpp"
+#include "library/parts.hpp"
 
 namespace lobatto {
 
@@ -24,7 +22,7 @@ struct Viewed {
 
 // `most_numbers`: of all channels together, which decides how large the page is. `progress` hears the steps done, and
 // of how many.
-Viewed viewed_motion(Scene scene, const Overrides& overrides, const std::string& label, std::size_t most_numbers,
+Viewed viewed_motion(const api::Scene& scene, const api::Settings& settings, bool is_alone, std::size_t most_numbers,
                      const std::function<void(std::int64_t, std::int64_t)>& progress);
 
 }  // namespace lobatto

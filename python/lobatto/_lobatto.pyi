@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Types of the compiled module. Settings: points, stages, splitting, tolerance, arithmetic, numbers, step, until, every, set."""
+"""Types of the compiled module. Settings: points, stages, splitting, tolerance, arithmetic, numbers, clock, step, until, every, set."""
 
 from typing import Any, Callable, Optional
 

@@ -262,8 +262,11 @@ TEST_CASE("mistakes on the command line are refused before anything is computed"
     CHECK(refusal({oscillator, "--chart", "no/such/x.svg"}) ==
           "--chart no/such/x.svg: there is no folder no/such; make it first\n");
     CHECK(refusal({""}) == "the scene has an empty name: give a file, such as scenes/pendulum.toml\n");
-    for (const auto& option : {std::vector<std::string>{"--tolerance", "1e-9"}, {"--arithmetic", "clean"}})
-        CHECK(refusal(option) == "--tolerance and --arithmetic belong to a scene; name one\n");
+    for (const auto& option : {std::vector<std::string>{"--tolerance", "1e-9"},
+                               {"--arithmetic", "clean"},
+                               {"--numbers", "float"},
+                               {"--clock", "auto"}})
+        CHECK(refusal(option) == "--tolerance, --arithmetic, --numbers and --clock belong to a scene; name one\n");
     CHECK(refusal({"--step", "0.1"}) == "--chart, --step and --set belong to a scene; name one\n");
     CHECK(contains(refusal({"missing.toml"}), "missing.toml"));
     CHECK(contains(refusal({oscillator, "--step", "-1"}), "the step must be positive"));

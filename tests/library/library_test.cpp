@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 #include <thread>
+#include <tuple>
 
 #include "tests/support.hpp"
 
@@ -300,6 +301,59 @@ TEST_CASE("tune returns settings with which a run keeps the error that was asked
     const lob::Trajectory run = lob::run(scene, options);
     REQUIRE(run.error.has_value());
     CHECK(*run.error < 3e-8);
+}
+
+namespace {
+
+// Five revolutions with e = 0.9 from the pericentre.
+lob::Scene eccentric(const std::string& clock, const std::string& step, const std::string& output = "") {
+    return lob::Scene::from_text(
+        "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+        "x = { position = 0.1, velocity = 0 }\ny = { position = 0, velocity = \"sqrt(19)\" }\n"
+        "[method]\npoints = 9\n" +
+        clock + "[run]\nstep = " + step + "\nuntil = \"10*pi\"\n" + output);
+}
+
+}  // namespace
+
+TEST_CASE("a clock is a setting: the same steps as with the scene's own, and equal ones without") {
+    const lob::Scene with = eccentric("clock = \"auto\"\n", "0.02"), without = eccentric("", "0.02");
+    lob::RunOptions automatic, equal;
+    automatic.clock = "auto";
+    equal.clock = "none";
+    const auto ends = [](const lob::Scene& scene, const lob::RunOptions& options) {
+        const lob::Trajectory run = lob::run(scene, options);
+        return std::tuple(run.steps, run.t.back(), run.q[run.q.size() - 2], run.q.back());
+    };
+    CHECK(ends(without, automatic) == ends(with, {}));
+    CHECK(ends(with, automatic) == ends(with, {}));
+    CHECK(ends(with, equal) == ends(without, {}));
+    CHECK(ends(with, {}) != ends(without, {}));
+    CHECK(without.derivation(automatic) == with.derivation());
+    CHECK(with.derivation(equal) == without.derivation());
+
+    // What a scene keeps counts steps without a clock, and is a time with one: the other kind of step keeps all.
+    const lob::Trajectory all = lob::run(eccentric("clock = \"auto\"\n", "0.02", "[output]\nevery = 3\n"), equal);
+    CHECK(all.count == static_cast<std::size_t>(all.steps) + 1);
+}
+
+TEST_CASE("tune of the library chooses a clock where that is cheaper, and a run keeps the promise with it" *
+          doctest::test_suite("slow")) {
+    const lob::Scene without = eccentric("", "0.02"), with = eccentric("clock = \"auto\"\n", "0.02");
+    const auto settings_for = [](const lob::Scene& scene) {
+        return lob::tune(scene, 1e-8, {}, 600).settings;  // ends long before, but for a busy machine
+    };
+    lob::RunOptions chosen;
+    static_cast<lob::Settings&>(chosen) = settings_for(without);
+    CHECK(chosen.clock == "auto");
+    CHECK(lob::run(without, chosen).error.value() < 2e-8);
+    CHECK(settings_for(with).clock.empty());  // its own
+    lob::Settings proved;
+    proved.clock = "auto";
+    for (const lob::Claim& claim : lob::verify(without, proved)) {
+        CAPTURE(claim.claim);
+        CHECK(claim.holds);
+    }
 }
 
 TEST_CASE("threads derive, compile and step at once") {

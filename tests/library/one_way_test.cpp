@@ -76,6 +76,12 @@ TEST_CASE("the command line and the library refuse the same with the same words 
              lob::run(scene, options);
          },
          {"run", pendulum, "--step", "0", "-o", csv}},
+        {[&] {
+             lob::RunOptions options;
+             options.clock = "auto";
+             lob::run(scene, options);
+         },
+         {"run", pendulum, "--clock", "auto", "-o", csv}},
         {[&] { static_cast<void>(scene.stability_json(settings([](lob::Settings& all) { all.splitting = 6; }))); },
          {"stability", pendulum, "--splitting", "6"}},
     };
@@ -100,6 +106,7 @@ TEST_CASE("words that settings do not know, and settings that a call has no use 
         run_with(settings([](lob::Settings& all) { all.numbers = "half"; })).starts_with("unknown numbers; there are"));
     CHECK(run_with(settings([](lob::Settings& all) { all.arithmetic = "cleann"; })) ==
           "unknown arithmetic 'cleann'; there are \"plain\" and \"clean\"");
+    CHECK(run_with(settings([](lob::Settings& all) { all.clock = "r"; })).starts_with("unknown clock 'r'; there are"));
     CHECK(run_with(settings([](lob::Settings& all) { all.points = 13; })) ==
           "there is no method lobatto with 13; there are 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12");
     CHECK(run_with(settings([](lob::Settings& all) { all.points = 4, all.stages = 2; })) ==
@@ -111,7 +118,7 @@ TEST_CASE("words that settings do not know, and settings that a call has no use 
           "verify takes the scene's own values; leave out 'step', or write it into the scene");
     CHECK(refusal_of([&] { static_cast<void>(scene.emit(longer)); }).second.starts_with("emit takes the scene's own"));
     CHECK(refusal_of([&] { lob::tune(scene, 1e-4, longer); }).second ==
-          "tune chooses the method, its numbers and the step; leave them out of the settings");
+          "tune chooses the method, its numbers, the clock and the step; leave them out of the settings");
 }
 
 TEST_CASE("a sweep of the library warns as the command line does, and of lost trajectories where they are lost") {

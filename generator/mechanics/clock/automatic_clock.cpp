@@ -90,4 +90,30 @@ bool has_automatic_clock(const Scene& scene) {
     return conserves && poles_of(scene).least.has_value();
 }
 
+namespace {
+
+void keep_all_steps(Outputs& outputs) {
+    outputs.every = 1;
+    outputs.dense = 0;
+    outputs.interval = 0;
+}
+
+}  // namespace
+
+Scene with_automatic_clock(Scene scene) {
+    if (scene.clock && scene.clock->is_automatic) return scene;
+    if (!scene.clock) keep_all_steps(scene.outputs);
+    scene.clock = Clock();
+    scene.clock->text = "auto";
+    scene.clock->is_automatic = true;
+    return scene;
+}
+
+Scene with_equal_steps(Scene scene) {
+    if (!scene.clock) return scene;
+    scene.clock.reset();
+    keep_all_steps(scene.outputs);
+    return scene;
+}
+
 }  // namespace lobatto

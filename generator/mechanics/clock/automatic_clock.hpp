@@ -14,4 +14,9 @@ GiNaC::ex automatic_clock(const Scene& scene);
 // Whether there is one, of a motion that keeps its energy.
 bool has_automatic_clock(const Scene& scene);
 
+// The scene with that clock, or with equal steps in t. Where that changes what a step is, all states at its steps are
+// kept: the scene's own word on it counts steps without a clock, and is a time with one.
+Scene with_automatic_clock(Scene scene);
+Scene with_equal_steps(Scene scene);
+
 }  // namespace lobatto

@@ -65,6 +65,7 @@ typedef struct lobatto_settings {
     int points, stages, splitting;    /* of Lobatto, Gauss, a splitting method; one at most */
     double tolerance;                 /* of the iteration of a step, relative */
     const char *arithmetic, *numbers; /* "plain", "clean"; "double", "float", ... */
+    const char* clock;                /* "none": equal steps; "auto" */
     const char *step, *until;         /* formulas in the parameters */
     int64_t every;                    /* keep every such state */
     const char* const* set;           /* "name=formula" each; the last is NULL */

@@ -78,6 +78,7 @@ struct Settings {
     std::optional<double> tolerance;                       ///< of the iteration of a step, relative
     std::string arithmetic;                                ///< "plain", "clean"
     std::string numbers;                                   ///< "float", "double", "long double", "double-double", ...
+    std::string clock;                                     ///< "none": equal steps; "auto" (docs/clocks.md)
     std::vector<std::pair<std::string, std::string>> set;  ///< parameters: {"omega", "2*pi"}
     std::string step, until;                               ///< formulas in the parameters: "2*pi/omega/50"
     std::optional<std::int64_t> every;                     ///< keep every such state
@@ -381,8 +382,8 @@ struct Choice {
     double seconds = 0;          ///< what the motion costs with it
     bool complete = false;       ///< no member that was not tried can be expected to win
 };
-/// The cheapest member of the family, and its step, that keep an error to the end. `settings` name no method and no
-/// step; `lobatto tune` tries clocks too. `budget`: seconds to search, at least 1.
+/// The cheapest member of the family, its clock and its step, that keep an error to the end. `settings` name no method,
+/// no clock and no step. `budget`: seconds to search, at least 1.
 /// `progress`: told what is being done; false ends the search, which then throws ComputationError.
 ///
 ///     lob::Settings settings;
