@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Scenes of the library: read, and changed by settings.
+#include <fmt/format.h>
+
 #include "analysis/checked_scene.hpp"
 #include "analysis/stability/json.hpp"
 #include "generator/describe/describe.hpp"
