@@ -270,7 +270,7 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
     start.whole_rate = whole(to_all_digits.rate, start.rate);
 }
 
-// (D47) The nearest start that keeps the constraints; not a number where there is none.
+// (D47) The nearest start that keeps the constraints; where there is none the given one, which the kernel refuses.
 void SweepStarts::assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start, Exact& exact) const {
     Scene scene = scene_;
     for (std::size_t i = 0; i < parameters.size(); ++i) scene.parameters[i].value = parameters[i];
@@ -288,7 +288,6 @@ void SweepStarts::assemble(const std::vector<GiNaC::ex>& parameters, EnsembleSta
             start.rate[k] = cln::double_approx(found.v[k]);
         }
     } catch (const InputError&) {
-        start.q.assign(start.q.size(), std::numeric_limits<double>::quiet_NaN());
     }
 }
 

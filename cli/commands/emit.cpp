@@ -84,21 +84,22 @@ void print_report(const std::vector<PassReport>& report) {
     fmt::print(std::cout, "(over all functions of the kernel; values compared at 60 digits)\n");
 }
 
-void print_use(const KernelSource& source, const EmitCommand& options, Precision numbers) {
-    const bool quadruple = numbers == Precision::quadruple;
+void print_use(const KernelSource& source, const EmitCommand& options, const Scene& scene) {
+    const Precision numbers = scene.method.numbers;
+    const bool quadruple = numbers == Precision::quadruple, hybrid = !scene.watched().empty() && !scene.clock;
     const char* const exact = numbers == Precision::double_double ? " -ffp-contract=off" : "";
     const std::string include = options.standalone ? "" : options.no_support ? " -I runtime/kernel" : "";
     fmt::print(std::cout,
                "\nUse it:\n"
                "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2{5}{2} -I {3} program.cpp{4}\n"
-               "  lobatto::Stepper<lobatto::kernels::{0}> stepper;\n"
-               "  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .q, "
-               ".momentum(p)\n",
+               "  lobatto::{6}<lobatto::kernels::{0}> stepper;\n"
+               "  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .{7}, "
+               ".momentum(p){8}\n",
                source.name, quadruple ? "gnu++" : "c++", include, shell_word(options.folder),
                quadruple                  ? " -lquadmath"
                : has_many_digits(numbers) ? " -lmpfr"
                                           : "",
-               exact);
+               exact, hybrid ? "HybridStepper" : "Stepper", hybrid ? "q()" : "q", hybrid ? "; .events()" : "");
 }
 
 // The folder, made where it is not there, and the file in it, which must not be the scene.
@@ -188,7 +189,7 @@ void emit_scene(const EmitCommand& options) {
     if (!options.standalone && !options.no_support)
         fmt::print(std::cout, " and {}", (fs::path(options.folder) / "kernel.hpp").string());
     fmt::print(std::cout, "\n");
-    print_use(source, options, api::with_method(scene, settings).method.numbers);
+    print_use(source, options, api::with_method(scene, settings));
 }
 
 }  // namespace

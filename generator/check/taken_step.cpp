@@ -35,7 +35,10 @@ public:
         for (const Numbers& positions : path_)
             for (std::size_t k = 0; k < n_; ++k) size[k] = cln::max(size[k], cln::abs(positions[k]));
         Numbers size0 = step_.p0, size1 = step_.p1;  // of the momenta at the ends
-        if (!system_.constraints.empty()) add_sizes_of_others(size, size0, size1);
+        if (!system_.constraints.empty()) {
+            add_sizes_of_others(size, size0, size1);
+            add_sizes_of_constraints(size);
+        }
         Noise noise(12);
         const auto rounded = [&](const cln::cl_R& value, const cln::cl_R& of) {
             return value + cln::cl_R((cln::plusp(noise.next()) ? 1 : -1)) * of * step_.epsilon;
@@ -86,6 +89,26 @@ private:
             position[k] = cln::max(position[k], cln::sqrt(moved / mass[k]));
             for (Numbers* const momentum : {&momentum0, &momentum1})
                 (*momentum)[k] = cln::max(cln::abs((*momentum)[k]), cln::sqrt(pushed * mass[k]));
+        }
+    }
+
+    // Positions are no better than the constraints that they are solved for: the terms of phi round, and what that
+    // leaves, G^T phi / |G|^2, is in the positions, however small these are.
+    void add_sizes_of_constraints(Numbers& position) {
+        std::vector<GiNaC::ex> values;
+        for (const Constraint& constraint : system_.constraints) values.push_back(constraint.value);
+        const std::vector<Id> constraints = formulas_.convert(values);
+        for (std::size_t j : {std::size_t(0), controls() - 1}) {
+            formulas_.set(system_.t, t0_ + control_[j] * h_);
+            set(system_.q, path_[j]);
+            const std::vector<Sized> phi = formulas_.evaluate_sized(constraints);
+            const Numbers G = values_of(system_.constraint_q.dense());
+            for (std::size_t c = 0; c < phi.size(); ++c) {
+                cln::cl_R square = 0;
+                for (std::size_t k = 0; k < n_; ++k) square = square + cln::square(G[c * n_ + k]);
+                for (std::size_t k = 0; k < n_ && cln::plusp(square); ++k)
+                    position[k] = cln::max(position[k], phi[c].size * cln::abs(G[c * n_ + k]) / square);
+            }
         }
     }
 

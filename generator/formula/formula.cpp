@@ -14,6 +14,7 @@
 #include <algorithm>
 
 #include "generator/formula/parser.hpp"
+#include "generator/formula/suggest.hpp"
 
 namespace lobatto {
 namespace {
@@ -25,7 +26,9 @@ constexpr std::pair<char, std::string_view> stray_signs[] = {
     {',', "decimals have a point, and functions have no more arguments"},
     {'=', "a formula is one side only"},
     {'.', "two points stand only in a sum, as in sum(i = 1 .. n, formula)"},
-    {'\'', "a prime belongs directly after the name of a coordinate"}};
+    {'\'', "a prime belongs directly after the name of a coordinate"},
+    {'<', "a comparison stands only in if(a < b, c, d)"},
+    {'>', "a comparison stands only in if(a > b, c, d)"}};
 
 constexpr std::string_view form_of_series = "a sum is written sum(i = 1 .. n, formula)";
 
@@ -38,16 +41,16 @@ Syntax Parser::formula() {
     return whole;
 }
 
-EventSyntax Parser::crossing() {
+EventSyntax Parser::crossing(const std::string& what, const std::string& form) {
     refuse_emptiness();
     has_direction_ = true;
     Syntax left = read_sum();
-    if (!token().is('=')) fail_rest("an event is written x = 0, x = 0 rising or x = y falling");
+    if (!token().is('=')) fail_rest(what + " is written " + form);
     const Token equals = tokens_[next_++];
     Syntax right = read_sum();
     EventSyntax crossing;
     if (at_direction()) crossing.direction = tokens_[next_++].text == "rising" ? 1 : -1;
-    if (token().is('=')) fail(token(), "an event has one =");
+    if (token().is('=')) fail(token(), what + " has one =");
     refuse_rest();
     Syntax& difference = crossing.difference;
     difference = node(Kind::sum, equals);
@@ -86,6 +89,10 @@ void Parser::refuse_emptiness() const {
 
 [[noreturn]] void Parser::fail_missing_operator() const {
     const std::string_view left = tokens_[next_ - 1].text, right = token().text;
+    const bool is_unknown =
+        token().kind == Token::Kind::name && !at_direction() && find(token().text) == nullptr && right.size() > 2;
+    if (has_direction_ && is_unknown && !suggestion(std::string(right), {"rising", "falling"}).empty())
+        fail(token(), fmt::format("'{}' is no direction: write rising or falling", right.substr(0, 40)));
     fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
 }
 
@@ -307,7 +314,11 @@ Syntax parse_formula(const Source& source, const Text& text, const Scope& scope)
 }
 
 EventSyntax parse_crossing(const Source& source, const Text& text, const Scope& scope) {
-    return parser_of(source, text, scope).crossing();
+    return parser_of(source, text, scope).crossing("an event", "x = 0, x = 0 rising or x = y falling");
+}
+
+EventSyntax parse_equation(const Source& source, const Text& text, const Scope& scope) {
+    return parser_of(source, text, scope).crossing("an equation", "x^2 + y^2 = 1");
 }
 
 Subject parse_subject(const Source& source, const Text& text, const Scope& scope) {

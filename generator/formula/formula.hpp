@@ -66,6 +66,7 @@ struct EventSyntax {
     int direction = 0;  // rising 1, falling -1
 };
 EventSyntax parse_crossing(const Source& source, const Text& text, const Scope& scope);
+EventSyntax parse_equation(const Source& source, const Text& text, const Scope& scope);  // of a constraint
 
 // A name to declare or to give a force to: "r", "r[i,j]", "x[3]".
 struct Subject {

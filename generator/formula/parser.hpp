@@ -18,7 +18,8 @@ public:
         : source_(source), scope_(scope), indices_(scope.indices), tokens_(tokenise(source, text, scope.formula)) {}
 
     Syntax formula();
-    EventSyntax crossing();
+    // `what`, and the form in which it is written, stand in errors.
+    EventSyntax crossing(const std::string& what, const std::string& form);
     Subject subject();
 
 private:

@@ -126,7 +126,7 @@ void SystemReader::read_constraint(const Entry& entry) {
                          equation->value.kind_name()));
     Scope scope{&names_, "the constraint " + name, true, {}};
     if (index) scope.indices = {*index};
-    const EventSyntax sides = parse_crossing(source_, equation->value.text, scope);
+    const EventSyntax sides = parse_equation(source_, equation->value.text, scope);
     if (sides.direction != 0)
         fail(equation->value.at, "a constraint holds at all times: leave out 'rising' or 'falling'");
     for (long i = 1; i <= count; ++i) {

@@ -276,24 +276,10 @@ struct Export {
     }
 
     static std::int32_t start(void* stepper, const void* time, const void* q, const void* p) {
-        if constexpr (has_switches) take_sides(*static_cast<S*>(stepper), *in(time), in(q), in(p));
-        const Status status = static_cast<S*>(stepper)->start(*in(time), in(q), in(p));
-        if constexpr (has_walls) {
-            if (status == Status::ok) return code(side_of_walls(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
-        }
-        return code(status);
-    }
-    // The side of each switch where a state is; a velocity is that of the sides so far.
-    static void take_sides(S& stepper, real time, const real* q, const real* p) {
-        real velocity[n];
-        if (stepper.velocity(time, q, p, velocity) == Status::ok) take_sides_at(stepper, time, q, velocity);
-    }
-    static void take_sides_at(S& stepper, real time, const real* q, const real* velocity) {
-        real values[K::events];
-        Formulas<K>::event(stepper.coefficients, time, q, velocity, +values);
-        for (int i = 0; i < switches_of<K>(); ++i)
-            stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
-        stepper.prepare(stepper.parameters, stepper.step_size);
+        if constexpr (has_walls)
+            return code(Sides<K>::start(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
+        else
+            return code(static_cast<S*>(stepper)->start(*in(time), in(q), in(p)));
     }
     static std::int32_t take_inputs(void* stepper, const void* parameters) {
         if constexpr (inputs > 0) {
@@ -307,48 +293,25 @@ struct Export {
             }
             Status status = set_inputs(here, values);
             if constexpr (has_walls) {
-                if (status == Status::ok) status = look_around(here);
+                if (status == Status::ok) status = Sides<K>::take_again(here);
             }
             return code(status);
         }
         return LOBATTO_UNSUPPORTED;
     }
     static constexpr auto inputs_taken = inputs > 0 ? take_inputs : nullptr;
-    // After a change of formulas: the sides of switches, and of walls, where the motion is.
-    static Status look_around(S& stepper) {
-        const real time = stepper.time();
-        real q[n], p[n];
-        for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
-        stepper.momentum(p);
-        if constexpr (has_switches) {
-            take_sides(stepper, time, q, p);
-            const Status status = stepper.restart(q, p, stepper.steps);
-            if (status != Status::ok) return status;
-        }
-        return side_of_walls(stepper, time, q, p);
-    }
     // What `use` makes of the stepper as it is at a state.
     template <class Use>
     static auto at_state(const void* stepper, const void* time, const void* q, const void* p, const Use& use) {
         if constexpr (has_switches) {
             S local = of(stepper);
-            take_sides(local, *in(time), in(q), in(p));
+            Sides<K>::take(local, *in(time), in(q), in(p));
             return use(local);
         } else {
             (void)time, (void)q, (void)p;
             return use(of(stepper));
         }
     }
-    // Whether a state is where the motion may be.
-    static Status side_of_walls(S& stepper, real time, const real* q, const real* p) {
-        Walls<K> wall;
-        for (real& scale : stepper.wall_scale) scale = real(0);
-        const Status status = wall.look(stepper, time, q, p);
-        for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
-            if (wall.is_behind(w)) return Status::off_constraints;
-        return status;
-    }
-
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
         call->steps_done = call->records_written = call->events_written = call->iterations = 0;
         call->chain_steps = 0;
@@ -444,7 +407,7 @@ struct Export {
     static void momentum(const void* stepper, const void* time, const void* q, const void* velocity, void* p) {
         if constexpr (has_switches) {
             S local = of(stepper);
-            take_sides_at(local, *in(time), in(q), in(velocity));
+            Sides<K>::take_at(local, *in(time), in(q), in(velocity));
             local.momentum(*in(time), in(q), in(velocity), out(p));
         } else {
             of(stepper).momentum(*in(time), in(q), in(velocity), out(p));

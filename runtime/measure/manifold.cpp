@@ -147,7 +147,7 @@ double area_defect(const Kernel& kernel, const QuadrupleStart& start, Quadruple 
 double return_distance(const Kernel& kernel, const QuadrupleStart& start, Quadruple step, std::int64_t steps) {
     LoadedStepper<Quadruple> stepper(kernel);
     Numbers128 q = start.q, p = start.p;
-    Quadruple time = 0;
+    Quadruple time = 0, size = largest_of(start.q);
     for (const Quadruple h : {step, -step}) {
         lobatto_advance call{};
         call.steps = steps;
@@ -155,10 +155,11 @@ double return_distance(const Kernel& kernel, const QuadrupleStart& start, Quadru
             stepper.advance(call) != LOBATTO_OK)
             throw ComputationError("a step fails on the way");
         stepper.state(time, q, p);
+        size = std::max(size, largest_of(q));
     }
     Quadruple distance = 0;
     for (std::size_t k = 0; k < q.size(); ++k) distance = std::max(distance, magnitude(q[k] - start.q[k]));
-    return static_cast<double>(distance / largest_of(start.q));
+    return static_cast<double>(distance / size);
 }
 
 }  // namespace lobatto

@@ -13,7 +13,7 @@ namespace lobatto {
 // the motion. Directions and images are differences of neighbours 1e-9 apart, good to about 1e-17.
 double area_defect(const Kernel& kernel, const QuadrupleStart& start, __float128 step);
 
-// Forwards and, with -h, backwards again: the distance from the start, relative to the largest position.
+// Forwards and, with -h, backwards again: the distance from the start, relative to the largest position on the way.
 double return_distance(const Kernel& kernel, const QuadrupleStart& start, __float128 step, std::int64_t steps);
 
 }  // namespace lobatto

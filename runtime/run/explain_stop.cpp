@@ -77,6 +77,11 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             advice = "to compile it from a scene whose [output] asks for it";
             break;
         case LOBATTO_OFF_CONSTRAINTS:
+            if (result.started) {
+                why = "the reset of an impact leads to positions or momenta that do not keep the constraints";
+                advice = "a reset that keeps them, or a restitution, which does";
+                break;
+            }
             why = "the start does not keep the constraints: its positions or its momenta are off";
             advice = "positions and velocities that keep them, or assemble = true under [run] of the scene";
             break;

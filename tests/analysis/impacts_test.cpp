@@ -252,6 +252,41 @@ TEST_CASE("a wall that is touched and not crossed does nothing") {
     CHECK(ended.result.p == std::vector<double>{1, 0});
 }
 
+TEST_CASE("the motion arrives at a wall, and never crosses it: an event there falls as often as the wall is met") {
+    for (int i = 0; i < 30; ++i) {
+        const double from = 0.7 + 0.11 * i;
+        CAPTURE(from);
+        const Ended ended = run(
+            fmt::format("lagrangian = \"y'^2/2 - 9.81*y\"\n[coordinates]\ny = {{ position = {}, velocity = 0 }}\n"
+                        "[impacts]\nf = {{ when = \"y = 0 falling\" }}\n",
+                        from) +
+            method("points = 4", 0.1, 60) + "[output]\nevents = [\"y = 0\", \"y = 0 rising\", \"y = 0 falling\"]\n");
+        int met[4] = {};
+        for (const auto& event : ended.events) ++met[static_cast<int>(event[0])];
+        CHECK(met[3] > 30);
+        CHECK(met[0] == met[3]);
+        CHECK(met[1] == 0);
+        CHECK(met[2] == met[3]);
+    }
+}
+
+TEST_CASE("a reset that leads off a constraint is told as that, not as a wrong start") {
+    const std::string text =
+        "lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\nx = { position = 0.5, velocity = 2 }\n"
+        "y = { position = 0.25, velocity = 2 }\n[constraints]\nc = \"sin(y - x^2) = 0\"\n[impacts]\n"
+        "w = { when = \"y = 0.5 rising\", reset = { \"x\" = \"-x/2\" } }\n" +
+        method("points = 5", 0.01, 3);
+    const Scene scene = scene_of(text);
+    const Kernel kernel = kernel_of(emit(derive(scene)), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    const TrajectoryRequest request = request_of(scene, steps_of(scene, {}).count, stepper);
+    const TrajectoryResult result = integrate(kernel, request);
+    CHECK(result.status == LOBATTO_OFF_CONSTRAINTS);
+    CHECK(result.steps_done > 0);
+    CHECK(explain_stop(result, request).find("the reset of an impact leads to positions or momenta that do not keep") !=
+          std::string::npos);
+}
+
 TEST_CASE("a reset is the state after the impact") {
     const Ended ended =
         run("lagrangian = \"x'^2/2\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[impacts]\n"

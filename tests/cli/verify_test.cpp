@@ -84,6 +84,31 @@ TEST_CASE("coordinates that a constraint holds at 0 are not accused") {
     CHECK(result.exit_code == 0);
 }
 
+TEST_CASE("right kernels are not accused where coordinates that constraints join begin at 0") {
+    const TemporaryFolder folder;
+    write_text(folder / "ring.toml",
+               "lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n"
+               "y = { position = 0, velocity = 0 }\n[constraints]\nc = \"x^2 + (y - 1)^2 = 1\"\n"
+               "[run]\nstep = 0.01\nuntil = 1\n");
+    // Three hinged bars, drawn where they start: all angles are 0.
+    const std::string bars =
+        "[bodies]\na = { mass = 1, inertia = 1, position = [1, 0] }\n"
+        "b = { mass = 1, inertia = 1, position = [2, 1], angle = \"pi/2\" }\n"
+        "c = { mass = 1, inertia = 1, position = [1, 2] }\n[joints]\n"
+        "A = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0], velocity = 1 }\n"
+        "B = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [2, 0], velocity = -1 }\n"
+        "C = { type = \"hinge\", bodies = [\"b\", \"c\"], point = [2, 2], velocity = 1 }\n"
+        "D = { type = \"hinge\", bodies = [\"ground\", \"c\"], point = [0, 2] }\n[run]\nuntil = 1\nstep = ";
+    write_text(folder / "bars.toml", bars + "0.01\n");
+    write_text(folder / "short.toml", bars + "0.0005\n");
+    for (const char* scene : {"ring.toml", "bars.toml", "short.toml"}) {
+        const Finished result = verify({folder / scene});
+        INFO(result.out << result.err);
+        CHECK(result.exit_code == 0);
+        CHECK(!contains(result.out, "FAILED"));
+    }
+}
+
 TEST_CASE("what forces and time take away is not promised, the rest is checked, for Gauss too") {
     const TemporaryFolder folder;
     write_text(folder / "driven.toml",

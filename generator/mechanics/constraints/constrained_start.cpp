@@ -14,6 +14,20 @@ cln::cl_R power_of_ten(int exponent) {
     return cln::expt(cln::cl_RA(10), exponent);
 }
 
+using Numbers = std::vector<cln::cl_R>;
+
+Numbers difference(const Numbers& a, const Numbers& b) {
+    Numbers result;
+    for (std::size_t k = 0; k < a.size(); ++k) result.push_back(a[k] - b[k]);
+    return result;
+}
+
+cln::cl_R largest_of(const Numbers& numbers) {
+    cln::cl_R largest = 0;
+    for (const cln::cl_R& number : numbers) largest = cln::max(largest, cln::abs(number));
+    return largest;
+}
+
 }  // namespace
 
 ConstrainedStart::ConstrainedStart(const Scene& scene, const System& system, Formulas& start,
@@ -44,36 +58,97 @@ void ConstrainedStart::keep_positions() {
     if (off && !scene_.run.assemble) refuse(*off, what, moved_text(system_.q, given));
 }
 
-// Newton's iteration M (q - q0) + G^T mu = 0, phi(q) = 0, its steps halved while phi would grow.
+// M (q - q0) = G^T mu, phi(q) = 0, with M at q0. Steps without the second derivatives of phi go down, halved while phi
+// would grow, but slowly where phi curves; those of Newton's iteration are taken where they are the better ones.
 void ConstrainedStart::move_positions(const Numbers& given) {
     const cln::cl_R small = power_of_ten(-working_digits() / 2);
+    const MassEquations::Entries mass = equations_.mass();
     Numbers q = given;
-    for (int iteration = 0; iteration < 100; ++iteration) {
-        Numbers away;
-        for (std::size_t k = 0; k < q.size(); ++k) away.push_back(q[k] - given[k]);
-        Numbers right = equations_.mass_times(away);
-        for (const cln::cl_R& phi : start_.evaluate(constraints_)) right.push_back(phi);
-        const Elimination step = equations_.eliminate(right);
+    for (int iteration = 0; iteration < 200; ++iteration) {
+        const Numbers right = residual(mass, given);
+        const Elimination step = equations_.eliminate(mass, right);
         if (step.singular) break;
-        const std::optional<cln::cl_R> before = square();
-        cln::cl_RA fraction = 1;
-        for (int halvings = 0; halvings < 60; ++halvings, fraction = fraction / 2) {
-            for (std::size_t k = 0; k < q.size(); ++k) start_.set(system_.q[k], q[k] - fraction * step.vector[k]);
-            const std::optional<cln::cl_R> now = square();
-            if (now && *now <= *before) break;
-        }
+        if (iteration < 2 || !newton_step(mass, given, right, step)) go(q, step.vector);
         const Numbers moved = values_of(system_.q);
-        cln::cl_R change = 0, size = 0;
-        for (std::size_t k = 0; k < q.size(); ++k) {
-            change = cln::max(change, cln::abs(moved[k] - q[k]));
-            size = cln::max(size, cln::abs(moved[k]));
-        }
+        const cln::cl_R change = largest_of(difference(moved, q)), size = largest_of(moved);
         q = moved;
         const bool stands = change <= size * small;
         if (stands && !furthest(constraints_)) return;
         if (stands && iteration > 0) break;
     }
     if (const std::optional<std::size_t> off = furthest(constraints_)) refuse_unreachable(*off);
+}
+
+// M (q - q0), then phi(q).
+ConstrainedStart::Numbers ConstrainedStart::residual(const MassEquations::Entries& mass, const Numbers& given) const {
+    const Numbers away = difference(values_of(system_.q), given);
+    Numbers right(away.size(), cln::cl_R(0));
+    for (const auto& [place, value] : mass) {
+        cln::cl_R& row = right[static_cast<std::size_t>(place.first)];
+        row = row + value.value * away[static_cast<std::size_t>(place.second)];
+    }
+    for (const cln::cl_R& phi : start_.evaluate(constraints_)) right.push_back(phi);
+    return right;
+}
+
+// From q along a step, the whole of it, a half, a quarter, ... so that phi does not grow.
+void ConstrainedStart::go(const Numbers& q, const Numbers& step) {
+    const std::optional<cln::cl_R> before = square();
+    cln::cl_RA fraction = 1;
+    for (int halvings = 0; halvings < 60; ++halvings, fraction = fraction / 2) {
+        for (std::size_t k = 0; k < q.size(); ++k) start_.set(system_.q[k], q[k] - fraction * step[k]);
+        const std::optional<cln::cl_R> now = square();
+        if (now && *now <= *before) return;
+    }
+}
+
+// Newton's step, where what it leaves to do is a quarter of `step` at most; else positions stay.
+bool ConstrainedStart::newton_step(const MassEquations::Entries& mass, const Numbers& given, const Numbers& right,
+                                   const Elimination& step) {
+    if (bends_.empty()) find_bends();
+    const Numbers q = values_of(system_.q);
+    const std::size_t n = q.size();
+    for (std::size_t c = 0; c < mu_.size(); ++c) start_.set(mu_[c], step.vector[n + c]);
+    bool is_better = false;
+    try {
+        MassEquations::Entries block = mass;
+        const std::vector<Sized> bends = start_.evaluate_sized(bends_);
+        for (std::size_t i = 0; i < bends.size(); ++i) {
+            Sized& entry = block.try_emplace(bend_places_[i], Sized{cln::cl_R(0), cln::cl_R(0)}).first->second;
+            entry.value = entry.value - bends[i].value;
+            entry.size = entry.size + bends[i].size;
+        }
+        const Elimination newton = equations_.eliminate(block, right);
+        if (!newton.singular) {
+            for (std::size_t k = 0; k < n; ++k) start_.set(system_.q[k], q[k] - newton.vector[k]);
+            const Elimination left = equations_.eliminate(mass, residual(mass, given));
+            const auto positions = [n](const Elimination& of) {
+                return Numbers(of.vector.begin(), of.vector.begin() + static_cast<std::ptrdiff_t>(n));
+            };
+            is_better = !left.singular && 4 * largest_of(positions(left)) <= largest_of(positions(step));
+        }
+    } catch (const DomainError&) {
+    }
+    for (const auto& mu : mu_) start_.set(mu, cln::cl_R(0));
+    if (!is_better)
+        for (std::size_t k = 0; k < n; ++k) start_.set(system_.q[k], q[k]);
+    return is_better;
+}
+
+// The second derivatives of mu phi.
+void ConstrainedStart::find_bends() {
+    std::map<std::pair<int, int>, GiNaC::ex> sums;
+    for (const auto& [place, slope] : system_.constraint_q.entries())
+        for (std::size_t k = 0; k < system_.q.size(); ++k)
+            if (slope.has(system_.q[k]))
+                sums[{place.second, static_cast<int>(k)}] +=
+                    mu_[static_cast<std::size_t>(place.first)] * slope.diff(system_.q[k]);
+    std::vector<GiNaC::ex> formulas;
+    for (const auto& [place, sum] : sums) {
+        bend_places_.push_back(place);
+        formulas.push_back(sum);
+    }
+    bends_ = start_.convert(formulas);
 }
 
 // M (v - v0) + G^T mu = 0, G v + dphi/dt = 0; the second look takes the rounding of the first away.

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "generator/mechanics/system/mass_equations.hpp"
@@ -36,6 +37,11 @@ private:
     Numbers values_of(const std::vector<GiNaC::symbol>& symbols) const;
     std::optional<cln::cl_R> square() const;
     void move_positions(const Numbers& given);
+    Numbers residual(const MassEquations::Entries& mass, const Numbers& given) const;
+    void go(const Numbers& q, const Numbers& step);
+    bool newton_step(const MassEquations::Entries& mass, const Numbers& given, const Numbers& right,
+                     const Elimination& step);
+    void find_bends();
     [[noreturn]] void refuse(std::size_t constraint, const std::string& what, const std::string& nearest) const;
     [[noreturn]] void refuse_unreachable(std::size_t constraint) const;
 
@@ -45,6 +51,8 @@ private:
     const MassEquations& equations_;
     std::vector<GiNaC::symbol> mu_;
     std::vector<Id> momentum_, rates_, constraints_;
+    std::vector<std::pair<int, int>> bend_places_;  // of d2(mu phi)/dq2, when they were asked for
+    std::vector<Id> bends_;
 };
 
 }  // namespace lobatto

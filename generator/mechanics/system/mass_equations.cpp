@@ -6,37 +6,33 @@
 namespace lobatto {
 
 MassEquations::MassEquations(const System& system, Formulas& formulas) : system_(system), formulas_(formulas) {
-    std::vector<GiNaC::ex> entries;
+    std::vector<GiNaC::ex> masses, slopes;
     for (const auto& [place, value] : system.momentum_v.entries()) {
         places_.push_back(place);
-        entries.push_back(value);
+        masses.push_back(value);
     }
     for (const auto& [place, value] : system.constraint_q.entries()) {
         const int row = system.n + place.first;
-        places_.emplace_back(row, place.second);
-        places_.emplace_back(place.second, row);
-        entries.insert(entries.end(), 2, value);
+        slope_places_.emplace_back(row, place.second);
+        slope_places_.emplace_back(place.second, row);
+        slopes.insert(slopes.end(), 2, value);
     }
-    values_ = formulas.convert(entries);
+    values_ = formulas.convert(masses);
+    slopes_ = formulas.convert(slopes);
 }
 
-Elimination MassEquations::eliminate(std::vector<cln::cl_R> right) const {
-    right.resize(unknowns(), cln::cl_R(0));
+MassEquations::Entries MassEquations::mass() const {
     const std::vector<Sized> values = formulas_.evaluate_sized(values_);
-    std::map<std::pair<int, int>, Sized> matrix;
-    for (std::size_t i = 0; i < places_.size(); ++i) matrix[places_[i]] = values[i];
-    return lobatto::eliminate(matrix, std::move(right));
+    Entries entries;
+    for (std::size_t i = 0; i < places_.size(); ++i) entries[places_[i]] = values[i];
+    return entries;
 }
 
-std::vector<cln::cl_R> MassEquations::mass_times(const std::vector<cln::cl_R>& x) const {
-    const std::vector<cln::cl_R> values = formulas_.evaluate(values_);
-    std::vector<cln::cl_R> product(system_.q.size(), cln::cl_R(0));
-    for (std::size_t i = 0; i < system_.momentum_v.entries().size(); ++i) {
-        const auto row = static_cast<std::size_t>(places_[i].first),
-                   column = static_cast<std::size_t>(places_[i].second);
-        product[row] = product[row] + values[i] * x[column];
-    }
-    return product;
+Elimination MassEquations::eliminate(Entries block, std::vector<cln::cl_R> right) const {
+    right.resize(unknowns(), cln::cl_R(0));
+    const std::vector<Sized> slopes = formulas_.evaluate_sized(slopes_);
+    for (std::size_t i = 0; i < slope_places_.size(); ++i) block[slope_places_[i]] = slopes[i];
+    return lobatto::eliminate(block, std::move(right));
 }
 
 std::string MassEquations::dependent_constraints(const Elimination& singular) const {

@@ -425,7 +425,8 @@ private:
     bool is_zero(const Sample& sample, int e) {
         return is_wall(e) ? fabs(sample.value) <= slack[e - first_wall] : is_rounding(sample, e);
     }
-    // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number.
+    // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
+    // time, in which a position goes its way.
     bool is_rounding(const Sample& sample, int e) {
         if (!sample.is_exact) return false;
         real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
@@ -435,12 +436,13 @@ private:
         state_at(sample.theta, row);
         if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
         if (status != Status::ok) return false;
-        const real moved = real(1) + real(64) * Limits<real>::epsilon;
+        const real few = real(64) * Limits<real>::epsilon, h = fabs(step->step_size),
+                   passed = fabs(row[0]) > h ? fabs(row[0]) : h;
         real change = real(0);
         for (int k = 0; k <= 2 * n; ++k) {
             real& number = k == 0 ? row[0] : k <= n ? row[k] : velocity[k - n - 1];
-            const real before = number;
-            number *= moved;
+            const real before = number, way = k == 0 || k > n ? real(0) : fabs(velocity[k - 1]) * passed;
+            number += few * (fabs(number) > way ? number : way);
             Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
             number = before;
             if (is_finite(values[e])) change += fabs(values[e] - sample.value);
@@ -451,6 +453,7 @@ private:
     // The changes of sign along the samples. A zero at a sample, or what is rounding there, is one if the sign beyond
     // it is another: else g only touches zero. Where g is not defined in between, nothing has happened.
     void walk(int e, real until) {
+        if (e < 0) __builtin_unreachable();  // what g++ would warn of
         real& last = step->event_values[e];  // that is not zero
         int zero = -1, before = -1;          // samples: the first zero since the one before, which has the sign of last
         for (int i = 0; i < sample_count && status == Status::ok; ++i) {
@@ -460,7 +463,8 @@ private:
                 zero = before = -1;
             } else if (here.value == real(0) || is_zero(here, e)) {
                 if (zero < 0) zero = i;
-                if (i == 0 && step->steps == 1 && !is_wall(e)) last = real(0);  // the motion starts there
+                // The motion starts there, or goes on there from an impact, whose state is the only one looked at.
+                if (i == 0 && (step->steps == 1 || last == here.value) && !is_wall(e)) last = real(0);
             } else {
                 if (changes(last, here.value)) {
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;

@@ -111,6 +111,59 @@ private:
     }
 };
 
+// On which side of walls and switches a stepper is.
+template <class K>
+struct Sides {
+    using real = typename K::real;
+    using S = WatchedStepper<K>;
+    static constexpr int n = K::coordinates;
+
+    // Of each switch where a state is.
+    static void take_at(S& stepper, real time, const real* q, const real* velocity) {
+        if constexpr (switches_of<K>() > 0) {
+            real values[K::events];
+            Formulas<K>::event(stepper.coefficients, time, q, velocity, +values);
+            for (int i = 0; i < switches_of<K>(); ++i)
+                stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
+            stepper.prepare(stepper.parameters, stepper.step_size);
+        }
+    }
+    // The velocity is that of the sides so far.
+    static void take(S& stepper, real time, const real* q, const real* p) {
+        if constexpr (switches_of<K>() > 0) {
+            real velocity[n];
+            if (stepper.velocity(time, q, p, velocity) == Status::ok) take_at(stepper, time, q, velocity);
+        }
+    }
+    // Whether a state is where the motion may be.
+    static Status of_walls(S& stepper, real time, const real* q, const real* p) {
+        Walls<K> wall;
+        for (real& scale : stepper.wall_scale) scale = real(0);
+        const Status status = wall.look(stepper, time, q, p);
+        for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
+            if (wall.is_behind(w)) return Status::off_constraints;
+        return status;
+    }
+    static Status start(S& stepper, real time, const real* q, const real* p) {
+        take(stepper, time, q, p);
+        const Status status = stepper.start(time, q, p);
+        return status == Status::ok ? of_walls(stepper, time, q, p) : status;
+    }
+    // After a change of formulas, where the motion is.
+    static Status take_again(S& stepper) {
+        const real time = stepper.time();
+        real q[n], p[n];
+        for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
+        stepper.momentum(p);
+        if constexpr (switches_of<K>() > 0) {
+            take(stepper, time, q, p);
+            const Status status = stepper.restart(q, p, stepper.steps);
+            if (status != Status::ok) return status;
+        }
+        return of_walls(stepper, time, q, p);
+    }
+};
+
 // Looks at each step of one stepper: keep before it, look after it.
 template <class K>
 class Watch {
@@ -269,6 +322,64 @@ private:
         put(stepper, rest->q, momentum, stepper.steps);
         for (int e = 0; e < K::events; ++e) stepper.event_values[e] = rest->event_values[e];
     }
+};
+
+// A stepper with all that its kernel looks for: events, stops, impacts, switches. A step is one from t to t + h,
+// whatever it meets on the way. For programs that hold a kernel's text; it allocates when it starts.
+template <class K>
+class HybridStepper {
+public:
+    using real = typename K::real;
+    static constexpr int n = K::coordinates, columns = Watch<K>::columns;
+
+    HybridStepper() = default;
+    HybridStepper(const HybridStepper&) = delete;
+    HybridStepper& operator=(const HybridStepper&) = delete;
+    ~HybridStepper() { delete looks; }
+
+    Status prepare(const typename K::Parameters& parameters, real h) {
+        delete looks;
+        looks = nullptr;
+        stepper.parameters = parameters;
+        return stepper.prepare(parameters, h);
+    }
+    // Status::off_constraints behind a wall.
+    Status start(real time, const real* q, const real* p) {
+        delete looks;
+        looks = nullptr;
+        Status status;
+        if constexpr (WatchedStepper<K>::walls > 0)
+            status = Sides<K>::start(stepper, time, q, p);
+        else
+            status = stepper.start(time, q, p);
+        if (status == Status::ok) looks = new Looks(stepper);
+        return status;
+    }
+    // Status::stopped: the motion met a stop in this step, where the last event says. To be called after start().
+    Status step() {
+        looks->count = 0;
+        looks->watch.keep(stepper);
+        const Status status = stepper.step();
+        return status == Status::ok ? looks->watch.look(stepper, looks->rows, looks->count) : status;
+    }
+
+    real time() const { return stepper.time(); }
+    const real* q() const { return stepper.q; }
+    void momentum(real* p) const { stepper.momentum(p); }
+    // Of the last step, in the order of the motion: number (those of the scene: events, stops, impacts), t, q[n], p[n];
+    // of an impact the state after it.
+    std::int64_t events() const { return looks == nullptr ? 0 : looks->count; }
+    const real* event(std::int64_t i) const { return looks->rows + i * columns; }
+
+private:
+    struct Looks {
+        explicit Looks(const WatchedStepper<K>& stepper) : watch(stepper) {}
+        Watch<K> watch;
+        real rows[Watch<K>::most * columns];
+        std::int64_t count = 0;
+    };
+    WatchedStepper<K> stepper{};
+    Looks* looks = nullptr;
 };
 
 }  // namespace lobatto

@@ -78,6 +78,70 @@ TEST_CASE("a standalone pendulum carries what it stands on, at most 3120 lines, 
     }
 }
 
+TEST_CASE("an emitted kernel with walls, switches and events takes the steps of the run, with all that they meet") {
+    struct Case {
+        std::string scene, start;
+        int steps;
+        double h;
+    };
+    for (const Case& tried :
+         {Case{"bouncing_ball", "{1}, p[] = {0}", 150, 0.02}, Case{"rubbing", "{1.5}, p[] = {0}", 60, 0.05}}) {
+        CAPTURE(tried.scene);
+        const test::TemporaryFolder folder;
+        std::string file = tree + "/scenes/" + tried.scene + ".toml";
+        if (tried.scene == "rubbing") {  // dry friction: a switch where the velocity is 0
+            file = folder / "rubbing.toml";
+            test::write_text(file,
+                             "lagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1.5, velocity = 0 }\n"
+                             "[forces]\nx = \"-0.05*sign(x')\"\n[output]\nevents = [\"x = 0\"]\n"
+                             "[method]\npoints = 3\n[run]\nstep = 0.05\nuntil = 3\n");
+        }
+        const test::Finished emitted =
+            test::run({LOBATTO_PROGRAM, "emit", file, "--standalone", "-o", folder.string()});
+        REQUIRE_MESSAGE(emitted.exit_code == 0, emitted.err);
+        CHECK(emitted.out.find("lobatto::HybridStepper<lobatto::kernels::" + tried.scene) != std::string::npos);
+        test::write_text(folder / "program.cpp",
+                         fmt::format("#include \"{}.hpp\"\n#include <cstdio>\n"
+                                     "int main() {{\n"
+                                     "    lobatto::HybridStepper<lobatto::kernels::{}> stepper;\n"
+                                     "    const double q[] = {};\n"
+                                     "    if (stepper.prepare({{}}, {}) != lobatto::Status::ok) return 1;\n"
+                                     "    if (stepper.start(0, q, p) != lobatto::Status::ok) return 2;\n"
+                                     "    long met = 0;\n"
+                                     "    for (int i = 0; i < {}; ++i) {{\n"
+                                     "        if (stepper.step() != lobatto::Status::ok) return 3;\n"
+                                     "        met += stepper.events();\n"
+                                     "    }}\n"
+                                     "    double momentum;\n"
+                                     "    stepper.momentum(&momentum);\n"
+                                     "    std::printf(\"%.17g %.17g %ld\\n\", stepper.q()[0], momentum, met);\n"
+                                     "}}\n",
+                                     tried.scene, tried.scene, tried.start, tried.h, tried.steps));
+        const test::Finished compiled =
+            test::run({"g++", "-std=c++17", "-O2", "-march=native", "-ffp-contract=off", "-Wall", "-Wextra",
+                       "-Wpedantic", "-Werror", "-o", folder / "program", folder / "program.cpp"});
+        REQUIRE_MESSAGE(compiled.exit_code == 0, compiled.err);
+        const test::Finished ran = test::run({folder / "program"});
+        REQUIRE(ran.exit_code == 0);
+        const test::Finished whole =
+            test::run({LOBATTO_PROGRAM, "run", file, "--until", fmt::format("{}", tried.steps * tried.h), "-o",
+                       folder / "run.csv", "--json", "--unmeasured"});
+        const std::string rows = test::read_file(folder / "run.csv"),
+                          events = test::read_file(folder / "run.events.csv");
+        const std::string last = rows.substr(rows.rfind('\n', rows.size() - 2) + 1);
+        double t = 0, x = 0, p = 0, emitted_x = 0, emitted_p = 0;
+        long met = 0;
+        REQUIRE(std::sscanf(last.c_str(), "%lf,%lf,%lf", &t, &x, &p) == 3);
+        REQUIRE(std::sscanf(ran.out.c_str(), "%lf %lf %ld", &emitted_x, &emitted_p, &met) == 3);
+        CHECK(emitted_x == x);
+        CHECK(emitted_p == p);
+        const long lines = std::count(events.begin(), events.end(), '\n'),
+                   comments = std::count(events.begin(), events.end(), '#');
+        CHECK(met == lines - comments - 1);
+        CHECK(met > 0);
+    }
+}
+
 TEST_CASE("standalone kernels of every precision compile with nothing else, run, and agree" *
           doctest::test_suite("slow")) {
     // q after ten steps of 0.05 from q = 1, p = 0: what each precision may differ by, in its own epsilon, is below

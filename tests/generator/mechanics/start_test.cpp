@@ -123,3 +123,31 @@ TEST_CASE("what has no value where it stands is an error, also where the rest of
          {"m*x'^2/2 - k*sqrt(x^2)", "m*x'^2/2 - k*(sqrt(x))^2", "m*x'^2/2 - k*x/x", "m*x'^2/2 - k*exp(log(x))"})
         CHECK_MESSAGE(refusal(lagrangian, one, mk) == "accepted", lagrangian);
 }
+
+TEST_CASE("a start is moved to the nearest that keeps the constraints, to all digits, also where they curve sharply") {
+    // On an ellipse, from inside its evolute, from outside it, from far away and from almost on the line.
+    for (const auto& [x0, y0] : {std::pair{"1.45", "0.01"},
+                                 {"1.4", "0.001"},
+                                 {"0", "0.01"},
+                                 {"6", "1"},
+                                 {"0.3", "0.95"},
+                                 {"1e-9", "3"},
+                                 {"-2.0000001", "1e-7"},
+                                 {"1.6", "0.1"}}) {
+        const std::string tried = std::string(x0) + ", " + y0;  // bindings cannot be captured
+        CAPTURE(tried);
+        const Scene scene = read_scene(
+            Source("scene.toml", std::string("lagrangian = \"(x'^2 + 3*y'^2)/2\"\n[coordinates]\nx = { position = ") +
+                                     x0 + ", velocity = 0 }\ny = { position = " + y0 +
+                                     ", velocity = 0.2 }\n[constraints]\nc = \"x^2/4 + y^2 = 1\"\n[run]\nstep = 0.1\n"
+                                     "until = 1\nassemble = true\n"));
+        const StartOnConstraints start = start_on_constraints(scene, build_system(scene));
+        const cln::cl_R x = start.q[0], y = start.q[1];
+        const auto given = [&](std::size_t k) {
+            return cln::the<cln::cl_R>(scene.evaluate(scene.initial_position[k], "").to_cl_N());
+        };
+        const cln::cl_R off = x * x / 4 + y * y - 1, along = (x - given(0)) * 2 * y - 3 * (y - given(1)) * x / 2;
+        CHECK(cln::double_approx(cln::abs(off)) < 1e-50);
+        CHECK(cln::double_approx(cln::abs(along)) < 1e-28 * (1 + cln::double_approx(cln::abs(given(0)))));
+    }
+}
