@@ -21,6 +21,15 @@ struct Reason {
     std::string why, advice;
 };
 
+// At the start, or on the way.
+Reason off_constraints(bool on_the_way) {
+    if (on_the_way)
+        return {"the reset of an impact leads to positions or momenta that do not keep the constraints",
+                "a reset that keeps them, or a restitution, which does"};
+    return {"the start does not keep the constraints: its positions or its momenta are off",
+            "positions and velocities that keep them, or assemble = true under [run] of the scene"};
+}
+
 // `smaller`: the advice of a smaller step; `more`: what else to try.
 Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& request, const std::string& smaller,
                  const std::string& more) {
@@ -66,25 +75,16 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
                 "determine velocities";
             advice =
                 "other values of the parameters that stand before the squared velocities, or start elsewhere; none of "
-                "the "
-                "masses may vanish";
+                "the masses may vanish";
             break;
         case LOBATTO_UNSUPPORTED:
             why =
                 "the kernel was compiled without what is asked of it: states between steps, events, energies or "
-                "tangent "
-                "maps";
+                "tangent maps";
             advice = "to compile it from a scene whose [output] asks for it";
             break;
         case LOBATTO_OFF_CONSTRAINTS:
-            if (result.started) {
-                why = "the reset of an impact leads to positions or momenta that do not keep the constraints";
-                advice = "a reset that keeps them, or a restitution, which does";
-                break;
-            }
-            why = "the start does not keep the constraints: its positions or its momenta are off";
-            advice = "positions and velocities that keep them, or assemble = true under [run] of the scene";
-            break;
+            return off_constraints(result.started);
         case LOBATTO_IMPACTS_ACCUMULATE:
             why =
                 "impacts accumulate within this step, more than 100 of them or nearer to one another than can be told "
