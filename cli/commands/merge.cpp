@@ -181,13 +181,15 @@ void merge(const MergeOptions& options) {
 void add_merge(CommandLine& program) {
     Command command = program.command("merge", "Make one table of the parts of a sweep that --shard divided");
     const auto options = std::make_shared<MergeOptions>();
-    command.option("TABLE", options->output, "Table to write: .csv, .npy or .h5, as the parts are").required();
     command.option("PARTS", options->parts, "All parts, in any order").required();
+    command.option("-o,--output", options->output, "Table to write: .csv, .npy or .h5, as the parts are")
+        .shown_as("FILE")
+        .required();
     command.flag("--quiet", options->quiet, "Print nothing but errors");
     command.footer(
         "Example:\n  lobatto sweep scenes/pendulum.toml --vary q=0:3:100 --until 10 --shard 1/2 -o first.npy\n"
         "  lobatto sweep scenes/pendulum.toml --vary q=0:3:100 --until 10 --shard 2/2 -o second.npy\n"
-        "  lobatto merge table.npy first.npy second.npy");
+        "  lobatto merge first.npy second.npy -o table.npy");
     command.does([options] { merge(*options); });
 }
 

@@ -81,7 +81,7 @@ TEST_CASE("shards, merged in any order, are the table of one process, byte for b
         CAPTURE(ending);
         const std::string whole = place.bytes("whole" + ending, varied(place));
         for (const int of : {1, 3, 50, 100}) {  // 84 trajectories: some shards of 100 are empty
-            std::vector<std::string> words{"merge", place.file("merged" + ending)};
+            std::vector<std::string> words{"merge", "-o", place.file("merged" + ending)};
             for (int number = of; number > 0; --number) {
                 const std::string name = fmt::format("part{}{}", number, ending);
                 place.bytes(name, varied(place, {"--shard", fmt::format("{}/{}", number, of), "--quiet"}));
@@ -120,8 +120,8 @@ TEST_CASE("a scene may have the names of the table's own columns, and units with
         const std::string whole = sweep("whole" + ending);
         sweep("1" + ending, {"--shard", "1/2"});
         sweep("2" + ending, {"--shard", "2/2"});
-        const test::Finished merged =
-            place.lobatto({"merge", place.file("m" + ending), place.file("2" + ending), place.file("1" + ending)});
+        const test::Finished merged = place.lobatto(
+            {"merge", place.file("2" + ending), place.file("1" + ending), "-o", place.file("m" + ending)});
         CHECK_MESSAGE(merged.exit_code == 0, merged.err);
         CHECK(test::read_file(place.file("m" + ending)) == whole);
         CHECK(sweep("whole" + ending, {"--resume"}) == whole);
@@ -136,7 +136,7 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
     };
     const std::string out = place.file("all.csv");
     const auto refusal = [&](std::vector<std::string> parts, const std::string& to) {
-        parts.insert(parts.begin(), {"merge", to});
+        parts.insert(parts.begin(), {"merge", "-o", to});
         const test::Finished done = place.lobatto(parts);
         CHECK(done.exit_code == 2);
         CHECK_FALSE(std::filesystem::exists(place.file("all.csv.partial")));
@@ -179,7 +179,7 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
     char& letter = elsewhere[elsewhere.find(label) + label.size()];
     letter = letter == '0' ? '1' : '0';
     test::write_text(two, elsewhere);
-    const test::Finished mixed = place.lobatto({"merge", out, one, two, three, four});
+    const test::Finished mixed = place.lobatto({"merge", one, two, three, four, "-o", out});
     CHECK(mixed.exit_code == 0);
     CHECK(mixed.err == "lobatto: warning: " + two +
                            " was computed on another kind of processor, or by another compiler, than the first of the "
@@ -249,7 +249,7 @@ TEST_CASE("a sweep with stops and with what is kept has the same bytes by thread
         CHECK(std::count(stops.begin(), stops.end(), 0) > 200);
         CHECK(std::count(stops.begin(), stops.end(), 0) < 1000);
         for (const char* threads : {"2", "5"}) CHECK(bytes("more.csv", {"--threads", threads}) == whole);
-        std::vector<std::string> merge{"merge", place.file("merged.csv")};
+        std::vector<std::string> merge{"merge", "-o", place.file("merged.csv")};
         for (const char* part : {"1", "2", "3"}) {
             bytes(std::string(part) + ".csv", {"--shard", std::string(part) + "/3"});
             merge.push_back(place.file(std::string(part) + ".csv"));

@@ -130,7 +130,7 @@ TEST_CASE(
     CHECK(test::read_file(place.file("c.h5.new")) == "of somebody else");
     CHECK_FALSE(std::filesystem::exists(place.file("c.h5")));
     test::write_text(place.file("d.h5"), "\x89HDF and nothing more");
-    const test::Finished merged = place.lobatto({"merge", place.file("e.h5"), place.file("d.h5")});
+    const test::Finished merged = place.lobatto({"merge", place.file("d.h5"), "-o", place.file("e.h5")});
     CHECK(merged.exit_code == 4);
     CHECK(merged.err.find("it is no table that Lobatto wrote as HDF5, or is damaged") != std::string::npos);
 }
