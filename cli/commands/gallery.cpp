@@ -102,6 +102,7 @@ Outputs pictured(const Scene& scene) {
 Picture picture_of_scene(const api::Scene& read) {
     Scene scene = read.parts().scene;
     scene.outputs = pictured(scene);
+    scene.run.stops.clear();  // the picture shows where the motion would go
     const Motion motion = motion_of(api::scene_of(scene));
     const bool nested = motion.is_closed && !scene.clock && shape_of(scene) == Shape::phase;
     return picture_of(scene, motion.states, nested ? smaller_motions(scene, motion.states) : std::vector<MotionRows>{});
