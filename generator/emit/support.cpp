@@ -21,11 +21,17 @@ std::string stepper_of(const Scene& scene, const Structure& structure) {
                                      : "steppers/separable.hpp";
 }
 
+// As is_one_dense_group in runtime/kernel/base/dense.hpp.
+bool is_one_dense_group(const std::vector<Group>& groups) {
+    return groups.size() == 1 && 3 * (groups[0].bandwidth + 1) >= static_cast<int>(groups[0].coordinates.size());
+}
+
 }  // namespace
 
 std::vector<std::string> support_of(const Derivation& derivation, const Graph& graph) {
     std::set<std::string> parts = {stepper_of(derivation.scene, derivation.structure)};
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
+    if (!is_one_dense_group(derivation.structure.groups)) parts.insert("base/grouped.hpp");
     if (has_full_matrix(derivation)) parts.insert("base/full_matrix.hpp");
     if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
     if (!derivation.system.inputs.empty()) parts.insert("steppers/inputs.hpp");

@@ -8,8 +8,9 @@ namespace lobatto {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+// Each kind of decomposition takes seconds to compile: there is one of each.
 VectorXd least_squares(const MatrixXd& A, const VectorXd& b) {
-    return A.completeOrthogonalDecomposition().solve(b);
+    return Eigen::JacobiSVD<MatrixXd>(A, Eigen::ComputeThinU | Eigen::ComputeThinV).solve(b);
 }
 
 std::optional<Eigen::VectorXcd> eigenvalues(const MatrixXd& A) {
@@ -29,7 +30,7 @@ bool is_positive_definite(const MatrixXd& A) {
 }
 
 MatrixXd inverse(const MatrixXd& A) {
-    return A.inverse();
+    return Eigen::FullPivLU<MatrixXd>(A).inverse();
 }
 
 std::optional<MatrixXd> solution(const MatrixXd& A, const MatrixXd& B, double threshold) {

@@ -13,7 +13,7 @@
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), minus_acceleration(k, q, W),
 //   node(k, q, W, S), propagate(k, q, p, q1, p1).
 // Form::separable: the first five of these; points (s, both ends included), c, b, A (interior); entries, entry_row,
-//   entry_column of S; unknowns, N = n (s - 2); E[(s - 2) * s] extrapolates (D15); the tables of base/solve.hpp order
+//   entry_column of S; unknowns, N = n (s - 2); E[(s - 2) * s] extrapolates (D15); the tables of base/grouped.hpp order
 //   the unknowns; `neighbours` says that acceleration can go SideBySide (base/rows.hpp; with row_reach, how far its
 //   rows reach, immediate, that it can go Immediate, and unit_masses), and `absorbed` says that quadratic_part(k, S0)
 //   gives a constant part of S to iterate with; `clean` that steps are those of steppers/clean.hpp. Gauss's nodes stand

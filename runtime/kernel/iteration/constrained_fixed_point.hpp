@@ -12,9 +12,9 @@
 #define LOBATTO_KERNEL_CONSTRAINED_FIXED_POINT_HPP
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
-#include "../base/solve.hpp"
 #include "convergence.hpp"
 #include "stage_map.hpp"
 

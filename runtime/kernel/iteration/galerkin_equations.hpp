@@ -22,7 +22,7 @@
 // Lambda_m follows from the momentum at the end (iteration/velocity_of_momentum.hpp).
 //
 // A kernel of this form provides: active, cyclic and their tables; nodes (r), controls (m + 1), c, b, control, B, D,
-// extrapolation (l_k(1 + x_j)), legendre_polynomial (pi_i, all zero for Gauss); the tables of base/solve.hpp for the
+// extrapolation (l_k(1 + x_j)), legendre_polynomial (pi_i, all zero for Gauss); the tables of base/grouped.hpp for the
 // active coordinates; node(k, z, g, H), slope(k, z, g); entries, entry_row, entry_column of H;
 // legendre(k, q, velocity, p, M), mass_entries, mass_row, mass_column; momentum(k, q, velocity, p);
 // energy(k, q, velocity); slopes(k, q, velocity, Lv, Lq), dL/dv and dL/dq + F over all coordinates.
@@ -32,8 +32,8 @@
 #include <type_traits>
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
-#include "../base/solve.hpp"
 
 namespace lobatto {
 
@@ -105,7 +105,7 @@ constexpr NodeProducts<K, row, column> node_products{};
 template <class K, Slot row, Slot column>  // MPFR is no part of the compiler
 inline const NodeProducts<K, row, column> node_products<K, row, column, true>{};
 
-// A motion with the equations of its steps. What is marked `solver` is in the order of the unknowns that solve.hpp has.
+// A motion with the equations of its steps. What is marked `solver` is in the order of the unknowns that Layout has.
 template <class K>
 struct GalerkinEquations : Motion<K> {
     using typename Motion<K>::real;
@@ -121,13 +121,16 @@ struct GalerkinEquations : Motion<K> {
     static constexpr int room = N > 0 ? N : 1, entry_room = K::entries > 0 ? K::entries : 1;
     static constexpr int cyclic_room = cyclic > 0 ? cyclic : 1, mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
 
-    struct Empty {  // no unknowns: nothing to solve
-        void clear() {}
-        bool factor() { return true; }
-        void solve(real*) const {}
+    struct NoUnknowns {  // nothing to solve
+        template <class>
+        struct Matrix {
+            void clear() {}
+            bool factor() { return true; }
+            void solve(real*) const {}
+        };
     };
-    using Layout = Grouped<K, blocks, m, kappas>;
-    using Matrix = std::conditional_t<(N > 0), GroupedMatrix<real, Layout>, Empty>;
+    using Layout = LayoutOf<K, blocks, m, kappas>;
+    using Matrix = typename std::conditional_t<(N > 0), Layout, NoUnknowns>::template Matrix<real>;
     struct Arrays {
         real Y[room], delta[room], kappa_scale[cyclic_room];
         real z[r * Z], g[r * Z], H[r * entry_room];

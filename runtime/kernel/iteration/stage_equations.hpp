@@ -7,8 +7,8 @@
 #define LOBATTO_KERNEL_STAGE_EQUATIONS_HPP
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
-#include "../base/solve.hpp"
 #include "stage_coefficients.hpp"
 
 namespace lobatto {
@@ -18,8 +18,8 @@ template <class K>
 struct StageEquations {
     using real = typename K::real;
     static constexpr int n = K::coordinates, s = K::points, m = s - 2, N = n * m;
-    using Layout = Grouped<K, n, (m > 0 ? m : 1), 0>;
-    using Matrix = GroupedMatrix<real, Layout>;
+    using Layout = LayoutOf<K, n, (m > 0 ? m : 1)>;
+    using Matrix = typename Layout::template Matrix<real>;
     real h;
 
     explicit StageEquations(real step_size) : h(step_size) {}

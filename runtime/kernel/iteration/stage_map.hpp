@@ -13,9 +13,9 @@
 #include <type_traits>
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
-#include "../base/solve.hpp"
 #include "stage_coefficients.hpp"
 
 namespace lobatto {

@@ -4,8 +4,8 @@
 #define LOBATTO_KERNEL_TANGENT_HPP
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
-#include "../base/solve.hpp"
 
 namespace lobatto {
 

@@ -10,8 +10,8 @@
 #include <type_traits>
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
-#include "../base/solve.hpp"
 
 namespace lobatto {
 
@@ -69,7 +69,7 @@ public:
     }
 
 private:
-    using Layout = std::conditional_t<K::cyclic == 0, Grouped<K, unknowns, 1, 0>, Whole<n>>;
+    using Layout = std::conditional_t<K::cyclic == 0, LayoutOf<K, unknowns, 1>, Single<n>>;
     static constexpr int few = 4;  // iterations, after which only rounding may be left
     static constexpr int mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
     static constexpr int slope_room = K::constraint_entries > 0 ? K::constraint_entries : 1;
@@ -77,7 +77,7 @@ private:
     struct Arrays {
         real x[unknowns], trial[unknowns], residual[unknowns], increment[unknowns], next[unknowns];
         real p[n], mass[mass_room], phi_t[constraints > 0 ? constraints : 1], G[slope_room];
-        GroupedMatrix<real, Layout> matrix;
+        typename Layout::template Matrix<real> matrix;
     };
     struct State {
         const typename K::Coefficients& k;

@@ -7,8 +7,8 @@
 #include <type_traits>
 
 #include "../base/contract.hpp"
+#include "../base/dense.hpp"
 #include "../base/numbers.hpp"
-#include "../base/solve.hpp"
 #include "../iteration/constrained_fixed_point.hpp"
 #include "../iteration/galerkin.hpp"
 #include "../iteration/galerkin_newton.hpp"

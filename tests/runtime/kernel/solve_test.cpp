@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The solvers of runtime/kernel/base/solve.hpp against Eigen: dense, banded, and in groups of either kind.
+// The solvers of runtime/kernel/base/dense.hpp and grouped.hpp against Eigen: dense, banded, and in groups of either
+// kind.
 #include <doctest/doctest.h>
 
 #include <Eigen/LU>
@@ -9,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "runtime/kernel/base/solve.hpp"
+#include "runtime/kernel/base/grouped.hpp"
 
 using namespace lobatto;
 
@@ -47,11 +48,17 @@ struct Chain {
 struct TwoChains : Chain {
     static constexpr int group_count = 2, group_first[3] = {0, 20, 40}, group_bandwidth[2] = {2, 1};
 };
+// Three in a chain, which is dense enough.
+struct Full {
+    static constexpr int position[3] = {2, 0, 1};
+    static constexpr int group_count = 1, group_first[2] = {0, 3}, group_bandwidth[1] = {1};
+};
 
-template <class Layout, class Tables>
-void check_grouped(int extra) {
+template <class Tables, int blocks, int per, int extra = 0>
+void check_grouped() {
+    using Layout = LayoutOf<Tables, blocks, per, extra>;
     for (int trial = 0; trial < 50; ++trial) {
-        GroupedMatrix<double, Layout> matrix;
+        typename Layout::template Matrix<double> matrix;
         matrix.clear();
         MatrixXd A = MatrixXd::Zero(Layout::size, Layout::size);
         const auto group_of = [](int place) {
@@ -59,15 +66,14 @@ void check_grouped(int extra) {
             while (place >= Tables::group_first[g + 1]) ++g;
             return g;
         };
-        const int blocks = Layout::blocks;
         for (int u = 0; u < blocks + extra; ++u)
             for (int v = 0; v < blocks + extra; ++v) {
                 if (u < blocks && v < blocks && extra == 0) {
                     const int a = Tables::position[u], b = Tables::position[v];
                     if (group_of(a) != group_of(b) || std::abs(a - b) > Tables::group_bandwidth[group_of(a)]) continue;
                 }
-                for (int j = 0; j < (u < blocks ? Layout::per : 1); ++j)
-                    for (int k = 0; k < (v < blocks ? Layout::per : 1); ++k) {
+                for (int j = 0; j < (u < blocks ? per : 1); ++j)
+                    for (int k = 0; k < (v < blocks ? per : 1); ++k) {
                         const double value = u == v && j == k ? 1e-9 * entry() : entry();  // so that rows are exchanged
                         matrix(u, j, v, k) += value;
                         A(Layout::index(u, j), Layout::index(v, k)) += value;
@@ -127,13 +133,15 @@ TEST_CASE("banded systems with exchanges of rows are solved to rounding") {
 }
 
 TEST_CASE("a matrix is dense or banded as its groups are, in the kernel's order" * doctest::test_suite("slow")) {
-    CHECK(group_is_dense<Grouped<Groups, 5, 2, 0>>(1));
-    CHECK_FALSE(group_is_dense<Grouped<Chain, 40, 3, 0>>(0));
-    CHECK(places<Grouped<Chain, 40, 3, 0>>.offset[1] == 120 * (3 * 8 + 1));
-    check_grouped<Grouped<Groups, 5, 2, 0>, Groups>(0);
-    check_grouped<Grouped<Chain, 40, 3, 0>, Chain>(0);
-    check_grouped<Grouped<TwoChains, 40, 2, 0>, TwoChains>(0);
-    check_grouped<Grouped<Groups, 5, 2, 3>, Groups>(3);  // single unknowns last: one dense group
+    CHECK(Grouped<Groups, 5, 2>::dense(1));
+    CHECK_FALSE(Grouped<Chain, 40, 3>::dense(0));
+    CHECK(places<Grouped<Chain, 40, 3>>.offset[1] == 120 * (3 * 8 + 1));
+    CHECK(std::is_same_v<LayoutOf<Full, 3, 2>, Dense<Full, 3, 2, 0>>);
+    check_grouped<Groups, 5, 2>();
+    check_grouped<Chain, 40, 3>();
+    check_grouped<TwoChains, 40, 2>();
+    check_grouped<Full, 3, 2>();
+    check_grouped<Groups, 5, 2, 3>();  // single unknowns last: dense
 }
 
 TEST_CASE("a singular matrix is refused") {
