@@ -21,30 +21,39 @@ struct Lanes {
     std::vector<std::int64_t> steps_done, iterations;
 };
 
-std::unique_ptr<SweepStudy> study_of(const Scene& scene, const Starts& starts, const Settings& settings) {
+// The scene without what is of whole motions; InputError where an ensemble cannot do what is asked for.
+Scene scene_for(const Scene& scene, const Settings& settings) {
+    return in_algebra([&] {
+        const lobatto::Scene chosen = with_method(scene, settings);
+        if (chosen.clock || !chosen.run.stops.empty())
+            throw InputError(fmt::format(
+                "{}: the trajectories of an ensemble are all at one time, but {}; leave it out, or take sweep()",
+                chosen.path,
+                !chosen.clock               ? "the scene has stops"
+                : scene.parts().scene.clock ? "the scene has a clock"
+                                            : "the settings ask for a clock"));
+        if (chosen.method.numbers != Precision::double_)
+            throw InputError(chosen.path + ": ensembles are computed in double; leave `numbers` out, or take sweep()");
+        const auto parts = shared_in_algebra(new Scene::Parts(scene.parts()));
+        parts->scene.outputs.kept.clear();
+        return Scene(parts);
+    });
+}
+
+OpenedSweep study_of(const Scene& scene, const Starts& starts, const Settings& settings) {
     SweepOptions options;
     static_cast<Settings&>(options) = settings;
     options.measure = false;
     options.threads = 1;  // the caller's
-    auto parts = std::make_shared<Scene::Parts>(scene.parts());
-    lobatto::Scene& read = parts->scene;
-    read.outputs.kept.clear();  // which is of whole motions
     if (starts.count == 0)
-        throw InputError(read.path + ": an ensemble has one trajectory at least; there are 0 starts");
-    if (read.clock || !read.run.stops.empty())
-        throw InputError(
-            fmt::format("{}: the trajectories of an ensemble are all at one time, but the scene has {}; leave it out, "
-                        "or take sweep()",
-                        read.path, read.clock ? "a clock" : "stops"));
-    if (in_algebra([&] { return with_method(scene, settings); }).method.numbers != Precision::double_)
-        throw InputError(read.path + ": ensembles are computed in double; leave `numbers` out, or take sweep()");
-    return open_sweep(Scene(parts), request_of(starts), options);
+        throw InputError(scene.path() + ": an ensemble has one trajectory at least; there are 0 starts");
+    return open_sweep(scene_for(scene, settings), request_of(starts), options);
 }
 
 }  // namespace
 
 struct Ensemble::Parts {
-    std::unique_ptr<SweepStudy> study;
+    OpenedSweep study;
     std::vector<Variable> parameters;  // as the scene has them
     std::vector<double> step;
     std::int64_t steps = 0;  // taken

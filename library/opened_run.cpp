@@ -7,48 +7,59 @@
 
 namespace lobatto::api {
 
+void OpenedRun::LetGo::operator()(Parts* parts) const {
+    if (parts->observers && parts->observers->companion)
+        parts->observers->companion->end();  // it may wait for formulas
+    LetGoInAlgebra()(parts);
+}
+
 OpenedRun::OpenedRun(const Scene& scene, const RunOptions& options, bool general)
-    : prepared_(in_algebra([&] { return prepare_run(with_method(scene, options), overrides_of(options), general); })),
-      beyond_horizon_(options.beyond_horizon) {
+    : beyond_horizon_(options.beyond_horizon) {
     in_algebra([&] {
-        LoadedStepper<double> stepper(prepared_.plain);
-        request_ = request_of(prepared_.scene, prepared_.steps.count, stepper);
-        add_digits(request_, prepared_.scene, prepared_.kernel);
-        request_.formulas = columns_of(prepared_.scene, request_, &algebra());
+        parts_.reset(new Parts{prepare_run(with_method(scene, options), overrides_of(options), general)});
+        const PreparedRun& prepared = parts_->prepared;
+        TrajectoryRequest& request = parts_->request;
+        LoadedStepper<double> stepper(prepared.plain);
+        request = request_of(prepared.scene, prepared.steps.count, stepper);
+        add_digits(request, prepared.scene, prepared.kernel);
+        request.formulas = columns_of(prepared.scene, request, &algebra());
         std::vector<double> velocity;
-        stepper.velocity(request_.time, request_.q, request_.p, velocity);  // it has one: the start was accepted
-        observers_.emplace(prepared_, stepper, request_, velocity, options.measure);
+        stepper.velocity(request.time, request.q, request.p, velocity);  // it has one: the start was accepted
+        parts_->observers.emplace(prepared, stepper, request, velocity, options.measure);
     });
 }
 
 void OpenedRun::resume(const Halfway& halfway, const std::map<std::string, std::vector<double>>& observers) {
-    observers_->restore(observers);
-    request_.from = &halfway;
+    parts_->observers->restore(observers);
+    parts_->request.from = &halfway;
 }
 
 const TrajectoryResult& OpenedRun::go(const Listeners& listeners) {
     return guarded([&]() -> const TrajectoryResult& {
-        request_.sink = [&](const Records& records) {
+        parts_->request.sink = [&](const Records& records) {
             listeners.states(records);
-            observers_->observe(records);
+            parts_->observers->observe(records);
         };
-        if (!prepared_.scene.reported().empty())
-            request_.events = [&](const EventRecords& records) {
+        if (!parts_->prepared.scene.reported().empty())
+            parts_->request.events = [&](const EventRecords& records) {
                 listeners.events(records);
-                observers_->observe(records);
+                parts_->observers->observe(records);
             };
-        request_.checkpoint = listeners.checkpoint;
-        request_.progress = listeners.progress;
-        request_.interrupted = listeners.interrupted;
-        if (observers_->companion && std::thread::hardware_concurrency() > 1) observers_->companion->start();
-        result_ = integrate(prepared_.kernel, request_);
-        observers_->watch.look_at_end(result_);
-        return result_;
+        parts_->request.checkpoint = listeners.checkpoint;
+        parts_->request.progress = listeners.progress;
+        parts_->request.interrupted = listeners.interrupted;
+        if (parts_->observers->companion && std::thread::hardware_concurrency() > 1)
+            parts_->observers->companion->start();
+        parts_->result = integrate(parts_->prepared.kernel, parts_->request);
+        parts_->observers->watch.look_at_end(parts_->result);
+        return parts_->result;
     });
 }
 
 RunVerdict OpenedRun::verdict() {
-    return in_algebra([&] { return verdict_of(prepared_, request_, result_, *observers_, beyond_horizon_); });
+    return in_algebra([&] {
+        return verdict_of(parts_->prepared, parts_->request, parts_->result, *parts_->observers, beyond_horizon_);
+    });
 }
 
 }  // namespace lobatto::api

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,10 +23,10 @@ public:
     OpenedRun(const OpenedRun&) = delete;
     OpenedRun& operator=(const OpenedRun&) = delete;
 
-    const PreparedRun& prepared() const { return prepared_; }
-    const lobatto::Scene& scene() const { return prepared_.scene; }  // with its method and values
-    const TrajectoryRequest& request() const { return request_; }
-    const RunObservers& observers() const { return *observers_; }
+    const PreparedRun& prepared() const { return parts_->prepared; }
+    const lobatto::Scene& scene() const { return parts_->prepared.scene; }  // with its method and values
+    const TrajectoryRequest& request() const { return parts_->request; }
+    const RunObservers& observers() const { return *parts_->observers; }
 
     // Goes on from where an earlier run was, whose observers had kept this. What is handed over outlives the run.
     void resume(const Halfway& halfway, const std::map<std::string, std::vector<double>>& observers);
@@ -43,11 +44,17 @@ public:
     RunVerdict verdict();
 
 private:
-    PreparedRun prepared_;
+    struct Parts {
+        PreparedRun prepared;
+        TrajectoryRequest request{};
+        std::optional<RunObservers> observers{};
+        TrajectoryResult result{};
+    };
+    struct LetGo {
+        void operator()(Parts* parts) const;
+    };
+    std::unique_ptr<Parts, LetGo> parts_;
     bool beyond_horizon_;
-    TrajectoryRequest request_;
-    std::optional<RunObservers> observers_;
-    TrajectoryResult result_;
 };
 
 }  // namespace lobatto::api

@@ -10,9 +10,11 @@
 
 namespace lobatto::api {
 
+using OpenedSweep = std::unique_ptr<SweepStudy, LetGoInAlgebra>;
+
 // The columns, as a sweep takes them.
 StartsRequest request_of(const Starts& starts);
 // Reads what is kept, derives, compiles, and refuses what makes no sense. Throws Error.
-std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options);
+OpenedSweep open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options);
 
 }  // namespace lobatto::api

@@ -2,6 +2,7 @@
 // What stands behind the classes of lobatto.hpp, and the way in: one thread derives at a time.
 #pragma once
 
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -40,6 +41,19 @@ decltype(auto) in_algebra(Work&& work) {
         const std::lock_guard lock(algebra());
         return work();
     });
+}
+
+// Neither are the counts of who holds them: who lets go of formulas does so like one who derives.
+struct LetGoInAlgebra {
+    template <class T>
+    void operator()(T* held) const {
+        const std::lock_guard lock(algebra());
+        delete held;
+    }
+};
+template <class T>
+std::shared_ptr<T> shared_in_algebra(T* made) {
+    return std::shared_ptr<T>(made, LetGoInAlgebra());
 }
 
 MethodChoice method_of(const Settings& settings);

@@ -15,8 +15,8 @@ std::string version() {
 }
 
 std::recursive_mutex& algebra() {
-    static std::recursive_mutex mutex;
-    return mutex;
+    static auto* const mutex = new std::recursive_mutex;  // for as long as static scenes of programs live
+    return *mutex;
 }
 
 MethodChoice method_of(const Settings& settings) {
@@ -106,7 +106,7 @@ std::size_t index_of(const std::vector<Variable>& parameters, const std::string&
 namespace {
 
 std::shared_ptr<const Scene::Parts> parts_of(lobatto::Scene read) {
-    auto parts = std::make_shared<Scene::Parts>(Scene::Parts{std::move(read), {}, {}, {}, {}, 0, 0});
+    const auto parts = shared_in_algebra(new Scene::Parts{std::move(read), {}, {}, {}, {}, 0, 0});
     const lobatto::Scene& scene = parts->scene;
     parts->coordinates = coordinates_of(scene);
     parts->parameters = parameters_of(scene);

@@ -56,9 +56,9 @@ Kernel compile(const Scene& scene, const Settings& settings) {
         const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
         LoadedStepper<double> stepper(kernel);
         const TrajectoryRequest start = request_of(changed, steps.count, stepper);
-        return Kernel(std::make_shared<const Kernel::Parts>(
-            Kernel::Parts{changed, kernel, source.digest, start, coordinates_of(changed), parameters_of(changed),
-                          inputs_of(changed), events_of(changed)}));
+        return Kernel(
+            shared_in_algebra(new const Kernel::Parts{changed, kernel, source.digest, start, coordinates_of(changed),
+                                                      parameters_of(changed), inputs_of(changed), events_of(changed)}));
     });
 }
 

@@ -101,7 +101,7 @@ void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& t
 
 }  // namespace
 
-std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options) {
+OpenedSweep open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options) {
     auto study = in_algebra([&] {
         lobatto::Scene read =
             options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);
@@ -115,7 +115,7 @@ std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& 
         wish.threads = options.threads;
         wish.measures = options.measure;
         wish.beyond_horizon = options.beyond_horizon;
-        auto made = std::make_unique<SweepStudy>(std::move(read), starts, wish, &algebra());
+        OpenedSweep made(new SweepStudy(std::move(read), starts, wish, &algebra()));
         refuse_both(options, made->starts());
         return made;
     });
@@ -128,7 +128,7 @@ std::unique_ptr<SweepStudy> open_sweep(const Scene& scene, const StartsRequest& 
 
 Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& options) {
     return guarded([&] {
-        const std::unique_ptr<SweepStudy> study = open_sweep(scene, request_of(starts), options);
+        const OpenedSweep study = open_sweep(scene, request_of(starts), options);
         const lobatto::Scene& swept = study->scene();
         Sweep sweep;
         sweep.coordinates = in_algebra([&] { return coordinates_of(swept); });

@@ -89,7 +89,7 @@ TableHead head_of(const SweepStudy& study) {
     return head;
 }
 
-std::unique_ptr<SweepStudy> study_of(const SweepOptions& options, int threads) {
+api::OpenedSweep study_of(const SweepOptions& options, int threads) {
     api::SweepOptions wish;
     static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
     wish.keep = options.keep;
@@ -199,7 +199,7 @@ void sweep(const SweepOptions& options) {
     const TableFormat format = options.table_format();
     Say say;
     if (!quiet) say("deriving and compiling");
-    const std::unique_ptr<SweepStudy> study = study_of(options, threads);
+    const api::OpenedSweep study = study_of(options, threads);
     say.clear();
     if (options.json && is_stream) throw InputError("--json: standard output has the table; name a file with -o");
     if (options.resume && is_stream)

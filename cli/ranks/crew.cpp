@@ -227,9 +227,9 @@ std::vector<std::string> CrewLeader::end() {
     return warnings;
 }
 
-void work_in_crew(Ranks& ranks, const std::function<std::unique_ptr<SweepStudy>()>& begin) {
+void work_in_crew(Ranks& ranks, const std::function<api::OpenedSweep()>& begin) {
     const auto work = [&] {
-        std::unique_ptr<SweepStudy> study;
+        api::OpenedSweep study;
         SweepBlock block;
         while (true) {
             const std::string message = next_message(ranks).second;

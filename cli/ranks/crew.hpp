@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "analysis/sweep/rows.hpp"
-#include "analysis/sweep/study.hpp"
 #include "cli/ranks/ranks.hpp"
+#include "library/opened_sweep.hpp"
 
 namespace lobatto {
 
@@ -50,6 +50,6 @@ private:
 
 // Of the others: computes what it is told to, until the end. `begin` makes the study, once the first process has made
 // its own. Errors are told to the first process.
-void work_in_crew(Ranks& ranks, const std::function<std::unique_ptr<SweepStudy>()>& begin);
+void work_in_crew(Ranks& ranks, const std::function<api::OpenedSweep()>& begin);
 
 }  // namespace lobatto

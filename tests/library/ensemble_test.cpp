@@ -112,4 +112,23 @@ TEST_CASE("walls are met by each trajectory alone; what an ensemble cannot do is
               lob::Ensemble(pendulum, {1, {{"q", {1}}}}, settings);
           }).ends_with("ensembles are computed in double; leave `numbers` out, or take sweep()"));
     CHECK(input_error_of([&] { lob::Ensemble(pendulum, {}); }).find("there are 0 starts") != std::string::npos);
+    const lob::Scene kepler(scenes + "kepler.toml");
+    const lob::Scene comet = lob::Scene::from_text(
+        "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+        "y = { position = 0, velocity = 1 }\n[method]\nclock = \"auto\"\n[run]\nstep = 0.5\nuntil = 6\n",
+        "comet.toml");
+    lob::Settings automatic, none;
+    automatic.clock = "auto";
+    none.clock = "none";
+    const std::string end = "; leave it out, or take sweep()", all = "all at one time, but ";
+    CHECK(input_error_of([&] {
+              lob::Ensemble(kepler, {1, {{"x", {1}}}}, automatic);
+          }).ends_with(all + "the settings ask for a clock" + end));
+    CHECK(input_error_of([&] {
+              lob::Ensemble(comet, {1, {{"x", {1}}}});
+          }).ends_with(all + "the scene has a clock" + end));
+    none.step = "0.001";
+    lob::Ensemble equal(comet, {1, {{"x", {1}}}}, none);
+    equal.advance(3);
+    CHECK(equal.t() == doctest::Approx(0.003));
 }

@@ -86,6 +86,10 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
 }
 
 Companion::~Companion() {
+    end();
+}
+
+void Companion::end() {
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();
 }

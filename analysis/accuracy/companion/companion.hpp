@@ -67,6 +67,8 @@ public:
 
     // The kept states of the run go by.
     void observe(const Records& records);
+    // Computes no more.
+    void end();
     // Begins to compute. Before, `restore` may say what an earlier part of the run had.
     void start();
     std::vector<double> save() const;
