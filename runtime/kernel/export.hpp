@@ -286,16 +286,10 @@ struct Export {
             S& here = *static_cast<S*>(stepper);
             typename K::Parameters values;
             for (int i = 0; i < K::parameter_count; ++i) K::parameter(values, i) = in(parameters)[i];
-            if constexpr (event_count > 0) {  // the sides of switches stay
-                for (int i = K::first_input; i < K::first_input + inputs; ++i)
-                    K::parameter(here.parameters, i) = K::parameter(values, i);
-                values = here.parameters;
-            }
-            Status status = set_inputs(here, values);
-            if constexpr (has_walls) {
-                if (status == Status::ok) status = Sides<K>::take_again(here);
-            }
-            return code(status);
+            if constexpr (event_count > 0)
+                return code(set_watched_inputs(here, values));
+            else
+                return code(set_inputs(here, values));
         }
         return LOBATTO_UNSUPPORTED;
     }

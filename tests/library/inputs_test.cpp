@@ -235,3 +235,42 @@ TEST_CASE("inputs stand where formulas of the motion are, and errors say where n
           "inputs.toml:5:19: the definition d holds an input, which cannot occur in the initial position of q: write "
           "it with numbers and parameters");
 }
+
+TEST_CASE("an event at the end of a step is not lost where an input changes that it does not depend on") {
+    // 100 * 4.35 is 434.99999999999994 in double: t = 435 falls into step 101, by rounding alone.
+    const std::string head =
+                          "lagrangian = \"q'^2/2 - (q - u)^2/2e4\"\ntime = \"t\"\n[coordinates]\n"
+                          "q = { position = 1, momentum = 0 }\n[inputs]\nu = 0.5\n[run]\nstep = 4.35\nuntil = 1000\n",
+                      watched = "[output]\nevents = [\"t = 435\", \"q = u + 100\", \"t = 400 + 0*u\"]\n";
+    for (const char* more : {"", "[method]\npoints = 4\n", "[method]\nfamily = \"splitting\"\nstages = 11\n"}) {
+        CAPTURE(more);
+        lob::Stepper stepper = stepper_of(head + watched + more);
+        int at_435 = 0;
+        for (int i = 0; i < 200; ++i) {
+            stepper.set("u", i % 2);
+            stepper.step();
+            for (const lob::EventHit& hit : stepper.take_events()) at_435 += hit.kind == 0;
+        }
+        CHECK(at_435 == 1);
+    }
+}
+
+TEST_CASE("an event that an input jumps over is none, and one that begins where it is set is none either") {
+    lob::Stepper stepper = stepper_of(
+        "lagrangian = \"q'^2/2\"\n[coordinates]\nq = { position = 0, momentum = 1 }\n[inputs]\nu = 0.5\n"
+        "[run]\nstep = 0.25\nuntil = 10\n[output]\nevents = [\"q = u\"]\n");
+    std::vector<double> times;
+    const auto go = [&](double u) {
+        stepper.set("u", u);
+        stepper.step();
+        for (const lob::EventHit& hit : stepper.take_events()) times.push_back(hit.t);
+    };
+    go(0.1);  // q reaches 0.25: met at 0.1
+    go(0.9);  // jumped over q, which goes to 0.5
+    go(0.5);  // set where q is, which goes away from it
+    go(0.3);  // behind it
+    go(1.1);  // met at 1.1
+    REQUIRE(times.size() == 2);
+    CHECK(times[0] == doctest::Approx(0.1));
+    CHECK(times[1] == doctest::Approx(1.1));
+}

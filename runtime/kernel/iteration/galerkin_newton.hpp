@@ -153,11 +153,13 @@ private:
                 rounding[active * m + c] +=
                     fabs(step_size * K::b[i] * K::legendre_polynomial[i] * a.g[i * Z + 2 * active + c]);
         for (int b = 0; b < active; ++b) rounding[Layout::index(b, 0)] += fabs(p[K::active_index[b]]);
-        for (int e = 0; e < K::entries; ++e)  // phi at positions that are rounded
-            if (Tables::kind(K::entry_row[e]) == Slot::multiplier)
-                for (int j = 0; j < m; ++j)
-                    rounding[Layout::index(Tables::block(K::entry_row[e]), j)] +=
-                        fabs(a.H[(j + 1) * entry_room + e] * a.z[(j + 1) * Z + K::entry_column[e]]);
+        if constexpr (Tables::constraints > 0) {  // phi at positions that are rounded
+            for (int e = 0; e < K::entries; ++e)
+                if (Tables::kind(K::entry_row[e]) == Slot::multiplier)
+                    for (int j = 0; j < m; ++j)
+                        rounding[Layout::index(Tables::block(K::entry_row[e]), j)] +=
+                            fabs(a.H[(j + 1) * entry_room + e] * a.z[(j + 1) * Z + K::entry_column[e]]);
+        }
         for (int i = 0; i < N; ++i) rounding[i] *= a.delta[i] < real(0) ? real(-1) : real(1);
         a.matrix.solve(rounding);
         real most = real(0), largest = real(0);

@@ -98,12 +98,22 @@ struct WatchedStepper : Stepper<K> {
         const Status status = this->start(this->time(), position, momentum);
         this->start_time = begin;
         this->steps = steps_since;
+        for (bool& begins : this->event_begins) begins = true;
         return status;
     }
 
     // The side of a switch: 1 or -1.
     real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
 };
+
+// What was last known of the events of a stepper, which the same motion goes on with in another.
+template <class S>
+void keep_events(const S& from, S& to) {
+    for (int e = 0; e < S::event_room; ++e) {
+        to.event_values[e] = from.event_values[e];
+        to.event_begins[e] = from.event_begins[e];
+    }
+}
 
 // One function of the motion, sampled over a step.
 template <class real>
@@ -463,8 +473,8 @@ private:
                 zero = before = -1;
             } else if (here.value == real(0) || is_zero(here, e)) {
                 if (zero < 0) zero = i;
-                // The motion starts there, or goes on there from an impact, whose state is the only one looked at.
-                if (i == 0 && (step->steps == 1 || last == here.value) && !is_wall(e)) last = real(0);
+                // The motion starts there, or goes on there from an impact or with other inputs.
+                if (i == 0 && (step->steps == 1 || step->event_begins[e]) && !is_wall(e)) last = real(0);
             } else {
                 if (changes(last, here.value)) {
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
@@ -484,6 +494,7 @@ private:
                 before = i;
             }
         }
+        step->event_begins[e] = false;
     }
 
     // The root between a and b, to the rounding of theta: secants, with the value of an end that stays halved (the

@@ -157,12 +157,27 @@ struct Sides {
         stepper.momentum(p);
         if constexpr (switches_of<K>() > 0) {
             take(stepper, time, q, p);
+            const S before = stepper;
             const Status status = stepper.restart(q, p, stepper.steps);
             if (status != Status::ok) return status;
+            keep_events(before, stepper);
         }
         return of_walls(stepper, time, q, p);
     }
 };
+
+// (D60) As set_inputs (inputs.hpp) of a stepper that knows its parameters. The sides of switches are those of the
+// state.
+template <class K>
+Status set_watched_inputs(WatchedStepper<K>& stepper, typename K::Parameters values) {
+    for (int i = K::first_input; i < K::first_input + K::inputs; ++i)
+        K::parameter(stepper.parameters, i) = K::parameter(values, i);
+    const Status status = set_inputs(stepper, stepper.parameters);
+    if constexpr (WatchedStepper<K>::walls > 0)
+        return status == Status::ok ? Sides<K>::take_again(stepper) : status;
+    else
+        return status;
+}
 
 // Looks at each step of one stepper: keep before it, look after it.
 template <class K>
@@ -320,7 +335,7 @@ private:
         real momentum[n];
         rest->momentum(momentum);
         put(stepper, rest->q, momentum, stepper.steps);
-        for (int e = 0; e < K::events; ++e) stepper.event_values[e] = rest->event_values[e];
+        keep_events(*rest, stepper);
     }
 };
 
@@ -362,6 +377,9 @@ public:
         const Status status = stepper.step();
         return status == Status::ok ? looks->watch.look(stepper, looks->rows, looks->count) : status;
     }
+
+    // Of a kernel with inputs, before a step: their values in `values`, the others of which do not count.
+    Status set_inputs(const typename K::Parameters& values) { return set_watched_inputs(stepper, values); }
 
     real time() const { return stepper.time(); }
     const real* q() const { return stepper.q; }

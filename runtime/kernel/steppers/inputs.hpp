@@ -35,22 +35,39 @@ Status forget_forces(S& stepper) {
     return is_finite(not_finite_part(W, n)) ? Status::ok : Status::not_finite;
 }
 
+// The functions of events where the motion is.
+template <class K>
+Status event_functions(const Stepper<K>& stepper, typename K::real* values) {
+    using real = typename K::real;
+    real velocity[K::coordinates], momentum[K::coordinates];
+    stepper.momentum(momentum);
+    const real time = stepper.time();
+    const Status status = stepper.velocity(time, stepper.q, momentum, velocity);
+    if (status == Status::ok)
+        Formulas<K>::event(stepper.coefficients, time, static_cast<const real*>(stepper.q),
+                           static_cast<const real*>(velocity), values);
+    return status;
+}
+
 // Before a step: `parameters` with other values of K's inputs; those of other parameters must be the ones of prepare().
 // Where it fails, inputs must be set again before the next step.
 template <class K>
 Status set_inputs(Stepper<K>& stepper, const typename K::Parameters& parameters) {
     using real = typename K::real;
+    constexpr int events = K::events > 0 ? K::events : 1;
+    [[maybe_unused]] real before[events], after[events];
+    [[maybe_unused]] bool is_known = false;
+    if constexpr (K::events > 0) is_known = event_functions<K>(stepper, before) == Status::ok;
     Status status = K::set_inputs(parameters, stepper.step_size, stepper.coefficients);
     if constexpr (K::form != Form::general)
         if (status == Status::ok) status = forget_forces<K>(stepper);
     if constexpr (K::events > 0) {
-        real velocity[K::coordinates], momentum[K::coordinates];
-        stepper.momentum(momentum);
-        const real time = stepper.time();
-        if (status == Status::ok) status = stepper.velocity(time, stepper.q, momentum, velocity);
-        if (status == Status::ok)
-            Formulas<K>::event(stepper.coefficients, time, static_cast<const real*>(stepper.q),
-                               static_cast<const real*>(velocity), +stepper.event_values);
+        if (status == Status::ok) status = event_functions<K>(stepper, after);
+        for (int e = 0; status == Status::ok && e < K::events; ++e) {
+            if (is_known && before[e] == after[e]) continue;
+            stepper.event_values[e] = after[e];
+            stepper.event_begins[e] = true;
+        }
     }
     return status;
 }
