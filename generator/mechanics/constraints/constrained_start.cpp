@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "generator/formula/real.hpp"
 #include "generator/graph/notation.hpp"
 
@@ -33,7 +36,7 @@ cln::cl_R largest_of(const Numbers& numbers) {
 ConstrainedStart::ConstrainedStart(const Scene& scene, const System& system, Formulas& start,
                                    const MassEquations& equations)
     : scene_(scene), system_(system), start_(start), equations_(equations) {
-    std::vector<GiNaC::ex> momentum = system.momentum, rates = system.constraint_t, values;
+    std::vector<GiNaC::ex> momentum = system.momentum, rates = system.constraint_t, values, slopes;
     for (const Constraint& constraint : system.constraints) {
         mu_.emplace_back("mu_" + constraint.name);
         start.set(mu_.back(), cln::cl_R(0));
@@ -41,12 +44,14 @@ ConstrainedStart::ConstrainedStart(const Scene& scene, const System& system, For
     }
     for (const auto& [place, slope] : system.constraint_q.entries()) {
         const auto c = static_cast<std::size_t>(place.first), k = static_cast<std::size_t>(place.second);
+        slopes.push_back(slope);
         momentum[k] += slope * mu_[c];
         rates[c] += slope * system.v[k];
     }
     momentum_ = start.convert(momentum);
     rates_ = start.convert(rates);
     constraints_ = start.convert(values);
+    slopes_ = start.convert(slopes);
 }
 
 void ConstrainedStart::keep_positions() {
@@ -91,14 +96,19 @@ ConstrainedStart::Numbers ConstrainedStart::residual(const MassEquations::Entrie
     return right;
 }
 
-// From q along a step, the whole of it, a half, a quarter, ... so that phi does not grow.
+// From q along a step, the whole of it, a half, a quarter, ... so that phi does not grow, or by no more than a quarter
+// of what a step as long can change it by: along the constraints phi grows with the square of the step.
 void ConstrainedStart::go(const Numbers& q, const Numbers& step) {
     const std::optional<cln::cl_R> before = square();
+    cln::cl_R slope = 0, length = 0;
+    for (const cln::cl_R& value : start_.evaluate(slopes_)) slope = slope + cln::square(value);
+    for (std::size_t k = 0; k < q.size(); ++k) length = length + cln::square(step[k]);
+    const cln::cl_R whole = slope * length / 16;
     cln::cl_RA fraction = 1;
     for (int halvings = 0; halvings < 60; ++halvings, fraction = fraction / 2) {
         for (std::size_t k = 0; k < q.size(); ++k) start_.set(system_.q[k], q[k] - fraction * step[k]);
         const std::optional<cln::cl_R> now = square();
-        if (now && *now <= *before) return;
+        if (now && *now <= cln::max(*before, whole * cln::square(fraction))) return;
     }
 }
 
@@ -125,7 +135,8 @@ bool ConstrainedStart::newton_step(const MassEquations::Entries& mass, const Num
             const auto positions = [n](const Elimination& of) {
                 return Numbers(of.vector.begin(), of.vector.begin() + static_cast<std::ptrdiff_t>(n));
             };
-            is_better = !left.singular && 4 * largest_of(positions(left)) <= largest_of(positions(step));
+            is_better = !left.singular && 4 * largest_of(positions(left)) <= largest_of(positions(step)) &&
+                        goes_down(mass, right, newton, step);
         }
     } catch (const DomainError&) {
     }
@@ -133,6 +144,19 @@ bool ConstrainedStart::newton_step(const MassEquations::Entries& mass, const Num
     if (!is_better)
         for (std::size_t k = 0; k < n; ++k) start_.set(system_.q[k], q[k]);
     return is_better;
+}
+
+// Whether Newton's step goes along the constraints to where the distance shrinks, as `step` does: not to a saddle.
+bool ConstrainedStart::goes_down(const MassEquations::Entries& mass, Numbers right, const Elimination& newton,
+                                 const Elimination& step) const {
+    std::fill_n(right.begin(), system_.q.size(), cln::cl_R(0));
+    const Elimination across = equations_.eliminate(mass, right);  // to the constraints alone, in both steps
+    cln::cl_R together = 0;
+    for (const auto& [place, value] : mass) {
+        const auto [i, j] = std::pair(static_cast<std::size_t>(place.first), static_cast<std::size_t>(place.second));
+        together = together + (newton.vector[i] - across.vector[i]) * value.value * (step.vector[j] - across.vector[j]);
+    }
+    return !(together < 0);
 }
 
 // The second derivatives of mu phi.

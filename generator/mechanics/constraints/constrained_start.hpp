@@ -41,6 +41,8 @@ private:
     void go(const Numbers& q, const Numbers& step);
     bool newton_step(const MassEquations::Entries& mass, const Numbers& given, const Numbers& right,
                      const Elimination& step);
+    bool goes_down(const MassEquations::Entries& mass, Numbers right, const Elimination& newton,
+                   const Elimination& step) const;
     void find_bends();
     [[noreturn]] void refuse(std::size_t constraint, const std::string& what, const std::string& nearest) const;
     [[noreturn]] void refuse_unreachable(std::size_t constraint) const;
@@ -50,7 +52,7 @@ private:
     Formulas& start_;
     const MassEquations& equations_;
     std::vector<GiNaC::symbol> mu_;
-    std::vector<Id> momentum_, rates_, constraints_;
+    std::vector<Id> momentum_, rates_, constraints_, slopes_;
     std::vector<std::pair<int, int>> bend_places_;  // of d2(mu phi)/dq2, when they were asked for
     std::vector<Id> bends_;
 };

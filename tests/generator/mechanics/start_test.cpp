@@ -133,6 +133,7 @@ TEST_CASE("a start is moved to the nearest that keeps the constraints, to all di
                                  {"0.3", "0.95"},
                                  {"1e-9", "3"},
                                  {"-2.0000001", "1e-7"},
+                                 {"0.3", "1e-6"},
                                  {"1.6", "0.1"}}) {
         const std::string tried = std::string(x0) + ", " + y0;  // bindings cannot be captured
         CAPTURE(tried);
@@ -149,5 +150,15 @@ TEST_CASE("a start is moved to the nearest that keeps the constraints, to all di
         const cln::cl_R off = x * x / 4 + y * y - 1, along = (x - given(0)) * 2 * y - 3 * (y - given(1)) * x / 2;
         CHECK(cln::double_approx(cln::abs(off)) < 1e-50);
         CHECK(cln::double_approx(cln::abs(along)) < 1e-28 * (1 + cln::double_approx(cln::abs(given(0)))));
+        const double a = cln::double_approx(given(0)), b = cln::double_approx(given(1));
+        const auto distance = [&](double to_x, double to_y) {
+            return (to_x - a) * (to_x - a) + 3 * (to_y - b) * (to_y - b);
+        };
+        double least = 1e9;
+        for (int i = 0; i < 10000; ++i) {
+            const double angle = i * 2 * M_PI / 10000;
+            least = std::fmin(least, distance(2 * std::cos(angle), std::sin(angle)));
+        }
+        CHECK(distance(cln::double_approx(x), cln::double_approx(y)) <= least * (1 + 1e-12));
     }
 }
