@@ -32,8 +32,10 @@ Settings settings_of(const FoundChoice& found, const Settings& given) {
     if (candidate.tolerance > 0) settings.tolerance = candidate.tolerance;
     settings.arithmetic = candidate.member.arithmetic == StepArithmetic::clean ? "clean" : "plain";
     settings.numbers = precision_name(candidate.member.precision);
-    if (choice.clock != (found.scene.clock ? found.scene.clock->text : ""))
+    if (choice.clock != (found.scene.clock ? found.scene.clock->text : "")) {
         settings.clock = word_of(candidate.member.clock);
+        settings.every.reset();  // it would have another meaning: all steps are kept
+    }
     settings.step = fmt::format("{}", choice.step());
     settings.until = fmt::format("{}", choice.until);
     return settings;

@@ -112,9 +112,9 @@ std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request,
 PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
     const auto start = std::chrono::steady_clock::now();
     if (scene.clock && scene.method.numbers != Precision::double_)
-        scene.source.fail(scene.clock->at, "with a clock `lobatto run` computes in double, but numbers are \"" +
-                                               precision_name(scene.method.numbers) +
-                                               "\"; remove the clock, or give --numbers double");
+        fail_at_clock(scene, "with a clock `lobatto run` computes in double, but numbers are \"" +
+                                 precision_name(scene.method.numbers) +
+                                 "\"; remove the clock, or give --numbers double");
     const Precision numbers = scene.method.numbers;
     const DerivedKernel derived = derived_kernel(scene, {numbers, general, EnergyWatch::can_watch});
     KernelSource in_double;

@@ -321,9 +321,9 @@ Scene scene_to_prove(const Scene& chosen) {
     Scene scene = in_clock_time(chosen);
     scene.clock.reset();
     if (chosen.clock && scene.method.numbers != Precision::double_)
-        scene.source.fail(chosen.clock->at, "with a clock `lobatto verify` proves steps in double, but numbers are \"" +
-                                                precision_name(scene.method.numbers) +
-                                                "\"; remove the clock, or give --numbers double");
+        fail_at_clock(chosen, "with a clock `lobatto verify` proves steps in double, but numbers are \"" +
+                                  precision_name(scene.method.numbers) +
+                                  "\"; remove the clock, or give --numbers double");
     scene.outputs.energy = true;
     scene.outputs.tangent = scene.coordinates.size() <= tangent_limit;
     return scene;

@@ -60,8 +60,8 @@ void check_numbers(const Scene& scene) {
     if (scene.method.numbers == Precision::double_) return;
     const std::string numbers = ", but numbers are \"" + precision_name(scene.method.numbers) + "\"";
     if (scene.clock)
-        scene.source.fail(scene.clock->at, "with a clock `lobatto sweep` computes in double" + numbers +
-                                               "; remove the clock, or give --numbers double");
+        fail_at_clock(scene, "with a clock `lobatto sweep` computes in double" + numbers +
+                                 "; remove the clock, or give --numbers double");
     if (!scene.outputs.kept.empty())
         throw InputError(
             fmt::format("{}: what sweeps keep of a trajectory is computed in double{}; leave out --keep, or "
@@ -290,6 +290,7 @@ std::string SweepStudy::identity() const {
                         options_.beyond_horizon);
     if (as_written_.method.numbers != Precision::double_)
         text += "numbers " + precision_name(as_written_.method.numbers) + '\n';
+    if (as_written_.clock) text += "clock " + as_written_.clock->text + '\n';
     return text;
 }
 

@@ -89,6 +89,7 @@ MethodChoice method_of(const Beside& beside, const MethodChoice& options, const 
         method.points = beside.method.points;
         method.stages = beside.method.stages;
         method.splitting = beside.method.splitting;
+        if (method.splitting) method.tolerance.reset();  // it iterates nothing
     }
     try {
         Scene other = scene.parts().scene;

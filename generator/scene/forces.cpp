@@ -152,9 +152,13 @@ void SystemReader::read_constraint(const Entry& entry) {
         solve_constraint(constraint, sides, scope, indices);
         scene_.constraints.push_back(constraint);
     }
+    require_freedom(entry.at);
+}
+
+void SystemReader::require_freedom(Position at, const std::string& or_else) const {
     if (scene_.constraints.size() >= scene_.coordinates.size())
-        fail(entry.at, fmt::format("{} constraints on {} coordinates up to here: nothing is left that could move",
-                                   scene_.constraints.size(), scene_.coordinates.size()));
+        fail(at, fmt::format("{} constraints on {} coordinates up to here: nothing is left that could move{}",
+                             scene_.constraints.size(), scene_.coordinates.size(), or_else));
 }
 
 }  // namespace lobatto

@@ -161,9 +161,10 @@ private:
     void read_clock(const Entry& entry) {
         const Scope scope = system_.scope_of("the clock", true);
         Clock clock;
-        clock.at = entry.value.at;
+        const Position at = entry.value.at;
+        clock.at = at;
         if (!scene_.inputs().empty())
-            fail(clock.at,
+            fail(at,
                  "a clock needs a motion that keeps its energy, but inputs change it; remove the clock, or declare the "
                  "inputs under [parameters]");
         if (entry.value.kind == Value::Kind::text) clock.text = collapsed(entry.value.text.value);
@@ -174,8 +175,8 @@ private:
         }
         const Operand rate = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
         if (rate.velocities || rate.expression.has(scene_.time))
-            fail(clock.at, "a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
-        if (!rate.moves) fail(clock.at, "this clock holds no position, so that all its steps are equal; leave it out");
+            fail(at, "a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
+        if (!rate.moves) fail(at, "this clock holds no position, so that all its steps are equal; leave it out");
         clock.rate = rate.expression;
         scene_.clock = clock;
     }
@@ -351,6 +352,12 @@ Names parameter_names(const Scene& scene) {
     Names names;
     for (const auto& [name, values] : all) names.add_parameter(name, values.values, values.array);
     return names;
+}
+
+void fail_at_clock(const Scene& scene, const std::string& message) {
+    if (scene.clock->at) scene.source.fail(*scene.clock->at, message);
+    throw InputError(
+        fmt::format("{}: clock = \"{}\", as an option asks for: {}", scene.path, scene.clock->text, message));
 }
 
 Scene read_scene(const std::string& path, const std::vector<std::string>& kept) {

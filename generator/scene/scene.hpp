@@ -93,9 +93,9 @@ struct Outputs {
 
 // A clock: steps are equally long in a time tau with dt = g(q) dtau (generator/mechanics/clock/clock.hpp).
 struct Clock {
-    std::string text;  // as written, white space collapsed: "r^(3/2)"
-    GiNaC::ex rate;    // g, in positions and parameters
-    Position at = {};
+    std::string text;                         // as written, white space collapsed: "r^(3/2)"
+    GiNaC::ex rate;                           // g, in positions and parameters
+    std::optional<Position> at;               // in the scene file; nothing: an option asked for it
     GiNaC::symbol energy{"energy_of_start"};  // E
     bool is_automatic = false;  // "auto": g follows from L (generator/mechanics/clock/automatic_clock.hpp)
     bool is_applied = false;    // the scene is one in tau
@@ -215,6 +215,9 @@ struct Scene {
 };
 
 // The parameters and constants of a scene, for further formulas in them.
+// InputError: where the clock stands, or, if an option asked for it, without a place.
+[[noreturn]] void fail_at_clock(const Scene& scene, const std::string& message);
+
 struct Names;
 Names parameter_names(const Scene& scene);
 

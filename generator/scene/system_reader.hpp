@@ -76,6 +76,7 @@ private:
     void read_forces();
     void read_constraints();
     void read_constraint(const Entry& entry);
+    void require_freedom(Position at, const std::string& or_else = "") const;
     void solve_constraint(Constraint& constraint, const EventSyntax& sides, const Scope& scope,
                           const std::vector<long>& indices) const;
     // "link" or "link[i]"; how many links there are.

@@ -338,14 +338,17 @@ TEST_CASE("a clock is a setting: the same steps as with the scene's own, and equ
 }
 
 TEST_CASE("tune of the library chooses a clock where that is cheaper, and a run keeps the promise with it" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     const lob::Scene without = eccentric("", "0.02"), with = eccentric("clock = \"auto\"\n", "0.02");
-    const auto settings_for = [](const lob::Scene& scene) {
-        return lob::tune(scene, 1e-8, {}, 600).settings;  // ends long before, but for a busy machine
+    lob::Settings each_tenth;
+    each_tenth.every = 10;
+    const auto settings_for = [&](const lob::Scene& scene) {
+        return lob::tune(scene, 1e-8, each_tenth, 600).settings;  // ends long before, but for a busy machine
     };
     lob::RunOptions chosen;
     static_cast<lob::Settings&>(chosen) = settings_for(without);
     CHECK(chosen.clock == "auto");
+    CHECK_FALSE(chosen.every);  // it would be a time now
     CHECK(lob::run(without, chosen).error.value() < 2e-8);
     CHECK(settings_for(with).clock.empty());  // its own
     lob::Settings proved;

@@ -73,10 +73,9 @@ ex automatic_clock(const Scene& scene) {
         start[scene.coordinates[k].position] = scene.initial_position[k];
     const Poles poles = poles_of(scene);
     if (!poles.least)
-        scene.source.fail(
-            scene.clock->at,
-            "clock = \"auto\" looks for terms of the Lagrangian that grow without bound, such as 1/r, and "
-            "there is none; write a formula");
+        fail_at_clock(scene,
+                      "clock = \"auto\" looks for terms of the Lagrangian that grow without bound, such as 1/r, and "
+                      "there is none; write a formula");
     ex U = 0;
     for (const ex& term : poles.terms)
         U += scene.evaluate(term.subs(start), "the clock at the start").is_negative() ? -term : term;

@@ -69,7 +69,7 @@ public:
     }
 
 private:
-    [[noreturn]] void refuse(const std::string& why) const { scene_.source.fail(scene_.clock->at, why); }
+    [[noreturn]] void refuse(const std::string& why) const { fail_at_clock(scene_, why); }
 
     void require_conservation() const {
         for (const Coordinate& coordinate : scene_.coordinates)
@@ -137,11 +137,9 @@ Scene in_clock_time(const Scene& scene) {
 
 void refuse_clock(const Scene& scene, const std::string& what) {
     if (scene.clock)
-        scene.source.fail(
-            scene.clock->at,
-            what +
-                " looks at steps that are equal in time, and knows no clock; remove it, or use run, sweep, emit, "
-                "verify, tune or tradeoff");
+        fail_at_clock(scene, what +
+                                 " looks at steps that are equal in time, and knows no clock; remove it, or use run, "
+                                 "sweep, emit, verify, tune or tradeoff");
 }
 
 }  // namespace lobatto

@@ -383,8 +383,9 @@ struct Choice {
     bool complete = false;       ///< no member that was not tried can be expected to win
 };
 /// The cheapest member of the family, its clock and its step, that keep an error to the end. `settings` name no method,
-/// no clock and no step. `budget`: seconds to search, at least 1.
-/// `progress`: told what is being done; false ends the search, which then throws ComputationError.
+/// no clock and no step. Where a clock is chosen that the scene does not have, `every` is left out, because it would be
+/// a time then. `budget`: seconds to search, at least 1. `progress`: told what is being done; false ends the search,
+/// which then throws ComputationError.
 ///
 ///     lob::Settings settings;
 ///     settings.until = "2";

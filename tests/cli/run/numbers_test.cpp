@@ -125,6 +125,10 @@ TEST_CASE("what other numbers cannot do is refused") {
     CHECK(clocked.exit_code == 2);
     CHECK(contains(clocked.err, comet + ":7:9: with a clock `lobatto run` computes in double, but numbers are "
                                         "\"double-double\"; remove the clock, or give --numbers double"));
+    const test::Finished asked = place.run({"run", comet, "--clock", "auto", "--numbers", "double-double", "-o", csv});
+    CHECK(asked.exit_code == 2);
+    CHECK(
+        contains(asked.err, comet + ": clock = \"auto\", as an option asks for: with a clock `lobatto run` computes"));
 }
 
 TEST_CASE("a sweep computes in the numbers that are asked for, with the digits of a run") {

@@ -310,3 +310,12 @@ TEST_CASE("mistakes in a joint are one clear error") {
           "top.toml:1:2: joints hold bodies together; add [bodies] with lines such as top = { mass = 1, inertia = "
           "[1, 1, 0.5], position = [0, 0, 1] }");
 }
+
+TEST_CASE("joints that leave nothing that could move are refused where the last of them stands") {
+    CHECK(refusal("lagrangian = \"0\"\n[bodies]\na = { mass = 1, inertia = 1, position = [0, 0] }\n"
+                  "b = { mass = 1, inertia = 1, position = [1, 1] }\n[joints]\n"
+                  "left = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0] }\n"
+                  "apex = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [1, 1] }\n"
+                  "right = { type = \"hinge\", bodies = [\"ground\", \"b\"], point = [2, 0] }\n") ==
+          "top.toml:8:1: 2 constraints on 2 coordinates up to here: nothing is left that could move");
+}
