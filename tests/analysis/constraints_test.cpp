@@ -238,7 +238,7 @@ TEST_CASE("a constraint that moves: a pendulum whose pivot is shaken" * doctest:
 }
 
 TEST_CASE("a dead point that is met exactly ends the run, and all that is kept is on the constraints" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     // A parallelogram whose cranks turn with the velocity 1: after a time of s all four bars lie on one line, and
     // multipliers grow beyond what their rounding lets corrections change.
     const std::string bars =

@@ -26,7 +26,7 @@ KernelSource source_of(const std::string& scene_name, Precision numbers, int spl
 }  // namespace
 
 TEST_CASE("nvcc compiles the kernels of all forms, in double and float, to code of sm_80 and sm_90" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     if (!find_nvcc()) {
         MESSAGE("there is no nvcc: not tested");
         return;

@@ -78,7 +78,7 @@ std::string message_of(const std::string& path) {
 }  // namespace
 
 TEST_CASE("the slope of atan2 is the force c (-y, x)/r^2, also across the cut, in all forms and numbers" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     const test::TemporaryFolder folder;
     for (const char* method : {"[method]\npoints = 6\n", "[method]\nfamily = \"gauss\"\nstages = 3\n",
                                "[method]\nfamily = \"splitting\"\nstages = 17\n"}) {
@@ -147,7 +147,7 @@ TEST_CASE("check tells of the jump of atan2, and a motion through the origin end
 }
 
 TEST_CASE("a table of a cubic polynomial is that polynomial, as a force of the time and in a potential" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     const test::TemporaryFolder folder;
     write_cubic(folder);
     const std::string polynomial = "(1 - 2*t + t^3/2)*0.3";

@@ -267,7 +267,8 @@ TEST_CASE("a clock is written into a scene, unless its states would be kept at o
 }
 
 TEST_SUITE("slow") {
-    TEST_CASE("tune takes a clock where time scales vary, and keeps its promise against Kepler's solution") {
+    TEST_CASE("tune takes a clock where time scales vary, and keeps its promise against Kepler's solution" *
+              doctest::test_suite("slowest")) {
         const test::TemporaryFolder folder;
         const std::string path = folder / "orbit.toml";
         test::write_text(path, kepler_text(0.9, "points = 5", 10));

@@ -324,7 +324,7 @@ TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic so
 }
 
 TEST_CASE("tradeoff writes a table, CSV, JSON, pictures and a page that needs no other file, and goes on where it was" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     const Place place;
     const std::string out = place.folder / "out";
     const std::vector<std::string> command = {"tradeoff", pendulum, "--until", "10", "--budget", "7s", "-o", out};
@@ -399,7 +399,7 @@ TEST_CASE("run warns beyond the linear stability limit") {
 }
 
 TEST_SUITE("slow") {
-    TEST_CASE("a chaotic motion is not promised further than it is known") {
+    TEST_CASE("a chaotic motion is not promised further than it is known" * doctest::test_suite("slowest")) {
         const Place place;
         test::Finished refused;
         for (const char* const budget : {"15s", "60s", "4min"}) {  // a busy machine needs more for the reference

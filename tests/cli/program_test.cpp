@@ -80,7 +80,7 @@ TEST_CASE("the helps speak with one voice: values have names, sentences begin la
 }
 
 TEST_SUITE("slow") {
-    TEST_CASE("the example at the end of every help runs") {
+    TEST_CASE("the example at the end of every help runs" * doctest::test_suite("slowest")) {
         const test::TemporaryFolder folder;
         std::filesystem::create_directory_symlink(LOBATTO_SOURCE_DIR "/scenes", folder / "scenes");
         std::filesystem::create_directory(folder / "bin");

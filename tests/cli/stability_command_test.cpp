@@ -216,7 +216,8 @@ TEST_CASE("frequencies are met along a motion whose velocities couple the coordi
     CHECK(contains(falling.out, "  nothing oscillates: no frequency was met\n"));
 }
 
-TEST_CASE("the work has bounds: a run of too many steps is cut, a formula too long is left out") {
+TEST_CASE("the work has bounds: a run of too many steps is cut, a formula too long is left out" *
+          doctest::test_suite("slowest")) {
     const test::TemporaryFolder folder;
     const auto cut = report_of(
         {scene_in(folder, "q'^2/2 + cos(q)", "q = { position = 1, velocity = 0 }"), "--step", "1e-9", "--points", "2"});

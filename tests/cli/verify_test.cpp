@@ -171,7 +171,8 @@ TEST_CASE("correct code passes at rest, far from zero and near it, and where ene
     }
 }
 
-TEST_CASE("right kernels are not accused where the equations of a step are badly conditioned, or nothing can be told") {
+TEST_CASE("right kernels are not accused where the equations of a step are badly conditioned, or nothing can be told" *
+          doctest::test_suite("slowest")) {
     const TemporaryFolder folder;
     struct Motion {
         const char *lagrangian, *start, *method, *step;

@@ -197,6 +197,6 @@ TEST_CASE("every precision ends in its own right answer") {
     table.check();
 }
 
-TEST_CASE("every member, compiler and instruction set ends in the right answer" * doctest::test_suite("slow")) {
+TEST_CASE("every member, compiler and instruction set ends in the right answer" * doctest::test_suite("slowest")) {
     long_table.check();
 }

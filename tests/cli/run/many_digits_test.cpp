@@ -132,7 +132,7 @@ TEST_CASE("parameters, nodes and functions are exact to all digits that are aske
     CHECK(error < 1e-139);
 }
 
-TEST_CASE("a kernel in 30 digits knows all functions, in all forms" * doctest::test_suite("slow")) {
+TEST_CASE("a kernel in 30 digits knows all functions, in all forms" * doctest::test_suite("slowest")) {
     if (!has_mpfr()) return;
     const Digits place;
     for (const std::string kinetic : {"", "*(1 + x^2/9)"}) {

@@ -97,7 +97,8 @@ int stopped_rows(const std::string& table) {
 }  // namespace
 
 TEST_SUITE("slow") {
-    TEST_CASE("states of all forms on the device have the bits of the processor's lanes after 200 steps") {
+    TEST_CASE("states of all forms on the device have the bits of the processor's lanes after 200 steps" *
+              doctest::test_suite("slowest")) {
         const FakeDevice device;
         check_same_bytes(pendulum_file, {"--vary", "q=0.1:3:300", "--vary", "omega=1,2", "--steps", "200"});
         // Several workers, each with a queue of its own, and groups that are handed over in order.
@@ -126,7 +127,8 @@ TEST_SUITE("slow") {
                          {"--vary", "y'=0.1:2.2:70", "--step", "0.1", "--steps", "200", "--unmeasured"}, 3);
     }
 
-    TEST_CASE("trajectories that end at a stop on the device are those of the processor, in all forms") {
+    TEST_CASE("trajectories that end at a stop on the device are those of the processor, in all forms" *
+              doctest::test_suite("slowest")) {
         const FakeDevice device;
         const test::SweepFolder place;
         const std::vector<std::string> map{"--vary",  "a=-3:3:12", "--vary",           "b=-3:3:12",

@@ -513,7 +513,8 @@ int main() {
 }
 )";
 
-TEST_CASE("chains side by side move as each does alone, to the same bits, and one that ends leaves the others be") {
+TEST_CASE("chains side by side move as each does alone, to the same bits, and one that ends leaves the others be" *
+          doctest::test_suite("slowest")) {
     const TemporaryFolder folder;
     write_text(folder / "side.cpp", side_by_side_program);
     const bool has_avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");

@@ -116,7 +116,8 @@ std::vector<Shown> shown(const Kernel& kernel, EnsembleRequest request) {
 // What computes here are kernels, which no sanitiser looks into.
 TEST_SUITE_BEGIN("slow");
 
-TEST_CASE("a trajectory with a clock in a lane arrives at the times at which it arrives alone, in the same states") {
+TEST_CASE("a trajectory with a clock in a lane arrives at the times at which it arrives alone, in the same states" *
+          doctest::test_suite("slowest")) {
     for (const Clocked& motion : all) {
         CAPTURE(motion.body);
         CAPTURE(motion.method);

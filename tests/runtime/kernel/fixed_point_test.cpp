@@ -270,7 +270,8 @@ TEST_CASE("where the fixed-point iteration cannot contract Newton's iteration ta
     }
 }
 
-TEST_CASE("dense output, events and the tangent map after steps by fixed-point iteration are those after Newton's") {
+TEST_CASE("dense output, events and the tangent map after steps by fixed-point iteration are those after Newton's" *
+          doctest::test_suite("slowest")) {
     struct Watched {
         const Motion& motion;
         std::string event;

@@ -475,7 +475,8 @@ int main() {
 
 }  // namespace
 
-TEST_CASE("lanes give the same bits in any width, on every instruction set, from every compiler") {
+TEST_CASE("lanes give the same bits in any width, on every instruction set, from every compiler" *
+          doctest::test_suite("slowest")) {
     const TemporaryFolder folder;
     const KernelSource source = emit(derivation_of(pendulum, "points = 4"));
     write_text(folder / "motion.hpp", source.header);

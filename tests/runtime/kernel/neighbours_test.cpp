@@ -170,7 +170,8 @@ const char* const half_hung_chain =
 // What computes here are kernels, which no sanitiser of ours looks into.
 TEST_SUITE_BEGIN("slow");
 
-TEST_CASE("a step along neighbours has the same bits in registers and in memory, and stays within its arrays") {
+TEST_CASE("a step along neighbours has the same bits in registers and in memory, and stays within its arrays" *
+          doctest::test_suite("slowest")) {
     const TemporaryFolder folder;
     write_text(folder / "both.cpp", program);
     const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");

@@ -132,7 +132,8 @@ Kernel refilled(const Watched& watched, std::int64_t together = 32) {
 // What computes here are kernels, which no sanitiser looks into.
 TEST_SUITE_BEGIN("slow");
 
-TEST_CASE("a trajectory in a refilled lane meets what it meets alone, when and where it meets it alone") {
+TEST_CASE("a trajectory in a refilled lane meets what it meets alone, when and where it meets it alone" *
+          doctest::test_suite("slowest")) {
     for (const Watched& watched : all) {
         CAPTURE(watched.motion.body);
         CAPTURE(watched.method);
@@ -164,7 +165,8 @@ TEST_CASE("a trajectory in a refilled lane meets what it meets alone, when and w
     }
 }
 
-TEST_CASE("what a trajectory is does not depend on the lanes, on what they held before, nor on the threads") {
+TEST_CASE("what a trajectory is does not depend on the lanes, on what they held before, nor on the threads" *
+          doctest::test_suite("slowest")) {
     for (const Watched& watched : all) {
         CAPTURE(watched.motion.body);
         CAPTURE(watched.method);

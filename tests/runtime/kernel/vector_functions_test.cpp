@@ -347,14 +347,16 @@ TEST_CASE("vector functions without FMA keep their accuracy, at every width the 
 
 // As kernels are compiled, and optimised less.
 TEST_CASE(
-    "vector functions of this machine keep their accuracy, with the same bits at every width, from g++ and clang++") {
+    "vector functions of this machine keep their accuracy, with the same bits at every width, from g++ and clang++" *
+    doctest::test_suite("slowest")) {
     const std::string one = output_of("g++", "native", {"-O2", "-fpeel-loops"});
     check_errors(one);
     CHECK(output_of("g++", "native", {"-O1", "-DEVERY_WIDTH"}) == one);
     if (exists("clang++")) CHECK(output_of("clang++", "native", {"-O1"}) == one);
 }
 
-TEST_CASE("vector functions compile for AVX2 and AVX-512, and there have the same bits") {
+TEST_CASE("vector functions compile for AVX2 and AVX-512, and there have the same bits" *
+          doctest::test_suite("slowest")) {
     __builtin_cpu_init();
     const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     const bool avx512 = __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");

@@ -156,7 +156,7 @@ TEST_CASE("every form of kernel has its method's order: Lobatto's 2 s - 2, Gauss
     check_order(driven, {Family::lobatto, 5});
 }
 
-TEST_CASE("and so has every member, up to Lobatto's order 22 and Gauss's 20" * doctest::test_suite("slow")) {
+TEST_CASE("and so has every member, up to Lobatto's order 22 and Gauss's 20" * doctest::test_suite("slowest")) {
     for (int points = 2; points <= 12; ++points)
         check_order(motions[static_cast<std::size_t>(points + 3) % motions.size()], {Family::lobatto, points});
     for (int stages = 1; stages <= 10; ++stages)
