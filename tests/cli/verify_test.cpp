@@ -84,7 +84,8 @@ TEST_CASE("coordinates that a constraint holds at 0 are not accused") {
     CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("right kernels are not accused where coordinates that constraints join begin at 0") {
+TEST_CASE("right kernels are not accused where coordinates that constraints join begin at 0" *
+          doctest::test_suite("slowest")) {
     const TemporaryFolder folder;
     write_text(folder / "ring.toml",
                "lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n"

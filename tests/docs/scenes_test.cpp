@@ -28,7 +28,7 @@ std::vector<std::string> scenes_in(const std::string& page) {
 
 }  // namespace
 
-TEST_CASE("every whole scene of the documents runs" * doctest::test_suite("slow")) {
+TEST_CASE("every whole scene of the documents runs" * doctest::test_suite("slowest")) {
     const fs::path tree = LOBATTO_SOURCE_DIR;
     std::vector<fs::path> documents{tree / "README.md"};
     for (const auto& entry : fs::directory_iterator(tree / "docs"))

@@ -106,14 +106,25 @@ struct WatchedStepper : Stepper<K> {
     real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
 };
 
-// What was last known of the events of a stepper, which the same motion goes on with in another.
+// What was last known of the events of a motion that goes on in another stepper, or in this one after a restart.
 template <class S>
-void keep_events(const S& from, S& to) {
-    for (int e = 0; e < S::event_room; ++e) {
-        to.event_values[e] = from.event_values[e];
-        to.event_begins[e] = from.event_begins[e];
+struct KnownEvents {
+    typename S::real values[S::event_room];
+    bool begins[S::event_room];
+
+    explicit KnownEvents(const S& stepper) {
+        for (int e = 0; e < S::event_room; ++e) {
+            values[e] = stepper.event_values[e];
+            begins[e] = stepper.event_begins[e];
+        }
     }
-}
+    void put(S& stepper) const {
+        for (int e = 0; e < S::event_room; ++e) {
+            stepper.event_values[e] = values[e];
+            stepper.event_begins[e] = begins[e];
+        }
+    }
+};
 
 // One function of the motion, sampled over a step.
 template <class real>

@@ -157,10 +157,10 @@ struct Sides {
         stepper.momentum(p);
         if constexpr (switches_of<K>() > 0) {
             take(stepper, time, q, p);
-            const S before = stepper;
+            const KnownEvents<S> known(stepper);
             const Status status = stepper.restart(q, p, stepper.steps);
             if (status != Status::ok) return status;
-            keep_events(before, stepper);
+            known.put(stepper);
         }
         return of_walls(stepper, time, q, p);
     }
@@ -335,7 +335,7 @@ private:
         real momentum[n];
         rest->momentum(momentum);
         put(stepper, rest->q, momentum, stepper.steps);
-        keep_events(*rest, stepper);
+        KnownEvents<S>(*rest).put(stepper);
     }
 };
 

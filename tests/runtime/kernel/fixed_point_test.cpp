@@ -172,7 +172,8 @@ TEST_CASE("steps by fixed-point iteration are those of Newton's iteration, in do
     }
 }
 
-TEST_CASE("steps by fixed-point iteration are those of Newton's iteration, in float and long double") {
+TEST_CASE("steps by fixed-point iteration are those of Newton's iteration, in float and long double" *
+          doctest::test_suite("slowest")) {
     const Motion ring = lattice();
     for (const Motion* motion : {&pendulum, &double_pendulum, &ring}) {
         INFO(motion->body);

@@ -112,7 +112,7 @@ TEST_CASE("a constant mass matrix leaves only the interior nodes to solve") {
     }
 }
 
-TEST_CASE("masses that all change alike leave no matrix of a node to factor") {
+TEST_CASE("masses that all change alike leave no matrix of a node to factor" * doctest::test_suite("slowest")) {
     const auto with_kinetic_energy = [](const std::string& energy, const std::string& method = "") {
         return scene("time = \"t\"\nlagrangian = \"" + energy + " - x^2/2 - (y - x)^4\"\n[coordinates]\n" +
                      "x = { position = 0.5, velocity = 0.3 }\ny = { position = 0.2, velocity = -0.4 }\n[method]\n" +
