@@ -7,10 +7,10 @@
 
 namespace lobatto::api {
 
-void OpenedRun::LetGo::operator()(Parts* parts) const {
+void OpenedRun::Destroy::operator()(Parts* parts) const {
     if (parts->observers && parts->observers->companion)
-        parts->observers->companion->end();  // it may wait for formulas
-    LetGoInAlgebra()(parts);
+        parts->observers->companion->end();  // its thread may wait for the lock
+    DestroyInAlgebra()(parts);
 }
 
 OpenedRun::OpenedRun(const Scene& scene, const RunOptions& options, bool general)

@@ -50,10 +50,10 @@ private:
         std::optional<RunObservers> observers{};
         TrajectoryResult result{};
     };
-    struct LetGo {
+    struct Destroy {
         void operator()(Parts* parts) const;
     };
-    std::unique_ptr<Parts, LetGo> parts_;
+    std::unique_ptr<Parts, Destroy> parts_;
     bool beyond_horizon_;
 };
 

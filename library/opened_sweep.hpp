@@ -10,7 +10,7 @@
 
 namespace lobatto::api {
 
-using OpenedSweep = std::unique_ptr<SweepStudy, LetGoInAlgebra>;
+using OpenedSweep = std::unique_ptr<SweepStudy, DestroyInAlgebra>;
 
 // The columns, as a sweep takes them.
 StartsRequest request_of(const Starts& starts);

@@ -43,8 +43,8 @@ decltype(auto) in_algebra(Work&& work) {
     });
 }
 
-// Neither are the counts of who holds them: who lets go of formulas does so like one who derives.
-struct LetGoInAlgebra {
+// Their reference counts are not made for several threads either: formulas are destroyed under the same lock.
+struct DestroyInAlgebra {
     template <class T>
     void operator()(T* held) const {
         const std::lock_guard lock(algebra());
@@ -53,7 +53,7 @@ struct LetGoInAlgebra {
 };
 template <class T>
 std::shared_ptr<T> shared_in_algebra(T* made) {
-    return std::shared_ptr<T>(made, LetGoInAlgebra());
+    return std::shared_ptr<T>(made, DestroyInAlgebra());
 }
 
 MethodChoice method_of(const Settings& settings);

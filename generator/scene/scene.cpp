@@ -356,8 +356,7 @@ Names parameter_names(const Scene& scene) {
 
 void fail_at_clock(const Scene& scene, const std::string& message) {
     if (scene.clock->at) scene.source.fail(*scene.clock->at, message);
-    throw InputError(
-        fmt::format("{}: clock = \"{}\", as an option asks for: {}", scene.path, scene.clock->text, message));
+    throw InputError(fmt::format("{}: clock = \"{}\", from an option: {}", scene.path, scene.clock->text, message));
 }
 
 Scene read_scene(const std::string& path, const std::vector<std::string>& kept) {

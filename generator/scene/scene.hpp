@@ -214,10 +214,10 @@ struct Scene {
                             const std::vector<GiNaC::ex>& parameter_values = {}) const;
 };
 
-// The parameters and constants of a scene, for further formulas in them.
-// InputError: where the clock stands, or, if an option asked for it, without a place.
+// InputError where the clock stands, or without a place if an option asked for it.
 [[noreturn]] void fail_at_clock(const Scene& scene, const std::string& message);
 
+// The parameters and constants of a scene, for further formulas in them.
 struct Names;
 Names parameter_names(const Scene& scene);
 

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "generator/formula/real.hpp"
 #include "generator/graph/notation.hpp"
@@ -96,8 +95,8 @@ ConstrainedStart::Numbers ConstrainedStart::residual(const MassEquations::Entrie
     return right;
 }
 
-// From q along a step, the whole of it, a half, a quarter, ... so that phi does not grow, or by no more than a quarter
-// of what a step as long can change it by: along the constraints phi grows with the square of the step.
+// From q along a step, the whole of it, a half, a quarter, ... until phi is no larger than before, or no larger than a
+// quarter of |G| |step|. A step along the constraints changes phi by the square of its length, which this allows.
 void ConstrainedStart::go(const Numbers& q, const Numbers& step) {
     const std::optional<cln::cl_R> before = square();
     cln::cl_R slope = 0, length = 0;
@@ -146,14 +145,15 @@ bool ConstrainedStart::newton_step(const MassEquations::Entries& mass, const Num
     return is_better;
 }
 
-// Whether Newton's step goes along the constraints to where the distance shrinks, as `step` does: not to a saddle.
+// Whether the part of Newton's step along the constraints reduces the distance, as that of `step` does. Else it leads
+// to a saddle of the distance.
 bool ConstrainedStart::goes_down(const MassEquations::Entries& mass, Numbers right, const Elimination& newton,
                                  const Elimination& step) const {
     std::fill_n(right.begin(), system_.q.size(), cln::cl_R(0));
     const Elimination across = equations_.eliminate(mass, right);  // to the constraints alone, in both steps
     cln::cl_R together = 0;
     for (const auto& [place, value] : mass) {
-        const auto [i, j] = std::pair(static_cast<std::size_t>(place.first), static_cast<std::size_t>(place.second));
+        const auto i = static_cast<std::size_t>(place.first), j = static_cast<std::size_t>(place.second);
         together = together + (newton.vector[i] - across.vector[i]) * value.value * (step.vector[j] - across.vector[j]);
     }
     return !(together < 0);

@@ -162,7 +162,7 @@ struct Motion {
     std::int32_t iterations{};        // of the last step
     real increment{};                 // last increment that was measured, relative to the displacement of its step
     real event_values[event_room]{};  // the last of each that was not zero (steppers/events.hpp)
-    bool event_begins[event_room]{};  // that is of where the step begins, which no step before has looked at
+    bool event_begins[event_room]{};  // whether that is of the state now, which no step has looked at
 
     real time() const { return start_time + real(steps) * step_size; }
     real next_time() const { return start_time + real(steps + 1) * step_size; }

@@ -709,3 +709,19 @@ TEST_CASE("two scenes with unusual names do not share a default output") {
                                                "' run \"$s\" --until 1 --quiet; done; ls out"});
     CHECK(done.out == "*.csv\n\u00e4.csv\n");
 }
+
+TEST_CASE("sweeps with another kind of step have another digest") {
+    const Place place;
+    const auto digest = [&](const char* clock) {
+        const test::Finished done = place.sweep({LOBATTO_SOURCE_DIR "/scenes/kepler.toml", "--vary", "x=0.4:0.5:2",
+                                                 "--until", "1", "--step", "0.1", "--clock", clock});
+        REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+        const std::string table = test::read_file(place.file()), line = "\n# sweep: ";
+        const std::size_t at = table.find(line);
+        REQUIRE(at != std::string::npos);
+        return table.substr(at + line.size(), 16);
+    };
+    const std::string none = digest("none");
+    CHECK(none == digest("none"));
+    CHECK(none != digest("auto"));
+}
