@@ -4,14 +4,30 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace lobatto {
 
 namespace {
 
-const double none = std::numeric_limits<double>::quiet_NaN();
+const double none = KeptNumber::none;
+
+Kept kept_of(Reduction::Of of) {
+    switch (of) {
+        case Reduction::Of::first:
+            return Kept::first;
+        case Reduction::Of::count:
+            return Kept::count;
+        case Reduction::Of::max:
+            return Kept::max;
+        case Reduction::Of::min:
+            return Kept::min;
+        case Reduction::Of::mean:
+            return Kept::mean;
+        case Reduction::Of::last:
+            break;
+    }
+    return Kept::last;
+}
 
 std::vector<GiNaC::symbol> variables_of(const Scene& scene) {
     std::vector<GiNaC::symbol> all;
@@ -31,8 +47,8 @@ Reductions::Reductions(const Scene& scene) : n_(scene.coordinates.size()), param
     const std::vector<GiNaC::symbol> variables = variables_of(scene);
     variables_.resize(variables.size());
     for (const Reduction& kept : scene.outputs.kept) {
-        Part part{kept.of, kept.event, std::nullopt};
-        if (kept.of != Reduction::Of::first && kept.of != Reduction::Of::count) {
+        Part part{kept_of(kept.of), kept.event, std::nullopt};
+        if (part.of != Kept::first && part.of != Kept::count) {
             part.formula = Tape::of(kept.value, variables);
             if (!part.formula) throw InputError(fmt::format("{}: cannot be evaluated along a trajectory", kept.text));
             needs_energy_ = needs_energy_ || kept.value.has(scene.outputs.energy_of_kept);
@@ -47,7 +63,7 @@ void Reductions::begin(const LoadedStepper<double>& stepper, const EnsembleStart
     stepper_ = &stepper;
     std::copy(start.parameters.begin(), start.parameters.end(), variables_.begin());
     has_begun_ = false;
-    for (Part& part : parts_) part.value = part.of == Reduction::Of::count || part.of == Reduction::Of::mean ? 0 : none;
+    for (Part& part : parts_) part.number.begin(part.of);
 }
 
 void Reductions::observe(const double* rows, std::int64_t count) {
@@ -66,21 +82,12 @@ void Reductions::observe(const double* rows, std::int64_t count) {
         at = std::copy(p_.begin(), p_.end(), at);
         *at = energy;
         for (Part& part : parts_)
-            if (part.formula) look(part, (*part.formula)(variables_), row[0]);
+            if (part.formula)
+                part.number.observe(part.of, (*part.formula)(variables_), row[0] - last_time_, !has_begun_);
         if (!has_begun_) first_time_ = row[0];
         last_time_ = row[0];
         has_begun_ = true;
     }
-}
-
-void Reductions::look(Part& part, double value, double time) const {
-    if (part.of == Reduction::Of::last || std::isnan(value)) part.value = value;
-    if (part.of == Reduction::Of::max && !(part.value >= value) && !(has_begun_ && std::isnan(part.value)))
-        part.value = value;
-    if (part.of == Reduction::Of::min && !(part.value <= value) && !(has_begun_ && std::isnan(part.value)))
-        part.value = value;
-    if (part.of == Reduction::Of::mean && has_begun_) part.value += (time - last_time_) * (value + part.before) / 2;
-    part.before = value;
 }
 
 void Reductions::observe_events(const double* rows, std::int64_t count) {
@@ -88,22 +95,46 @@ void Reductions::observe_events(const double* rows, std::int64_t count) {
     for (std::int64_t i = 0; i < count; ++i) {
         const double* const row = rows + static_cast<std::size_t>(i) * columns;
         for (Part& part : parts_) {
-            if (part.formula || part.event != static_cast<std::size_t>(row[0])) continue;
-            if (part.of == Reduction::Of::count) ++part.value;
-            if (part.of == Reduction::Of::first && std::isnan(part.value)) part.value = row[1];
+            if (!part.formula && part.event == static_cast<std::size_t>(row[0]))
+                part.number.observe_event(part.of, row[1]);
         }
     }
 }
 
 std::vector<double> Reductions::values() const {
     std::vector<double> values;
-    for (const Part& part : parts_) {
-        const bool is_mean = part.of == Reduction::Of::mean && last_time_ != first_time_;
-        values.push_back(is_mean                          ? part.value / (last_time_ - first_time_)
-                         : part.of == Reduction::Of::mean ? part.before
-                                                          : part.value);
-    }
+    for (const Part& part : parts_) values.push_back(part.number.result(part.of, last_time_ - first_time_));
     return values;
+}
+
+std::string Reductions::text() const {
+    std::string of, events, formulas;
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+        const Part& part = parts_[i];
+        of += fmt::format("{}Kept({})", i == 0 ? "" : ", ", static_cast<int>(part.of));
+        events += fmt::format("{}{}", i == 0 ? "" : ", ", part.formula ? -1 : static_cast<int>(part.event));
+        if (!part.formula) continue;
+        formulas += "        {\n" + part.formula->text(fmt::format("values[{}]", i), "            ") + "        }\n";
+    }
+    return fmt::format(
+        "namespace lobatto {{\n"
+        "struct KeptFormulas {{\n"
+        "    static constexpr int parts = {0};\n"
+        "    static constexpr bool needs_velocity = {1}, needs_energy = {2};\n"
+        "    LOBATTO_DEVICE static Kept of(int part) {{\n"
+        "        constexpr Kept all[] = {{{3}}};\n"
+        "        return all[part];\n"
+        "    }}\n"
+        "    LOBATTO_DEVICE static int event(int part) {{\n"
+        "        constexpr int all[] = {{{4}}};\n"
+        "        return all[part];\n"
+        "    }}\n"
+        "    LOBATTO_DEVICE static void values([[maybe_unused]] const double* x, [[maybe_unused]] double* values) {{\n"
+        "{5}"
+        "    }}\n"
+        "}};\n"
+        "}}  // namespace lobatto\n",
+        parts_.size(), needs_velocity_, needs_energy_, of, events, formulas);
 }
 
 }  // namespace lobatto

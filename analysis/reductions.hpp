@@ -4,11 +4,12 @@
 // means are taken by the trapezoidal rule.
 #pragma once
 
-#include <memory>
+#include <string>
 #include <vector>
 
 #include "analysis/tape.hpp"
 #include "generator/scene/scene.hpp"
+#include "runtime/kernel/kept.hpp"
 #include "runtime/run/ensemble/ensemble.hpp"
 
 namespace lobatto {
@@ -24,14 +25,16 @@ public:
     // One for each Outputs::kept; not a number: an event that did not happen.
     std::vector<double> values() const override;
 
+    // The same for a device: C++ text of KeptFormulas (runtime/kernel/device_lanes.hpp).
+    std::string text() const;
+
 private:
     struct Part {
-        Reduction::Of of;
+        Kept of;
         std::size_t event;
         std::optional<Tape> formula;
-        double value = 0, before = 0;
+        KeptNumber number = {};
     };
-    void look(Part& part, double value, double time) const;
 
     std::vector<Part> parts_;
     std::size_t n_;

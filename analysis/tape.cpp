@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/tape.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -116,6 +119,7 @@ bool Tape::append(const ex& formula, const Variables& variables, const Operands&
             const auto found = functions.find(GiNaC::ex_to<GiNaC::function>(formula).get_name());
             if (found == functions.end()) return false;
             instruction.function = found->second;
+            instruction.name = found->first.c_str();
         }
         seen.emplace(formula, instructions_.size());
     } else {
@@ -159,6 +163,38 @@ Tape::Value Tape::sized(const std::vector<double>& variables) const {
         if (instruction.slot) memory[*instruction.slot] = result;
     }
     return {stack.back(), size};
+}
+
+std::string Tape::text(const std::string& result, const std::string& indent) const {
+    std::string statements;
+    std::vector<std::string> stack, memory(slots_);
+    for (const Instruction& instruction : instructions_) {
+        if (instruction.operands == 0) {
+            stack.push_back(instruction.operation == Operation::number   ? fmt::format("({:a})", instruction.number)
+                            : instruction.operation == Operation::recall ? memory[*instruction.slot]
+                                                                         : fmt::format("x[{}]", instruction.variable));
+            continue;
+        }
+        const auto first = stack.end() - instruction.operands;
+        std::string value = *first;
+        if (instruction.operation == Operation::call)
+            value = fmt::format("LOBATTO_LIBRARY({})({})", instruction.name, *first);
+        if (instruction.operation == Operation::angle)
+            value = fmt::format("LOBATTO_LIBRARY(atan2)({}, {})", first[0], first[1]);
+        if (instruction.operation == Operation::power)
+            value = first[1] == fmt::format("({:a})", 2.0)
+                        ? fmt::format("{0} * {0}", first[0])
+                        : fmt::format("LOBATTO_LIBRARY(pow)({}, {})", first[0], first[1]);
+        if (instruction.operation == Operation::sum) value = fmt::format("{}", fmt::join(first, stack.end(), " + "));
+        if (instruction.operation == Operation::product)
+            value = fmt::format("{}", fmt::join(first, stack.end(), " * "));
+        const std::string name = fmt::format("t{}", &instruction - instructions_.data());
+        statements += fmt::format("{}const double {} = {};\n", indent, name, value);
+        stack.erase(first, stack.end());
+        stack.push_back(name);
+        if (instruction.slot) memory[*instruction.slot] = name;
+    }
+    return statements + fmt::format("{}{} = {} + 0.0;\n", indent, result, stack.back());
 }
 
 }  // namespace lobatto

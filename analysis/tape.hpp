@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace lobatto {
@@ -31,6 +32,8 @@ public:
     Value sized(const std::vector<double>& variables) const;
     // Zero has no sign: that of -(a - b) and b - a would be another.
     double operator()(const std::vector<double>& variables) const { return sized(variables).value + 0.0; }
+    // The same as C++ statements that set `result`; the variables are x[0], x[1], ... Without tables.
+    std::string text(const std::string& result, const std::string& indent) const;
 
 private:
     enum class Operation { number, variable, recall, sum, product, power, call, angle, table };
@@ -40,6 +43,7 @@ private:
         std::size_t variable = 0;
         int operands = 0;
         double (*function)(double) = nullptr;
+        const char* name = nullptr;      // of the function
         const Spline* spline = nullptr;  // table
         int order = 0;
         std::optional<std::size_t> slot = std::nullopt;  // of the memory: where its result stays, or is found again

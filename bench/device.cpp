@@ -28,8 +28,11 @@ constexpr Row rows[] = {{"P1", "p1_pendulum", 4, 0.2, 20'000},
                         {"P2", "p2_henon_heiles", 6, 0.25, 10'000},
                         {"P3", "p3_double_pendulum", 6, 0.05, 4'000},
                         {"P4", "p4_kepler", 6, 0.1, 10'000}};
-constexpr std::int64_t counts[] = {1'000, 10'000, 100'000, 1'000'000, 10'000'000};
-constexpr std::int64_t many = 10'000'000;                // so many go a fifth of the way
+struct Size {
+    std::int64_t trajectories;
+    double steps = 1;  // of each, as a part of those of the row
+};
+constexpr Size sizes[] = {{1'000}, {10'000}, {100'000}, {100'000, 5}, {1'000'000}, {10'000'000, 0.2}};
 constexpr std::int64_t steps_of_processor = 30'000'000;  // of each core: it takes fewer trajectories as far
 
 // Steps of all trajectories in a second, what begins and ends them included; 0: some failed.
@@ -70,8 +73,9 @@ void print_rates(const Row& row, const std::shared_ptr<const CudaDevice>& device
     fmt::print("| trajectories | steps of each | one core, steps/s | {} cores | {} | times one core | times all |\n",
                thread_count(0), device->name());
     fmt::print("|---|---|---|---|---|---|---|\n");
-    for (const std::int64_t count : counts) {
-        const std::int64_t steps = count == many ? row.steps / 5 : row.steps, few = steps_of_processor / steps;
+    for (const Size& size : sizes) {
+        const auto steps = static_cast<std::int64_t>(size.steps * static_cast<double>(row.steps));
+        const std::int64_t count = size.trajectories, few = steps_of_processor / steps;
         alone.steps = request.steps = there.steps = steps;
         const double one = rate_of(kernel, alone, std::min(count, few)),
                      all = rate_of(kernel, request, std::min(count, few * thread_count(0))),
@@ -120,7 +124,7 @@ void print_flips(const std::shared_ptr<const CudaDevice>& device) {
     EnsembleRequest alone = flips_of(scene, 100), there = flips_of(scene, 100);
     alone.threads = 1;
     const double one = flips_in(kernel, alone).rate, all = flips_in(kernel, flips_of(scene, 400)).rate;
-    there.device = device_kernel_of(derived.source, Precision::double_, device, nullptr, true);
+    there.device = device_kernel_of(derived.source, Precision::double_, device, nullptr, {true});
     fmt::print("\nThe map of flips: {}, h = {}, {} registers; one core {:.3g} trajectories/s, {} cores {:.3g}\n\n",
                scene.method.name(), there.step, there.device->alike->registers(), one, thread_count(0), all);
     fmt::print("| map | flips | steps | {}, trajectories/s | times one core | times all |\n|---|---|---|---|---|---|\n",

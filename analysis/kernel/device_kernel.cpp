@@ -63,54 +63,55 @@ std::string with_loops_of_device(const std::string& text, bool written_out) {
     return result;
 }
 
-// With LOBATTO_DEVICE_STOPS where lanes are watched.
-std::string support_of_lanes(const KernelSource& source, bool stops) {
-    if (!stops) return support_text(with_ensemble(source.support));
+// With LOBATTO_DEVICE_WATCHES where steps are looked at.
+std::string support_of_lanes(const KernelSource& source, const WatchedLanes& watched) {
+    if (!watched.any()) return support_text(with_ensemble(source.support));
     std::vector<std::string> names = source.support;
     names.push_back("steppers/impacts.hpp");
-    return "#define LOBATTO_DEVICE_STOPS\n" + support_text(with_refilled_ensemble(names));
+    return "#define LOBATTO_DEVICE_WATCHES\n" + support_text(with_refilled_ensemble(names));
+}
+
+// The kernel and its lanes; `header`: of the kernel.
+void append_lanes(std::string& text, const KernelSource& source, const std::string& header,
+                  const WatchedLanes& watched) {
+    append_part(text, std::string(kernel_abi_h_text));
+    append_part(text, support_of_lanes(source, watched));
+    append_part(text, header);
+    append_part(text, std::string(kernel_kept_hpp_text));
+    if (!watched.kept.empty()) text += "#define LOBATTO_DEVICE_KEPT\n" + watched.kept;
+    append_part(text, std::string(kernel_device_lanes_hpp_text));
+    append_part(text, std::string(kernel_device_host_hpp_text));  // empty to nvcc: one text for both
 }
 
 }  // namespace
 
 std::string why_not_on_device(const Scene& scene) {
     const Precision numbers = scene.method.numbers;
-    if (numbers != Precision::double_ && numbers != Precision::single)
-        return fmt::format("a GPU has double and float, not {}", precision_name(numbers));
+    if (numbers != Precision::double_ && numbers != Precision::single && numbers != Precision::double_double)
+        return fmt::format("a GPU has double, float and double-double, not {}", precision_name(numbers));
     if (scene.clock) return "steps by a clock are taken by the processor alone";
     if (scene.is_cut()) return "impacts and switches are found by the processor alone";
-    if (!scene.run.stops.empty() && numbers != Precision::double_)
-        return "stops in float are found by the processor alone";
-    if (!scene.outputs.kept.empty()) return "what --keep asks for is computed by the processor alone";
     if (!scene.tables.empty()) return "measured tables are read by the processor alone";
     if (scene.method.arithmetic == StepArithmetic::clean) return "clean arithmetic is for the processor alone";
     return "";
 }
 
-Translation host_side_of(const KernelSource& source, Precision precision, bool stops) {
+Translation host_side_of(const KernelSource& source, Precision precision, const WatchedLanes& watched) {
     Translation translation;
     translation.name = source.name;
     translation.short_loops = source.form == Form::general;
     translation.text = before_support(precision);
-    append_part(translation.text, std::string(kernel_abi_h_text));
-    append_part(translation.text, support_of_lanes(source, stops));
-    append_part(translation.text, source.header);
-    append_part(translation.text, std::string(kernel_device_lanes_hpp_text));
-    append_part(translation.text, std::string(kernel_device_host_hpp_text));
+    append_lanes(translation.text, source, source.header, watched);
     translation.text += export_lanes + source.name + ")\n";
     return translation;
 }
 
 DeviceTranslation device_side_of(const KernelSource& source, const std::string& architecture, const DeviceLibrary& host,
-                                 bool stops) {
+                                 const WatchedLanes& watched) {
     constexpr int most_written_out = 256;  // words of a row
     DeviceTranslation translation{source.name, fmt::format("#define LOBATTO_DEVICE_BLOCK {}\n", DeviceKernel::block),
                                   architecture};
-    append_part(translation.text, std::string(kernel_abi_h_text));
-    append_part(translation.text, support_of_lanes(source, stops));
-    append_part(translation.text, with_functions_of_device(source.header));
-    append_part(translation.text, std::string(kernel_device_lanes_hpp_text));
-    append_part(translation.text, std::string(kernel_device_host_hpp_text));  // empty to nvcc: one text for both
+    append_lanes(translation.text, source, with_functions_of_device(source.header), watched);
     translation.text = with_loops_of_device(translation.text, host->words <= most_written_out);
     translation.text += fmt::format(
         "\nstatic_assert(lobatto::device_words<lobatto::kernels::{0}> == {1} &&\n"
@@ -123,15 +124,14 @@ DeviceTranslation device_side_of(const KernelSource& source, const std::string& 
 
 std::shared_ptr<const DeviceKernel> device_kernel_of(const KernelSource& source, Precision precision,
                                                      const std::shared_ptr<const CudaDevice>& device,
-                                                     std::string* compiled, bool stops) {
-    const Compiled host = compile(host_side_of(source, precision, stops));
+                                                     std::string* compiled, const WatchedLanes& watched) {
+    const Compiled host = compile(host_side_of(source, precision, watched));
     DeviceKernel kernel{DeviceLibrary::load(host.object, source.digest), nullptr, nullptr, nullptr};
     if (!kernel.host.has_lanes())
         throw InputError(
             "--device: this kernel has no lanes for a GPU: its coordinates are iterated along their neighbours, or a "
-            "trajectory is too large for a thread, or its steps are a linear map and it has stops; compute with "
-            "--device cpu");
-    const Compiled code = compile_for_device(device_side_of(source, device->architecture(), kernel.host, stops));
+            "trajectory is too large for a thread; compute with --device cpu");
+    const Compiled code = compile_for_device(device_side_of(source, device->architecture(), kernel.host, watched));
     const std::string cubin = content_of(code.object);
     kernel.lanes = std::make_shared<const CudaFunction>(device, cubin, DeviceKernel::name_of_lanes);
     kernel.alike = std::make_shared<const CudaFunction>(device, cubin, DeviceKernel::name_of_alike);

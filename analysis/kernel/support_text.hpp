@@ -16,6 +16,7 @@ struct SupportPart {
 extern const std::vector<SupportPart> support_parts;
 extern const std::string_view kernel_abi_h_text;             // runtime/kernel/abi.h
 extern const std::string_view kernel_export_hpp_text;        // runtime/kernel/export.hpp
+extern const std::string_view kernel_kept_hpp_text;          // runtime/kernel/kept.hpp
 extern const std::string_view kernel_device_lanes_hpp_text;  // runtime/kernel/device_lanes.hpp
 extern const std::string_view kernel_device_host_hpp_text;   // runtime/kernel/device_host.hpp
 

@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 11u
+#define LOBATTO_ABI_VERSION 12u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -218,7 +218,7 @@ typedef struct lobatto_device_call {
     int32_t* status;               /* LOBATTO_NOT_CONVERGED: `retake` takes the step; LOBATTO_STOPPED: looks at it */
     const int32_t* order;          /* lanes of this launch, `lanes` of them; null: all */
     int32_t alike;                 /* whether all lanes have the same parameters */
-    int32_t watches;               /* whether stops end trajectories */
+    int32_t watches;               /* whether events are sought, for stops or for what is kept */
     double start_time[2], step[2]; /* numbers of the kernel, in their first bytes */
 } lobatto_device_call;
 
@@ -230,20 +230,24 @@ typedef struct lobatto_device_lanes {
     int32_t first_moving, moving;           /* of these, which steps change and `state` reads */
     int32_t shared_bytes, shared_alignment; /* of what all lanes of one step size share */
     int32_t host_bytes, host_alignment;     /* of room for the functions below, one a thread */
-    int32_t columns;                        /* of `row` below; 0: the kernel has no stops */
+    int32_t columns;                        /* of `row` below; 0: nothing looks at the steps */
+    int32_t kept;                           /* numbers that are kept of a trajectory */
     /* Lanes first, ..., last - 1 at their starts; arrays are lane-major, as of ensembles. */
     void (*place)(void* host, lobatto_device_call* call, int64_t first, int64_t last, const void* parameters,
                   const void* q, const void* p, double tolerance, void* energy);
     void (*shared)(const lobatto_device_call* call, int64_t lane,
                    void* shared); /* of any lane placed with LOBATTO_OK */
+    /* Of each word whether it is a lane's own (1), not shared (0), where all have the same parameters. */
+    void (*own)(const void* shared, uint8_t* is_own);
     /* What a launch does, on the host. */
     void (*advance)(lobatto_device_call* call, const void* shared, int64_t first, int64_t last);
-    /* From the step that failed to the target; parameters of this lane. Of a kernel with stops that step alone, or a
-     * look at it; `row` of a lane that has ended: event number or -1, t, q, p, energy of its last state. */
-    void (*retake)(void* host, lobatto_device_call* call, int64_t lane, const void* parameters, double tolerance,
-                   void* row);
+    /* The first `count` lanes: from the step that failed to the target. Where steps are looked at that step alone, or a
+     * look at it; rows, `columns` numbers each, of lanes that have ended: event number or -1, t, q, p, energy of its
+     * last state, what is kept. */
+    void (*retake)(void* host, lobatto_device_call* call, int64_t count, const void* parameters, double tolerance,
+                   void* rows);
     void (*state)(void* host, const lobatto_device_call* call, int64_t first, int64_t last, void* q, void* p,
-                  void* energy); /* energy: one a lane; not a number without one */
+                  void* energy, void* kept); /* energy: one a lane; not a number without one */
 } lobatto_device_lanes;
 
 const lobatto_device_lanes* lobatto_device_lanes_table(void);

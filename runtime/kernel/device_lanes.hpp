@@ -7,31 +7,105 @@
 // computes is what a lane of Ensemble computes; this text is compiled for the host by any C++17 compiler, and for the
 // device by nvcc.
 //
-// With LOBATTO_DEVICE_STOPS a lane is one of RefilledEnsemble: it samples the functions of events after each step. One
-// that is not quiet (refilled.hpp) waits with that step, which the host looks at; then it goes on, or has ended.
+// With LOBATTO_DEVICE_WATCHES a lane is one of RefilledEnsemble, whose steps are looked at: for events, whose functions
+// it samples (one that is not quiet, as refilled.hpp has it, waits with that step, which the host looks at; then it
+// goes on, or has ended), and for what is kept of its trajectory (KeptFormulas, whose text is made for the scene).
 #pragma once
 
 #include <cstdint>
 #include <type_traits>
 
 #include "abi.h"
+#include "kept.hpp"
 #include "kernel.hpp"
 
 namespace lobatto {
 
-#ifdef LOBATTO_DEVICE_STOPS
+#ifndef LOBATTO_DEVICE_KEPT
+struct KeptFormulas {  // nothing is kept
+    static constexpr int parts = 0;
+    static constexpr bool needs_velocity = false, needs_energy = false;
+    static Kept of(int part);    // what is made of the formula or event,
+    static int event(int part);  // the number of the event; -1: it is the formula
+    // Formulas; x: parameters, time, positions, velocities, momenta, energy.
+    static void values(const double* x, double* values);
+};
+#endif
+
+#ifdef LOBATTO_DEVICE_WATCHES
 template <class K>
-constexpr bool has_watched_lanes =
-    K::form != Form::linear_map&& stops_of<K>() > 0 && impacts_of<K>() == 0 && switches_of<K>() == 0;
+constexpr bool has_watched_lanes = impacts_of<K>() == 0 && switches_of<K>() == 0;
+
+// What is kept of a lane's trajectory so far. Formulas are in double.
+template <class K>
+struct KeptOfLane {
+    using T = Pack<typename K::real, 1>;
+    static constexpr int n = K::coordinates, parameters = K::parameter_count, count = KeptFormulas::parts;
+    double of_parameters[parameters > 0 ? parameters : 1];
+    KeptNumber numbers[count];
+
+    // The state after a step, or the first one.
+    template <class Given>
+    LOBATTO_INLINE void observe(const LaneStepper<K, T>& motion, const Given& k, double time, double passed,
+                                bool is_first) {
+        T q[n], p[n];
+        for (int c = 0; c < n; ++c) q[c] = motion.position(c);
+        LentStep<K, T>::momenta(motion.rates(), k, p);
+        if constexpr (K::form == Form::general) {
+            T v[n];
+            const bool is_known = any(LentStep<K, T>::velocities(motion, k, T(time), v));
+            for (int c = 0; c < n; ++c) v[c] = is_known ? v[c] : T(KeptNumber::none);
+            observe(k, time, passed, is_first, q, p, v);
+        } else {
+            T v[n];
+            if constexpr (KeptFormulas::needs_velocity) K::velocity(k, static_cast<const T*>(p), +v);
+            observe(k, time, passed, is_first, q, p, v);
+        }
+    }
+    template <class Given>
+    LOBATTO_INLINE void observe(const Given& k, double time, double passed, bool is_first, const T* q, const T* p,
+                                const T* v) {
+        double x[parameters + 2 + 3 * n], values[count];
+        for (int i = 0; i < parameters; ++i) x[i] = of_parameters[i];
+        x[parameters] = time;
+        for (int c = 0; c < n; ++c) {
+            x[parameters + 1 + c] = lane_of(q[c], 0);
+            x[parameters + 1 + n + c] = lane_of(v[c], 0);
+            x[parameters + 1 + 2 * n + c] = lane_of(p[c], 0);
+        }
+        if constexpr (KeptFormulas::needs_energy && K::has_energy) {
+            T energy;
+            if constexpr (K::form == Form::linear_map)
+                energy = K::energy(k, q, p);
+            else
+                energy = Formulas<K>::energy(k, T(time), q, K::form == Form::general ? v : p);
+            x[parameters + 1 + 3 * n] = lane_of(energy, 0);
+        } else {
+            x[parameters + 1 + 3 * n] = KeptNumber::none;
+        }
+        KeptFormulas::values(x, values);
+        for (int i = 0; i < count; ++i)
+            if (KeptFormulas::event(i) < 0) numbers[i].observe(KeptFormulas::of(i), values[i], passed, is_first);
+    }
+};
+
+struct NothingKept {};
+struct NoPlaces {
+    void prepare() {}
+};
+template <class K>
+using KeptBy = std::conditional_t<(KeptFormulas::parts > 0), KeptOfLane<K>, NothingKept>;
+template <class K>
+using PlacesOfLanes = std::conditional_t<(K::events > 0), SamplePlaces<K>, NoPlaces>;
 
 // What a lane knows of events, and the state before the step that the host is to look at.
-template <class K>
+template <class K, bool has_events = (K::events > 0)>
 struct Watched {
     using T = Pack<typename K::real, 1>;
     T last[K::events], q_before[K::coordinates], rate_before[K::coordinates];
 };
 template <class K>
-using PlacesOfLanes = SamplePlaces<K>;
+struct Watched<K, false> {};
 #else
 template <class K>
 constexpr bool has_watched_lanes = false;
@@ -39,12 +113,16 @@ template <class K>
 struct PlacesOfLanes {};
 #endif
 
+// The state stands before what steps compute with.
 template <class K>
 struct alignas(8) DeviceLane {
     using T = Pack<typename K::real, 1>;
     typename K::template CoefficientsOf<T> coefficients;
+#ifdef LOBATTO_DEVICE_WATCHES
+    KeptBy<K> kept;
+#endif
     LaneStepper<K, T> motion;
-#ifdef LOBATTO_DEVICE_STOPS
+#ifdef LOBATTO_DEVICE_WATCHES
     Watched<K> watched;
 #endif
 };
@@ -53,7 +131,7 @@ struct alignas(8) DeviceLane {
 template <class K>
 constexpr bool has_device_lanes() {
     constexpr std::size_t most = 16384;  // bytes of a row
-#ifdef LOBATTO_DEVICE_STOPS
+#ifdef LOBATTO_DEVICE_WATCHES
     if (!has_watched_lanes<K>) return false;
 #endif
     if constexpr (ensemble_lanes<K>(1) == 0)
@@ -67,33 +145,39 @@ constexpr bool has_device_lanes() {
 template <class K>
 constexpr int device_words = sizeof(DeviceLane<K>) / 8;
 
-// The words of the state, which stands first in each LaneStepper: at most two positions and two velocities or momenta.
+// The words of what is kept and of the state, which stands first in each LaneStepper: at most two positions and two
+// velocities or momenta.
 template <class K>
 struct MovingWords {
     using T = typename DeviceLane<K>::T;
-    using Motion = LaneStepper<K, T>;
-    static constexpr std::size_t begin =
-        (sizeof(typename K::template CoefficientsOf<T>) + alignof(Motion) - 1) / alignof(Motion) * alignof(Motion);
-    static constexpr std::size_t wanted = begin + 8 + (4 * K::coordinates + 1) * sizeof(T);
+    static constexpr std::size_t begin = sizeof(typename K::template CoefficientsOf<T>) / 8 * 8;
+#ifdef LOBATTO_DEVICE_WATCHES
+    static constexpr std::size_t kept = sizeof(KeptBy<K>) + 8;
+#else
+    static constexpr std::size_t kept = 0;
+#endif
+    static constexpr std::size_t wanted = begin + alignof(T) + kept + 8 + (4 * K::coordinates + 1) * sizeof(T);
     static constexpr std::size_t end = wanted < sizeof(DeviceLane<K>) ? wanted : sizeof(DeviceLane<K>);
     static constexpr int first = begin / 8, count = (end + 7) / 8 - begin / 8;
 };
 
-// Words are copied whole: nvcc moves what it takes for bytes one by one.
-template <class K>
+// Words are copied whole: nvcc moves what it takes for bytes one by one. `words`: so many of the first.
+template <class K, int words = device_words<K> >
 LOBATTO_INLINE void load_lane(const lobatto_device_call& call, std::int64_t index, DeviceLane<K>& lane) {
-    for (int w = 0; w < device_words<K>; ++w) {
+    for (int w = 0; w < words; ++w) {
         const std::uint64_t word = call.words[w * call.room + index];
         __builtin_memcpy(reinterpret_cast<char*>(&lane) + 8 * w, &word, 8);
     }
 }
-template <class K>
-LOBATTO_INLINE void store_lane(const lobatto_device_call& call, std::int64_t index, const DeviceLane<K>& lane) {
-    for (int w = 0; w < device_words<K>; ++w) {
-        std::uint64_t word;
-        __builtin_memcpy(&word, reinterpret_cast<const char*>(&lane) + 8 * w, 8);
-        call.words[w * call.room + index] = word;
-    }
+// `count` lanes, of which the first is number `index`.
+template <class K, int count = 1>
+LOBATTO_INLINE void store_lanes(const lobatto_device_call& call, std::int64_t index, const DeviceLane<K>* lanes) {
+    for (int w = 0; w < device_words<K>; ++w)
+        for (int i = 0; i < count; ++i) {
+            std::uint64_t word;
+            __builtin_memcpy(&word, reinterpret_cast<const char*>(lanes + i) + 8 * w, 8);
+            call.words[w * call.room + index + i] = word;
+        }
 }
 
 // What lanes of one step size have in common; `alike`: of one step size and the same parameters.
@@ -110,25 +194,39 @@ struct SharedByLanes {
     }
 };
 
-#ifdef LOBATTO_DEVICE_STOPS
-// Before a step, and after it: whether the host has to look at it.
+#ifdef LOBATTO_DEVICE_WATCHES
+// Before a step.
 template <class K>
 LOBATTO_INLINE void keep_state(DeviceLane<K>& lane) {
-    for (int c = 0; c < K::coordinates; ++c) {
-        lane.watched.q_before[c] = lane.motion.position(c);
-        lane.watched.rate_before[c] = lane.motion.rates()[c];
-    }
+    if constexpr (K::events > 0)
+        for (int c = 0; c < K::coordinates; ++c) {
+            lane.watched.q_before[c] = lane.motion.position(c);
+            lane.watched.rate_before[c] = lane.motion.rates()[c];
+        }
 }
+// After it: whether the host has to look at it.
 template <class K>
 LOBATTO_INLINE bool is_restless(const lobatto_device_call& call, const PlacesOfLanes<K>& places,
                                 const DeviceLane<K>& lane, typename K::real begun, typename K::real gone,
                                 typename K::real h) {
-    using T = typename DeviceLane<K>::T;
-    if (call.watches == 0) return false;
-    LaneSamples<K, 1> samples;
-    for (int e = 0; e < K::events; ++e) samples.last[e] = lane.watched.last[e];
-    return any(samples.restless(places, lane.motion, lane.coefficients, T(begun), T(gone), h, lane.watched.q_before,
-                                lane.watched.rate_before));
+    if constexpr (K::events > 0) {
+        using T = typename DeviceLane<K>::T;
+        if (call.watches == 0) return false;
+        LaneSamples<K, 1> samples;
+        for (int e = 0; e < K::events; ++e) samples.last[e] = lane.watched.last[e];
+        return any(samples.restless(places, lane.motion, lane.coefficients, T(begun), T(gone), h, lane.watched.q_before,
+                                    lane.watched.rate_before));
+    } else {
+        return false;
+    }
+}
+template <class K>
+LOBATTO_INLINE void keep_numbers(DeviceLane<K>& lane, typename K::real begun, typename K::real done,
+                                 typename K::real h) {
+    if constexpr (KeptFormulas::parts > 0) {
+        const double time = begun + done * h, before = begun + (done - 1) * h;
+        lane.kept.observe(lane.motion, lane.coefficients, time, time - before, false);
+    }
 }
 #else
 template <class K>
@@ -138,6 +236,8 @@ LOBATTO_INLINE bool is_restless(const lobatto_device_call&, const PlacesOfLanes<
                                 typename K::real, typename K::real, typename K::real) {
     return false;
 }
+template <class K>
+LOBATTO_INLINE void keep_numbers(DeviceLane<K>&, typename K::real, typename K::real, typename K::real) {}
 #endif
 
 // What a thread does. A step that fails, or that the host has to look at, is not counted: its lane waits for the host.
@@ -172,8 +272,9 @@ LOBATTO_INLINE void advance_lane(const lobatto_device_call& call, const SharedBy
             status = Status::stopped;
             break;
         }
+        keep_numbers(lane, start_time, real(number + 1), h);
     }
-    store_lane(call, index, lane);
+    store_lanes(call, index, &lane);
     call.status[index] = static_cast<std::int32_t>(status);
     call.steps[index] = number;
     call.iterations[index] += evaluations;

@@ -6,6 +6,7 @@
 
 #include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/kernel/device_kernel.hpp"
+#include "analysis/reductions.hpp"
 #include "generator/scene/scene.hpp"
 #include "tests/support.hpp"
 
@@ -25,7 +26,7 @@ KernelSource source_of(const std::string& scene_name, Precision numbers, int spl
 
 }  // namespace
 
-TEST_CASE("nvcc compiles the kernels of all forms, in double and float, to code of sm_80 and sm_90" *
+TEST_CASE("nvcc compiles the kernels of all forms, in double, float and double-double, to code of sm_80 and sm_90" *
           doctest::test_suite("slowest")) {
     if (!find_nvcc()) {
         MESSAGE("there is no nvcc: not tested");
@@ -34,13 +35,13 @@ TEST_CASE("nvcc compiles the kernels of all forms, in double and float, to code 
     const test::TemporaryFolder folder;
     const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     const auto check = [](const KernelSource& source, Precision numbers, const std::string& architecture,
-                          bool stops = false) {
+                          const WatchedLanes& watched = {}) {
         CAPTURE(source.name);
         CAPTURE(architecture);
         const DeviceLibrary host =
-            DeviceLibrary::load(compile(host_side_of(source, numbers, stops)).object, source.digest);
+            DeviceLibrary::load(compile(host_side_of(source, numbers, watched)).object, source.digest);
         REQUIRE(host.has_lanes());
-        const DeviceTranslation translation = device_side_of(source, architecture, host, stops);
+        const DeviceTranslation translation = device_side_of(source, architecture, host, watched);
         const Compiled made = compile_for_device(translation);
         CHECK_FALSE(made.from_cache);
         CHECK(std::filesystem::file_size(made.object) > 1000);
@@ -53,5 +54,12 @@ TEST_CASE("nvcc compiles the kernels of all forms, in double and float, to code 
     check(source_of("henon_heiles", Precision::double_, 6), Precision::double_, "sm_80");
     check(source_of("driven_damped_pendulum", Precision::double_), Precision::double_, "sm_80");
     check(source_of("pendulum", Precision::single), Precision::single, "sm_80");
-    check(source_of("flips", Precision::double_), Precision::double_, "sm_90", true);
+    check(source_of("flips", Precision::double_), Precision::double_, "sm_90", {true});
+    check(source_of("flips", Precision::single), Precision::single, "sm_90", {true});
+    for (const char* name : {"pendulum", "double_pendulum"})
+        check(source_of(name, Precision::double_double), Precision::double_double, "sm_90");
+    Scene kept = read_scene(LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", {"max(H), mean(q^2), last(sin(q) + q')"});
+    kept.outputs.watch_kept();
+    check(derived_kernel(kept, {Precision::double_}).source, Precision::double_, "sm_90",
+          {false, Reductions(kept).text()});
 }

@@ -16,7 +16,13 @@
 #include "pack.hpp"
 #include "trigonometry.hpp"
 
+#ifdef __CUDACC__
+#define LOBATTO_CALLED LOBATTO_DEVICE inline
+#define LOBATTO_RARE LOBATTO_DEVICE
+#else
 #define LOBATTO_CALLED [[gnu::noinline]] inline
+#define LOBATTO_RARE [[gnu::noinline, gnu::cold]]
+#endif
 
 namespace lobatto {
 
@@ -36,7 +42,6 @@ struct ReciprocalFactorials {
         }
     }
 };
-constexpr ReciprocalFactorials reciprocal_factorial{};
 
 // x^first / first! + x^(first + by) / (first + by)! + ..., over x^first: `exact` terms to 106 bits, the others, which
 // are below 2^-53 of the sum, to 53. `sign`: of each further term. z = x^by.
@@ -44,7 +49,8 @@ template <int first, int by, int exact, int others, int sign, int width>
 LOBATTO_INLINE DoubleDoublePack<width> series(const DoubleDoublePack<width>& z) {
     using P = Doubles<width>;
     using X = DoubleDoublePack<width>;
-    const auto& terms = reciprocal_factorial.values;
+    static constexpr ReciprocalFactorials table{};  // in here: a device has no address of one outside
+    const auto& terms = table.values;
     const auto signed_part = [](int i, double x) { return sign < 0 && i % 2 == 1 ? -x : x; };
     const P approximate = high_part(z);
     P rest = P(0.0);
@@ -211,9 +217,9 @@ LOBATTO_CALLED DoubleDoublePack<width> power_of_positive(const DoubleDoublePack<
 }
 
 // One lane where the path above does not hold.
-[[gnu::noinline, gnu::cold]] inline DoubleDouble power_beyond(const DoubleDouble& x, const DoubleDouble& y) {
-    const double value = __builtin_pow(x.high, y.high);
-    const bool is_whole = __builtin_rint(y.high) == y.high && __builtin_rint(y.low) == y.low;
+LOBATTO_RARE inline DoubleDouble power_beyond(const DoubleDouble& x, const DoubleDouble& y) {
+    const double value = LOBATTO_LIBRARY(pow)(x.high, y.high);
+    const bool is_whole = LOBATTO_LIBRARY(rint)(y.high) == y.high && LOBATTO_LIBRARY(rint)(y.low) == y.low;
     if (!(x.high < 0) || !is_whole || !(value - value == 0)) return {value, 0.0};
     const DoubleDouble magnitude = power_of_positive(Pack<DoubleDouble, 1>(-x), Pack<DoubleDouble, 1>(y))[0];
     return value < 0 ? -magnitude : magnitude;
@@ -247,31 +253,36 @@ LOBATTO_INLINE Pack<DoubleDouble, width> pow(const DoubleDouble& x, const Pack<D
 namespace functions {
 
 constexpr double wide_reduced_below = 0x1p40;
-constexpr DoubleDouble wide_half_pi(0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54);
+LOBATTO_INLINE constexpr DoubleDouble wide_half_pi() {
+    return {0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
+}
 
 // 2/pi in words of 64 bits, 1408 in all.
-constexpr std::uint64_t two_over_pi[] = {0xa2f9836e4e441529, 0xfc2757d1f534ddc0, 0xdb6295993c439041, 0xfe5163abdebbc561,
-                                         0xb7246e3a424dd2e0, 0x06492eea09d1921c, 0xfe1deb1cb129a73e, 0xe88235f52ebb4484,
-                                         0xe99c7026b45f7e41, 0x3991d639835339f4, 0x9c845f8bbdf9283b, 0x1ff897ffde05980f,
-                                         0xef2f118b5a0a6d1f, 0x6d367ecf27cb09b7, 0x4f463f669e5fea2d, 0x7527bac7ebe5f17b,
-                                         0x3d0739f78a5292ea, 0x6bfb5fb11f8d5d08, 0x56033046fc7b6bab, 0xf0cfbc209af4361d,
-                                         0xa9e391615ee61b08, 0x6599855f14a06840};
+struct TwoOverPi {
+    std::uint64_t word[22] = {0xa2f9836e4e441529, 0xfc2757d1f534ddc0, 0xdb6295993c439041, 0xfe5163abdebbc561,
+                              0xb7246e3a424dd2e0, 0x06492eea09d1921c, 0xfe1deb1cb129a73e, 0xe88235f52ebb4484,
+                              0xe99c7026b45f7e41, 0x3991d639835339f4, 0x9c845f8bbdf9283b, 0x1ff897ffde05980f,
+                              0xef2f118b5a0a6d1f, 0x6d367ecf27cb09b7, 0x4f463f669e5fea2d, 0x7527bac7ebe5f17b,
+                              0x3d0739f78a5292ea, 0x6bfb5fb11f8d5d08, 0x56033046fc7b6bab, 0xf0cfbc209af4361d,
+                              0xa9e391615ee61b08, 0x6599855f14a06840};
+};
 
 // turns += x 2/pi modulo 4, in units of 2^-256: five words, the last one of whole quarters (M. Payne and R. Hanek
 // 1983).
-[[gnu::noinline, gnu::cold]] inline void add_quarters(double x, std::uint64_t* turns) {
+LOBATTO_RARE inline void add_quarters(double x, std::uint64_t* turns) {
+    constexpr TwoOverPi two_over_pi{};
     int exponent = 0;
-    const double fraction = __builtin_frexp(__builtin_fabs(x), &exponent);
+    const double fraction = LOBATTO_LIBRARY(frexp)(LOBATTO_LIBRARY(fabs)(x), &exponent);
     const auto m = static_cast<std::uint64_t>(fraction * 0x1p53);
     exponent -= 53;  // |x| = m 2^exponent
     // Word i of 2/pi 2^exponent modulo 2^64, in units of 2^-256; bit 0 of word 0 is bit 256 + exponent of 2/pi.
-    const auto word_at = [](int bit) {  // 64 bits of 2/pi, the last of them number `bit` after the point
+    const auto word_at = [&](int bit) {  // 64 bits of 2/pi, the last of them number `bit` after the point
         std::uint64_t word = 0;
         const int first = bit - 64;  // bits first + 1 ... bit
         for (int part = 0; part < 2; ++part) {
             const int index = (first >= 0 ? first / 64 : -((63 - first) / 64)) + part,
                       shift = first - (index - part) * 64;
-            const std::uint64_t value = index >= 0 && index < 22 ? two_over_pi[index] : 0;
+            const std::uint64_t value = index >= 0 && index < 22 ? two_over_pi.word[index] : 0;
             word |= part == 0 ? value << shift : shift > 0 ? value >> (64 - shift) : 0;
         }
         return word;
@@ -290,7 +301,7 @@ constexpr std::uint64_t two_over_pi[] = {0xa2f9836e4e441529, 0xfc2757d1f534ddc0,
 }
 
 // One lane beyond the range of the quick reduction: x = quadrant pi/2 + r.
-[[gnu::noinline, gnu::cold]] inline DoubleDouble reduced_far(const DoubleDouble& x, std::int64_t& quadrant) {
+LOBATTO_RARE inline DoubleDouble reduced_far(const DoubleDouble& x, std::int64_t& quadrant) {
     std::uint64_t turns[5] = {};
     add_quarters(x.high, turns);
     if (x.low != 0) add_quarters(x.low, turns);
@@ -311,7 +322,7 @@ constexpr std::uint64_t two_over_pi[] = {0xa2f9836e4e441529, 0xfc2757d1f534ddc0,
     const double low = static_cast<double>(turns[3] & 0xffffffffu), high = static_cast<double>(turns[3] >> 32);
     const DoubleDouble part = two_fold::accurate_sum(DoubleDouble((beyond_half ? high - 0x1p32 : high) * 0x1p-32),
                                                      DoubleDouble(low * 0x1p-64));
-    return wide_half_pi * two_fold::accurate_sum(part, fraction);
+    return wide_half_pi() * two_fold::accurate_sum(part, fraction);
 }
 
 // x = k pi/2 + r, |r| <= pi/4 and a bit; sine and cosine of r by their series.
@@ -346,12 +357,12 @@ struct WideReduced {
     }
 
 private:
-    [[gnu::noinline, gnu::cold]] void leave(const DoubleDoublePack<width>& x, DoubleDoublePack<width>& r) {
+    LOBATTO_RARE void leave(const DoubleDoublePack<width>& x, DoubleDoublePack<width>& r) {
         double shifted[width];
         from_bits(quadrant).store(shifted);
         for (int lane = 0; lane < width; ++lane) {
             const DoubleDouble here = x[lane];
-            if (__builtin_fabs(here.high) < wide_reduced_below) continue;
+            if (LOBATTO_LIBRARY(fabs)(here.high) < wide_reduced_below) continue;
             if (!(here.high - here.high == 0)) {
                 r.set(lane, DoubleDouble(here.high - here.high, 0.0));
                 continue;
@@ -456,7 +467,7 @@ LOBATTO_CALLED Pack<DoubleDouble, width> atan(const Pack<DoubleDouble, width>& x
     sincos(of_parts(y0, functions::Doubles<width>(0.0)), sine, cosine);
     const X d = accurate_sum(t * cosine, -sine) / fused(t, sine, cosine);
     const X near = functions::turned(y0, d);
-    const X quarter = select(x < 0.0, X(-functions::wide_half_pi), X(functions::wide_half_pi));
+    const X quarter = select(x < 0.0, X(-functions::wide_half_pi()), X(functions::wide_half_pi()));
     const X value = functions::chosen(far, accurate_sum(quarter, -near), near);
     return functions::where(high == high, value, high);
 }
@@ -468,7 +479,7 @@ LOBATTO_CALLED Pack<DoubleDouble, width> atan2(const Pack<DoubleDouble, width>& 
     const X up = fabs(y), along = fabs(x);
     const auto steep = up > along, behind = x < 0.0;
     const X near = atan(select(steep, along, up) / select(steep, up, along));
-    const X half = X(functions::wide_half_pi), none = X(0.0);
+    const X half = X(functions::wide_half_pi()), none = X(0.0);
     const X axis = select(steep, half, select(behind, half + half, none));
     const X turned = select(steep, select(behind, near, -near), select(behind, -near, near));
     const X angle = accurate_sum(axis, turned);
@@ -508,5 +519,6 @@ LOBATTO_INLINE void sincos(const DoubleDouble& x, DoubleDouble& sine, DoubleDoub
 }  // namespace lobatto
 
 #undef LOBATTO_CALLED
+#undef LOBATTO_RARE
 
 #endif

@@ -31,7 +31,9 @@ struct EnsembleFixedPoint : StageMap<K, T> {
     using typename Tables::ActiveMask;
     static constexpr int values = inner_room * n;  // node by node
     static constexpr int evaluation_limit = 16;
-    static constexpr real first_weight = K::b[0], last_weight = K::b[s - 1];
+    struct EndWeights {  // made where they are used: a device has no address of K's own
+        real first = K::b[0], last = K::b[s - 1];
+    };
 
     struct Arrays {
         T P[values], X[values], W[values], S[inner_room * entries], d[values], delta[values], bend[values];
@@ -164,14 +166,15 @@ private:
     // The measures of increments, and X from the polynomial of the step before. Each coordinate has its own: increments
     // as small as its rounding are so whatever the others do.
     LOBATTO_INLINE void begin_step(const T* q, const T* u, Arrays& a) const {
+        constexpr EndWeights weight_of{};
         for (int c = 0; c < n; ++c) {
             const T W0 = w[c * s + s - 1], position = fabs(q[c]);
-            a.rate[c] = fused(T(-h * first_weight), W0, u[c]);
+            a.rate[c] = fused(T(-h * weight_of.first), W0, u[c]);
             const T moved = T(fabs(h)) * (fabs(a.rate[c]) + fabs(T(h) * W0));
             a.inverse_scale[c] = T(real(1)) / maximum(moved, fused(T(settled.part), position, T(settled.least)));
             a.inverse_next[c] = reach * a.inverse_scale[c];
             a.inverse_linear[c] = T(real(1)) / maximum(moved, fused(T(near.part), position, T(near.least)));
-            const T rate = fused(T(-h * (first_weight + last_weight)), W0, drifting[c]);
+            const T rate = fused(T(-h * (weight_of.first + weight_of.last)), W0, drifting[c]);
             const auto& of = map_of(c);
             const T* last;
             if constexpr (absorbs)
@@ -382,16 +385,17 @@ private:
     // (D16), (D17): the end of the step, each sum of increments rounded once; then the memory of the step.
     template <class Given, class Time>
     LOBATTO_INLINE ActiveMask finish(const Given& k, const Time& time, T* q, T* u, ActiveMask solved, const Arrays& a) {
+        constexpr EndWeights weight_of{};
         T q1[n], u1[n], W1[n], change[n];
         for (int c = 0; c < n; ++c) {
             const T* const W = a.W + c;
             q1[c] = q[c] + sum_over_nodes(T(h) * a.rate[c], arrival, W);
-            change[c] = sum_over_nodes(T(-h * first_weight) * w[c * s + s - 1], weight, W);
+            change[c] = sum_over_nodes(T(-h * weight_of.first) * w[c * s + s - 1], weight, W);
         }
         Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
         T not_finite = T(real(0));
         for (int c = 0; c < n; ++c) {
-            u1[c] = u[c] + fused(T(-h * last_weight), W1[c], change[c]);
+            u1[c] = u[c] + fused(T(-h * weight_of.last), W1[c], change[c]);
             not_finite = fused(T(real(0)), q1[c] + u1[c], not_finite);
         }
         solved = solved & (not_finite == T(real(0)));

@@ -209,9 +209,9 @@ private:
 
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step_in(const Given& k, const Time& time, T* q, T* p, ActiveMask active, Arrays& a) {
-        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
+        constexpr real epsilon = Limits<real>::epsilon, floor = epsilon / Limits<real>::root_epsilon;
         // Each coordinate has its own measure: increments as small as its rounding are so whatever the others do.
-        const real least = maximum(tolerance, Limits<real>::epsilon);
+        const real least = maximum(tolerance, epsilon);
         T kappa_now[n];
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
@@ -232,7 +232,7 @@ private:
             else
                 speed = fastest;
             const T scale = fabs(h) * speed + T(floor) * fabs(q[c]);
-            const T rounding = T(Limits<real>::epsilon / least) * fabs(q[c]) + T(Limits<real>::smallest);
+            const T rounding = T(epsilon / least) * fabs(q[c]) + T(Limits<real>::smallest);
             a.inverse_scale[c] = fabs(h) / maximum(scale, rounding);
             kappa_now[c] = kappa[c];
         }

@@ -16,13 +16,20 @@ struct StageCoefficients {
     static constexpr int s = K::points, m = s - 2, columns = m > 0 ? m : 1;
     real map[m + 1][columns]{}, before[m + 1][s]{}, sum[m + 1]{};
 
+    // Each number is set before it is read: g++ 13 stops with an error of its own at elements that {} alone has set.
     constexpr StageCoefficients() {
-        for (int i = 0; i <= m; ++i)
+        for (int i = 0; i <= m; ++i) {
+            real total = real(0), of_before[s]{};
+            for (int l = 0; l < s; ++l) of_before[l] = real(0);
             for (int j = 0; j < m; ++j) {
-                map[i][j] = i < m ? K::A[i * m + j] : K::b[j + 1] * (real(1) - K::c[j + 1]);
-                sum[i] += map[i][j];
-                for (int l = 0; l < s; ++l) before[i][l] += map[i][j] * K::E[j * s + l];
+                const real entry = i < m ? K::A[i * m + j] : K::b[j + 1] * (real(1) - K::c[j + 1]);
+                map[i][j] = entry;
+                total = total + entry;
+                for (int l = 0; l < s; ++l) of_before[l] = of_before[l] + entry * K::E[j * s + l];
             }
+            sum[i] = total;
+            for (int l = 0; l < s; ++l) before[i][l] = of_before[l];
+        }
     }
 };
 template <class K, bool computed_at_start = is_many_digits<typename K::real>>

@@ -26,7 +26,7 @@ struct LentVelocity {
     static constexpr int n = K::coordinates;
 
     template <class Given>
-    static void momenta(const T* rates, const Given& k, T* momentum) {
+    LOBATTO_LANE static void momenta(const T* rates, const Given& k, T* momentum) {
         K::momentum(k, rates, momentum);
     }
     template <class Given>
@@ -149,7 +149,7 @@ struct LentMomentum {
         motion.start(single, momentum, lane);
     }
     template <class Given>
-    static void momenta(const T* rates, const Given&, T* momentum) {
+    LOBATTO_LANE static void momenta(const T* rates, const Given&, T* momentum) {
         for (int c = 0; c < n; ++c) momentum[c] = rates[c];
     }
 };

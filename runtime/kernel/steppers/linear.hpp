@@ -94,7 +94,7 @@ LOBATTO_DEVICE inline void apply_map(const given* E, const number* q, const numb
 // exactly where Phi = 1 + E is symplectic, whether or not the map has a fixed point. In increments d = E z + w, so that
 // p.q and q.p do not have to cancel.
 template <int n, class given, class number>
-inline number discrete_energy(const given* E, const number* q, const number* p) {
+LOBATTO_DEVICE inline number discrete_energy(const given* E, const number* q, const number* p) {
     number value = number(0);
     for (int k = 0; k < n; ++k) {
         const given *const row_q = E + k * (2 * n + 1), *const row_p = E + (n + k) * (2 * n + 1);
@@ -230,8 +230,8 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     Shared shared() const { return {}; }
     template <bool>
     LOBATTO_INLINE void take(const Shared&) {}
-    const T& position(int c) const { return q[c]; }
-    const T* rates() const { return p; }
+    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
+    LOBATTO_DEVICE const T* rates() const { return p; }
 
     void prepare(const ScalarFallback<K>&, int) {}
     void set_tolerance(real) {}

@@ -5,10 +5,12 @@
 #include <atomic>
 #include <cstdint>
 #include <limits>
+#include <mutex>
 #include <vector>
 
 #include "runtime/kernel/abi.h"
 #include "runtime/run/ensemble/ensemble.hpp"
+#include "runtime/run/ensemble/turns.hpp"
 
 namespace lobatto {
 
@@ -40,23 +42,41 @@ struct EndedTogether {
     double processor_seconds = 0;
 };
 
-// What all threads see.
-struct Shared {
-    std::atomic<std::int64_t> steps_gone{0};
-    std::atomic<bool> halted{false};
-};
-
 // How many steps go between two looks at the interruption.
 class Chunk {
 public:
     static constexpr double usual = 0.02;
-    explicit Chunk(double seconds = usual) : wanted_(seconds) {}
+    // At least `least` steps, however long they take.
+    explicit Chunk(double seconds = usual, std::int64_t least = 1) : wanted_(seconds), least_(least) {}
     std::int64_t steps() const { return steps_; }
     void took(std::int64_t steps, double seconds);
 
 private:
     double wanted_;
-    std::int64_t steps_ = 256;
+    std::int64_t least_, steps_ = 256;
+};
+
+// What all threads see.
+struct Shared {
+    explicit Shared(const Chunk& of_device) : chunk(of_device) {}
+    std::atomic<std::int64_t> steps_gone{0};
+    std::atomic<bool> halted{false};
+    Turns turns;  // on a device
+
+    // Where all wait for one device they take the same number of steps at a time: else those that wait longer would
+    // take fewer, and end last.
+    std::int64_t steps_of_chunk() {
+        const std::lock_guard lock(mutex);
+        return chunk.steps();
+    }
+    void took(std::int64_t steps, double seconds) {
+        const std::lock_guard lock(mutex);
+        chunk.took(steps, seconds);
+    }
+
+private:
+    std::mutex mutex;
+    Chunk chunk;
 };
 
 }  // namespace lobatto

@@ -66,10 +66,9 @@ public:
           n_(static_cast<std::size_t>(kernel->coordinates)),
           parts_(static_cast<std::size_t>(kernel->parts)),
           step_(request.whole_step.empty() ? as_parts({request.step}, parts_) : request.whole_step),
-          single_(kernel),
-          chunk_(request.device ? DeviceTrajectories::seconds_of_launch : Chunk::usual) {
+          single_(kernel) {
         if (request.device)
-            lanes_ = std::make_unique<DeviceTrajectories>(kernel, request, room);
+            lanes_ = std::make_unique<DeviceTrajectories>(kernel, request, room, shared.halted);
         else if (kernel->lanes > 0)
             lanes_ = std::make_unique<LaneTrajectories>(kernel);
         else if (kernel->real_kind != LOBATTO_DOUBLE)
@@ -87,6 +86,7 @@ public:
         status_.resize(width);
         steps_done_.resize(width);
         iterations_.resize(width);
+        reduces_.resize(width);
     }
 
     // Trajectories first, first + 1, ..., last - 1; without those that an interruption cut short.
@@ -145,8 +145,9 @@ private:
             if (ended[lane].status != LOBATTO_OK) energy_[lane * parts_] = no_number;
             keep(lane, ended[lane]);
         }
-        reduces_ = request_.reducer && ended[0].status == LOBATTO_OK;
-        if (reduces_) lanes_->reduce(start_);
+        for (std::size_t lane = 0; lane < ended.size(); ++lane)
+            reduces_[lane] = request_.reducer && ended[lane].status == LOBATTO_OK;
+        if (reduces_[0]) lanes_->reduce(start_);
     }
 
     void keep(std::size_t lane, Ended& ended) const {
@@ -162,11 +163,14 @@ private:
             return std::any_of(ended.begin(), ended.end(), [](const Ended& e) { return e.goes_on(); });
         };
         const auto side_by_side = static_cast<std::int64_t>(ended.size());
+        std::optional<Turns::Turn> turn;
+        if (lanes_->takes_turns()) turn.emplace(shared_.turns);
         std::int64_t done = 0;
         while (done < request_.steps && active()) {
             if (shared_.halted.load(std::memory_order_relaxed)) return false;
+            if (turn) turn->wait();
             const double start = seconds_of_work();
-            const std::int64_t from = done, target = done + std::min(chunk_.steps(), request_.steps - done);
+            const std::int64_t from = done, target = done + std::min(steps_of_chunk(), request_.steps - done);
             while (done < target && active()) {
                 const std::int64_t next =
                     request_.every == 0 ? target : std::min(target, done + request_.every - done % request_.every);
@@ -175,12 +179,13 @@ private:
             }
             const double passed = seconds_of_work() - start;
             seconds += passed;
-            chunk_.took(done - from, passed);
+            took(done - from, passed);
             shared_.steps_gone += (done - from) * side_by_side;
         }
         shared_.steps_gone += (request_.steps - done) * side_by_side;
-        if (reduces_) ended[0].reduced = lanes_->reduced();
-        return true;
+        for (std::size_t lane = 0; lane < ended.size(); ++lane)
+            if (reduces_[lane]) ended[lane].reduced = lanes_->reduced(lane);
+        return !lanes_->is_cut_short();
     }
 
     // To step number `next`; keeps what is to be kept there, and the last good state of a trajectory that fails.
@@ -212,6 +217,11 @@ private:
         }
     }
 
+    std::int64_t steps_of_chunk() const { return request_.device ? shared_.steps_of_chunk() : chunk_.steps(); }
+    void took(std::int64_t steps, double seconds) {
+        request_.device ? shared_.took(steps, seconds) : chunk_.took(steps, seconds);
+    }
+
     // While a device works, the thread only waits.
     double seconds_of_work() const {
         if (!request_.device) return processor_seconds();
@@ -228,7 +238,7 @@ private:
     std::vector<double> parameters_, q_, p_, energy_;
     std::vector<std::int32_t> status_;
     std::vector<std::int64_t> steps_done_, iterations_;
-    bool reduces_ = false;  // the one trajectory
+    std::vector<bool> reduces_;  // where a trajectory has begun
     Chunk chunk_;
 };
 
@@ -348,7 +358,11 @@ double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
     const Plan plan(kernel, request);
     const double rows = static_cast<double>(rows_kept(request)) * static_cast<double>(plan.group_size);
     const int parts = kernel->parts > 1 ? 1 + kernel->parts : 1;
-    return sizeof(double) * parts * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 2);
+    const double kept =
+        sizeof(double) * parts * (2 + 2.0 * kernel->coordinates) * rows * static_cast<double>(plan.window + 2);
+    if (!request.device) return kept;
+    return kept + static_cast<double>(plan.threads * plan.group_size) *
+                      DeviceTrajectories::bytes_of_lane(kernel, *request.device);
 }
 
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
@@ -358,7 +372,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
     result.lanes = request.device ? static_cast<int>(plan.group_size) : std::max(kernel->lanes, 1);
     result.threads = static_cast<int>(plan.threads);
 
-    Shared shared;
+    Shared shared(request.device ? DeviceTrajectories::chunk_of(*request.device) : Chunk());
     Window window(plan);
     const auto work_with = [&](auto worker) {
         while (const auto group = window.take())

@@ -75,8 +75,8 @@ struct EnsembleRequest {
     std::int64_t every = 0;                                 // keep every such state; 0: the last one alone
     bool stops = false;                                     // the kernel's stops end trajectories
     std::function<std::unique_ptr<Reducer>()> reducer;      // one a thread; nothing: none. Of kernels without lanes
-    std::shared_ptr<const DeviceKernel> device;             // takes the steps; nothing: the processor. Without
-                                                            // reducer and clock
+    std::shared_ptr<const DeviceKernel> device;             // takes the steps; nothing: the processor. Without clock;
+                                                            // reduces as it was compiled to, if there is a reducer
     int threads = 0;                                        // that compute; 0: as many as the machine runs at once
     std::function<void(const EnsembleTrajectory&)> sink;    // in the order of the indices, in the thread of the caller
     std::function<void(std::int64_t steps_done)> progress;  // of all trajectories; about ten times a second, likewise
@@ -97,7 +97,7 @@ struct EnsembleResult {
 // How many threads compute where `threads` are asked for; 0: as many as the machine runs at once.
 int thread_count(int threads);
 
-// The most bytes of kept states in memory at any time.
+// The most bytes of kept states in memory at any time, with the host's side of a device.
 double memory_of(const Kernel& kernel, const EnsembleRequest& request);
 
 // Rethrows what `start` and `sink` throw; MachineError when no threads can be had.

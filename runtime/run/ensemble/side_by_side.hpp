@@ -2,7 +2,7 @@
 // Trajectories of an ensemble that take their steps together: in the lanes of a kernel, or a single one.
 //
 // All arrays are lane-major, status is one a lane (abi.h); numbers are sums of doubles, `parts` each (NumberStepper),
-// which is one double in lanes. Stops are of single trajectories and of those on a device, reductions of single ones.
+// which is one double in lanes. Stops and reductions are of single trajectories and of those on a device.
 #pragma once
 
 #include <memory>
@@ -31,9 +31,13 @@ public:
     // Of a trajectory that was stopped: by which event, and when.
     virtual int stop(std::size_t) const { return -1; }
     virtual double stop_time(std::size_t) const { return 0; }
-    // From the start on everything is handed to the reducer; its values.
+    // From the start on everything is handed to the reducer of a single trajectory; what it, or a device, made of it.
     virtual void reduce(const EnsembleStart&) {}
-    virtual std::vector<double> reduced() { return {}; }
+    virtual std::vector<double> reduced(std::size_t) const { return {}; }
+    // Whether others wait for the same device, and `advance` only for the device.
+    virtual bool takes_turns() const { return false; }
+    // Whether the last call of `advance` was interrupted on its way.
+    virtual bool is_cut_short() const { return false; }
 };
 
 class SingleTrajectory : public Trajectories {
@@ -49,7 +53,7 @@ public:
     int stop(std::size_t) const override { return stop_; }
     double stop_time(std::size_t) const override { return time_; }
     void reduce(const EnsembleStart& start) override;
-    std::vector<double> reduced() override { return reducer_->values(); }
+    std::vector<double> reduced(std::size_t) const override { return reducer_->values(); }
 
 private:
     void stop_at(const double* row);

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <sstream>
 
@@ -75,6 +77,49 @@ std::string stopped_scene(const test::SweepFolder& place, const std::string& nam
     text.insert(text.find(run) + run.size(), "stop = " + stop + "\n");
     test::write_text(place.file(name + ".toml"), text);
     return place.file(name + ".toml");
+}
+
+// The tables agree to rounding: in each column to this part of its largest number, and of the energy.
+void check_to_rounding(const std::string& scene, const std::vector<std::string>& words, double part,
+                       double energy = 0) {
+    CAPTURE(scene);
+    CAPTURE(fmt::format("{}", fmt::join(words, " ")));
+    const test::SweepFolder place;
+    std::vector<std::vector<std::vector<double>>> columns;
+    for (const std::string device : {"cpu", "cuda"}) {
+        std::vector<std::string> all{"sweep", scene, "--quiet", "--device", device, "-o", place.file(device + ".csv")};
+        all.insert(all.end(), words.begin(), words.end());
+        const test::Finished end = place.lobatto(all);
+        REQUIRE_MESSAGE(end.exit_code == 0, end.err);
+        std::istringstream lines(test::read_file(place.file(device + ".csv")));
+        auto& of_device = columns.emplace_back();
+        bool is_head = true;
+        for (std::string line; std::getline(lines, line);) {
+            if (line.empty() || line[0] == '#') continue;
+            std::istringstream fields(line);
+            std::string field;
+            for (std::size_t i = 0; !is_head && std::getline(fields, field, ','); ++i) {
+                if (of_device.size() <= i) of_device.emplace_back();
+                of_device[i].push_back(std::stod(field));
+            }
+            is_head = false;
+        }
+    }
+    REQUIRE(columns[0].size() == columns[1].size());
+    REQUIRE(columns[0].size() > 4);
+    for (std::size_t c = 0; c < columns[0].size(); ++c) {
+        const std::vector<double>&a = columns[0][c], &b = columns[1][c];
+        REQUIRE(a.size() == b.size());
+        double largest = 0, difference = 0;
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            CHECK(std::isnan(a[i]) == std::isnan(b[i]));
+            if (std::isnan(a[i])) continue;
+            largest = std::max(largest, std::fabs(a[i]));
+            difference = std::max(difference, std::fabs(a[i] - b[i]));
+        }
+        CAPTURE(c);
+        CHECK(difference <= part * std::max(largest, energy));
+    }
 }
 
 // How many rows have something but 0 in the column `stop`.
@@ -149,6 +194,49 @@ TEST_SUITE("slow") {
                   failing, {"--vary", "a=0.1:3:70", "--step", "0.3", "--steps", "200", "--unmeasured"})) > 5);
     }
 
+    TEST_CASE(
+        "what is kept of a trajectory on the device is that of the processor, with events, stops and failed steps" *
+        doctest::test_suite("slowest")) {
+        const FakeDevice device;
+        const std::string kept =
+            "max(q), min(p_q), mean(H), last(q'^2), count(q = 0), first(q' = 1 rising), mean(sin(q)*q^3)";
+        check_to_rounding(
+            pendulum_file,
+            {"--vary", "q=0.1:3:70", "--vary", "omega=1,2", "--steps", "200", "--unmeasured", "--keep", kept}, 1e-14);
+        check_same_bytes(scene_file("harmonic_oscillator"),  // a linear map; with an event it is none
+                         {"--vary", "q=0.1:3:70", "--steps", "200", "--keep", "max(H), mean(q^2), last(p_q)"});
+        check_same_bytes(scene_file("harmonic_oscillator"),
+                         {"--vary", "q=0.1:3:70", "--steps", "200", "--keep", "first(q = 0), max(q)"});
+        check_same_bytes(scene_file("henon_heiles"),
+                         {"--splitting", "6", "--random", "70", "--draw", "y ~ uniform(-0.2, 0.2)", "--steps", "200",
+                          "--keep", "max(x), count(y = 0), mean(H)"});
+        // In the general form velocities follow from momenta by other iterations.
+        check_to_rounding(scene_file("double_pendulum"),
+                          {"--vary", "a=0.1:2:70", "--step", "0.3", "--steps", "200", "--unmeasured", "--keep",
+                           "count(a = 0), max(H), mean(a'), first(b = pi)"},
+                          1e-13);
+        check_to_rounding(scene_file("flips"),
+                          {"--vary", "a=-3:3:12", "--vary", "b=-3:3:12", "--until", "40", "--beyond-horizon",
+                           "--unmeasured", "--keep", "max(H), count(a = 0), mean(b^2)"},
+                          1e-13);
+    }
+
+    TEST_CASE("double-double on the device agrees with the processor's single trajectories, float with stops too" *
+              doctest::test_suite("slowest")) {
+        const FakeDevice device;
+        // Parts below the rounded value are compared as parts of themselves: 1e-9 of 2^-53 is 1e-25.
+        check_to_rounding(pendulum_file,
+                          {"--vary", "q=0.1:3:20", "--steps", "200", "--unmeasured", "--numbers", "double-double"},
+                          1e-9);
+        check_to_rounding(
+            scene_file("flips"),
+            {"--vary", "a=-3:3:6", "--vary", "b=-3:3:6", "--until", "4", "--unmeasured", "--numbers", "double-double"},
+            1e-9);
+        const std::vector<std::string> map{"--vary", "a=-3:3:12", "--vary", "b=-3:3:12",   "--until",
+                                           "4",      "--numbers", "float",  "--unmeasured"};
+        check_to_rounding(scene_file("flips"), map, 1e-5, 5);
+    }
+
     TEST_CASE("a device that is lost ends the sweep, its finished rows stay, and --resume goes on to the same bytes") {
         const FakeDevice device;
         const test::SweepFolder place;
@@ -158,8 +246,9 @@ TEST_SUITE("slow") {
         std::vector<std::string> on_device = words;
         on_device.insert(on_device.end(), {"--device", "cuda", "--resume"});
         {
+            // Eight launches take the first step size to its end: four to each state that is kept.
             const test::EnvironmentVariable lost("FAKE_CUDA_LOST",
-                                                 "3");  // two launches take the first step size to its end
+                                                 "9");  // two launches take the first step size to its end
             CHECK(place.refusal("lost.csv", on_device, 4) ==
                   "lobatto: the GPU no real GPU does not begin the steps: unspecified launch failure "
                   "(CUDA_ERROR_LAUNCH_FAILED); or compute with --device cpu\n");
@@ -199,11 +288,12 @@ TEST_CASE("what stands in the way of a sweep on a device is said, with what to d
             "have left it; or compute with --device cpu\n");
     }
     SUBCASE("what the device does not do") {
-        std::vector<std::string> kept = words;
-        kept.insert(kept.end(), {"--keep", "max(q)"});
-        CHECK(place.refusal("t.csv", kept) == pendulum_file +
-                                                  ": --device cuda: what --keep asks for is computed by the processor "
-                                                  "alone; compute with --device cpu\n");
+        std::vector<std::string> quadruple = words;
+        quadruple.insert(quadruple.end(), {"--numbers", "quadruple"});
+        CHECK(place.refusal("t.csv", quadruple) ==
+              pendulum_file +
+                  ": --device cuda: a GPU has double, float and double-double, not "
+                  "quadruple; compute with --device cpu\n");
     }
 }
 
