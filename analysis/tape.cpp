@@ -70,6 +70,12 @@ private:
     std::map<ex, std::uint64_t, GiNaC::ex_is_less> known_;
 };
 
+// Exactly, as C++ reads it.
+std::string literal(double number) {
+    if (std::isinf(number)) return number > 0 ? "(1.0 / 0.0)" : "(-1.0 / 0.0)";
+    return fmt::format("({:a})", number);
+}
+
 }  // namespace
 
 std::optional<Tape> Tape::of(const ex& formula, const Variables& variables) {
@@ -182,9 +188,8 @@ std::string Tape::text(const std::string& result, const std::string& indent) con
         if (instruction.operation == Operation::angle)
             value = fmt::format("LOBATTO_LIBRARY(atan2)({}, {})", first[0], first[1]);
         if (instruction.operation == Operation::power)
-            value = first[1] == fmt::format("({:a})", 2.0)
-                        ? fmt::format("{0} * {0}", first[0])
-                        : fmt::format("LOBATTO_LIBRARY(pow)({}, {})", first[0], first[1]);
+            value = first[1] == literal(2) ? fmt::format("{0} * {0}", first[0])
+                                           : fmt::format("LOBATTO_LIBRARY(pow)({}, {})", first[0], first[1]);
         if (instruction.operation == Operation::sum) value = fmt::format("{}", fmt::join(first, stack.end(), " + "));
         if (instruction.operation == Operation::product)
             value = fmt::format("{}", fmt::join(first, stack.end(), " * "));

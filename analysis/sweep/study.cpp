@@ -130,8 +130,12 @@ void SweepStudy::choose_device() {
 
 void SweepStudy::put_on_device(Setting& setting) const {
     if (!device_) return;
-    WatchedLanes watched{!setting.scene.watched().empty() && (setting.request.stops || setting.request.reducer), {}};
-    if (!scene_.outputs.kept.empty()) watched.kept = Reductions(scene_).text();
+    WatchedLanes watched;
+    {
+        const std::lock_guard lock(*algebra_);
+        watched.events = !scene_.watched().empty() && (setting.request.stops || setting.request.reducer);
+        if (!scene_.outputs.kept.empty()) watched.kept = Reductions(scene_).text();
+    }
     std::string compiled;
     setting.request.device =
         device_kernel_of(*setting.source, setting.scene.method.numbers, device_, &compiled, watched);

@@ -41,6 +41,8 @@ template <class K>
 struct KeptOfLane {
     using T = Pack<typename K::real, 1>;
     static constexpr int n = K::coordinates, parameters = K::parameter_count, count = KeptFormulas::parts;
+    static constexpr bool needs_velocity =
+        KeptFormulas::needs_velocity || (KeptFormulas::needs_energy && K::form == Form::general);
     double of_parameters[parameters > 0 ? parameters : 1];
     KeptNumber numbers[count];
 
@@ -51,16 +53,10 @@ struct KeptOfLane {
         T q[n], p[n];
         for (int c = 0; c < n; ++c) q[c] = motion.position(c);
         LentStep<K, T>::momenta(motion.rates(), k, p);
-        if constexpr (K::form == Form::general) {
-            T v[n];
-            const bool is_known = any(LentStep<K, T>::velocities(motion, k, T(time), v));
-            for (int c = 0; c < n; ++c) v[c] = is_known ? v[c] : T(KeptNumber::none);
-            observe(k, time, passed, is_first, q, p, v);
-        } else {
-            T v[n];
-            if constexpr (KeptFormulas::needs_velocity) K::velocity(k, static_cast<const T*>(p), +v);
-            observe(k, time, passed, is_first, q, p, v);
-        }
+        T v[n];
+        for (int c = 0; c < n; ++c) v[c] = T(KeptNumber::none);
+        if constexpr (needs_velocity) velocities(motion, k, T(time), p, v);
+        observe(k, time, passed, is_first, q, p, v);
     }
     template <class Given>
     LOBATTO_INLINE void observe(const Given& k, double time, double passed, bool is_first, const T* q, const T* p,
@@ -86,6 +82,19 @@ struct KeptOfLane {
         KeptFormulas::values(x, values);
         for (int i = 0; i < count; ++i)
             if (KeptFormulas::event(i) < 0) numbers[i].observe(KeptFormulas::of(i), values[i], passed, is_first);
+    }
+
+private:
+    template <class Given>
+    LOBATTO_INLINE static void velocities(const LaneStepper<K, T>& motion, const Given& k, const T& time, const T* p,
+                                          T* v) {
+        if constexpr (K::form == Form::general) {
+            decltype(T() < T()) has_momenta;
+            const bool is_converged = any(LentStep<K, T>::velocities(motion, k, time, v, &has_momenta));
+            for (int c = 0; c < n; ++c) v[c] = is_converged || any(has_momenta) ? v[c] : T(KeptNumber::none);
+        } else {
+            K::velocity(k, p, v);
+        }
     }
 };
 

@@ -193,10 +193,13 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
         }
     }
     // By Newton's iteration from the velocity of the last node (D27). The lanes in which it has converged.
+    // `has_momenta`: those in which the velocities have the momenta, also where they are no more than the rounding of
+    // these.
     template <class Given>
-    LOBATTO_LANE static ActiveMask velocities(const Motion& motion, const Given& k, const T& time, T* velocity) {
+    LOBATTO_LANE static ActiveMask velocities(const Motion& motion, const Given& k, const T& time, T* velocity,
+                                              ActiveMask* has_momenta = nullptr) {
         static constexpr Table table{};
-        T change = T(real(0)), size = T(real(0));
+        T change = T(real(0)), size = T(real(0)), left = T(real(0)), whole = T(real(0));
         for (int c = 0; c < n; ++c) velocity[c] = motion.fixed_point.v[c * r + r - 1];
         for (int iteration = 0; iteration < 3; ++iteration) {
             T q[n], residual[n], packed[K::mass_entries], M[n * n];
@@ -206,7 +209,12 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
             for (int i = 0; i < n * n; ++i) M[i] = T(real(0));
             for (int e = 0; e < K::mass_entries; ++e) M[table.row[e] * n + table.column[e]] = packed[e];
             factor_symmetric<n>(M);
-            for (int c = 0; c < n; ++c) residual[c] = motion.rates()[c] - residual[c];
+            left = whole = T(real(0));
+            for (int c = 0; c < n; ++c) {
+                residual[c] = motion.rates()[c] - residual[c];
+                left += fabs(residual[c]);
+                whole += fabs(motion.rates()[c]);
+            }
             solve_symmetric<n>(M, residual);
             change = size = T(real(0));
             for (int c = 0; c < n; ++c) {
@@ -215,6 +223,7 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
                 size += fabs(velocity[c]);
             }
         }
+        if (has_momenta != nullptr) *has_momenta = left <= T(Limits<real>::root_epsilon) * whole;
         return change <= T(Limits<real>::root_epsilon) * size;
     }
     template <class Single>

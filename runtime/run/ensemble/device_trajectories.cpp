@@ -60,7 +60,8 @@ Chunk DeviceTrajectories::chunk_of(const DeviceKernel& kernel) {
 // Its row, the progress, the numbers of its start, its last row.
 double DeviceTrajectories::bytes_of_lane(const Kernel& kernel, const DeviceKernel& device) {
     const double starts = 2.0 * kernel->parts * (kernel->parameters + 3.0 * kernel->coordinates + 2);
-    return sizeof(double) * (device.host->words * 9 / 8.0 + 6 + starts + device.host->columns * kernel->parts);
+    return sizeof(double) *
+           (device.host->words * 9 / 8.0 + 6 + starts + device.host->columns * kernel->parts + device.host->kept);
 }
 
 DeviceTrajectories::DeviceTrajectories(const Kernel& kernel, const EnsembleRequest& request, std::int64_t room,
@@ -149,6 +150,12 @@ void DeviceTrajectories::start(double time, const std::vector<double>& q, const 
         if (here_.alike != 0) device_->host->own(shared, is_own_.data());
     }
     std::copy(status_.begin(), status_.end(), status);
+    if (!kept_.empty()) {  // of trajectories without a step
+        std::vector<double> same_q = q, same_p = p;
+        const Bytes energy = energy_;  // of an impossible start it is no number
+        read(same_q, same_p);
+        energy_ = energy;
+    }
     move_own(0, device_->host->words,
              [&](std::int64_t at, std::size_t bytes) { queue_.upload(there_.words + at, here_.words + at, bytes); });
     upload_progress();
@@ -173,7 +180,7 @@ void DeviceTrajectories::launch(std::int64_t begin) {
     std::copy(std::begin(here_.step), std::end(here_.step), call.step);
     std::copy(std::begin(here_.start_time), std::end(here_.start_time), call.start_time);
     void* arguments[] = {&call, aligned(shared_, device_->host->shared_bytes, device_->host->shared_alignment)};
-    const std::int64_t launches = is_watched() ? 1 : launches_together, steps = here_.target - begin;
+    const std::int64_t steps = here_.target - begin, launches = is_watched() ? 1 : std::min(launches_together, steps);
     for (std::int64_t i = 1; i <= launches; ++i) {
         call.target = begin + steps * i / launches;
         queue_.launch(here_.alike != 0 ? *device_->alike : *device_->lanes, call.lanes, DeviceKernel::block, arguments);
@@ -204,10 +211,11 @@ void DeviceTrajectories::advance(const EnsembleRequest& request, std::int64_t st
                 waiting.push_back(lane);
         if (!waiting.empty()) retake(waiting);
         if (!is_watched() || !arrives_) break;
-        is_cut_short_ = halted_.load(std::memory_order_relaxed);
-        if (is_cut_short_) break;
+        if (halted_.load(std::memory_order_relaxed)) break;
     }
+    is_cut_short_ = false;
     for (std::size_t lane = 0; lane < status_.size(); ++lane) {
+        is_cut_short_ = is_cut_short_ || (arrives_ && status_[lane] == LOBATTO_OK && steps_[lane] < here_.target);
         status[lane] = status_[lane];
         steps_done[lane] = steps_[lane] - steps_before[lane];
         iterations[lane] = iterations_[lane] - iterations_before[lane];
@@ -278,17 +286,22 @@ void DeviceTrajectories::move(std::int64_t count, bool back) {
     queue_.launch(*device_->move, count, DeviceKernel::block, arguments);
 }
 
+// Of the lanes as they are here.
+void DeviceTrajectories::read(std::vector<double>& q, std::vector<double>& p) {
+    const std::int64_t count = room_ * kernel_->coordinates;
+    Bytes positions(static_cast<std::size_t>(count * kernel_->real_bytes)), momenta(positions.size());
+    device_->host->state(host(), &here_, 0, room_, positions.data(), momenta.data(), energy_.data(), kept_.data());
+    kernel_->to_parts(positions.data(), count, q.data());
+    kernel_->to_parts(momenta.data(), count, p.data());
+}
+
 void DeviceTrajectories::state(std::vector<double>& q, std::vector<double>& p) {
     if (arrives_ || !is_watched()) {
         const std::int64_t first = device_->host->first_moving;
         move_own(first, first + device_->host->moving, [&](std::int64_t at, std::size_t bytes) {
             queue_.download(here_.words + at, there_.words + at, bytes);
         });
-        const std::int64_t count = room_ * kernel_->coordinates;
-        Bytes positions(static_cast<std::size_t>(count * kernel_->real_bytes)), momenta(positions.size());
-        device_->host->state(host(), &here_, 0, room_, positions.data(), momenta.data(), energy_.data(), kept_.data());
-        kernel_->to_parts(positions.data(), count, q.data());
-        kernel_->to_parts(momenta.data(), count, p.data());
+        read(q, p);
     }
     const std::ptrdiff_t n = kernel_->coordinates * parts_;  // rows: event, t, q, p, energy
     for (const std::int32_t lane : ended_) {

@@ -64,6 +64,7 @@ private:
     Bytes numbers(const std::vector<double>& values) const;
     template <class Move>
     void move_own(std::int64_t first, std::int64_t last, const Move& move);
+    void read(std::vector<double>& q, std::vector<double>& p);
     void upload_progress();
     void launch(std::int64_t begin);
     void retake(const std::vector<std::int32_t>& waiting);

@@ -39,7 +39,9 @@ void Ended::keep(const EnsembleRequest& request, double time, const double* q, c
 void Chunk::took(std::int64_t steps, double seconds) {
     // The clock ticks coarsely against a short chunk: grow at most eightfold at a time.
     const double pace = wanted_ / std::max(seconds, wanted_ / 8);
-    steps_ = std::max<std::int64_t>(least_, std::llround(static_cast<double>(steps) * pace));
+    const double least_takes = seconds / static_cast<double>(steps) * static_cast<double>(least_);
+    steps_ =
+        std::max<std::int64_t>(least_takes < longest ? least_ : 1, std::llround(static_cast<double>(steps) * pace));
 }
 
 }  // namespace lobatto

@@ -45,8 +45,8 @@ struct EndedTogether {
 // How many steps go between two looks at the interruption.
 class Chunk {
 public:
-    static constexpr double usual = 0.02;
-    // At least `least` steps, however long they take.
+    static constexpr double usual = 0.02, longest = 1;
+    // At least `least` steps, unless these take a second.
     explicit Chunk(double seconds = usual, std::int64_t least = 1) : wanted_(seconds), least_(least) {}
     std::int64_t steps() const { return steps_; }
     void took(std::int64_t steps, double seconds);

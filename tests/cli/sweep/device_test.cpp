@@ -203,6 +203,17 @@ TEST_SUITE("slow") {
         check_to_rounding(
             pendulum_file,
             {"--vary", "q=0.1:3:70", "--vary", "omega=1,2", "--steps", "200", "--unmeasured", "--keep", kept}, 1e-14);
+        check_same_bytes(pendulum_file, {"--vary", "q=0.1:3:70", "--steps", "0", "--unmeasured", "--keep",
+                                         "max(q), last(H), first(q = 0), mean(q'), count(q = 0)"});
+        // At rest in a rotating frame velocities are the rounding of momenta.
+        const test::SweepFolder place;
+        test::write_text(place.file("disk.toml"),
+                         "lagrangian = \"(x' - y)^2/2 + (y' + x)^2/2 + x'^2*y^2/100 - (x^2 + y^2)/2\"\n"
+                         "[coordinates]\nx = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }\n"
+                         "[method]\npoints = 4\n[run]\nstep = 0.1\nuntil = 1\n");
+        check_to_rounding(place.file("disk.toml"),
+                          {"--vary", "x=0.1:3:7", "--steps", "200", "--unmeasured", "--keep", "max(H), mean(x'^2 + 1)"},
+                          1e-13);
         check_same_bytes(scene_file("harmonic_oscillator"),  // a linear map; with an event it is none
                          {"--vary", "q=0.1:3:70", "--steps", "200", "--keep", "max(H), mean(q^2), last(p_q)"});
         check_same_bytes(scene_file("harmonic_oscillator"),
@@ -247,8 +258,7 @@ TEST_SUITE("slow") {
         on_device.insert(on_device.end(), {"--device", "cuda", "--resume"});
         {
             // Eight launches take the first step size to its end: four to each state that is kept.
-            const test::EnvironmentVariable lost("FAKE_CUDA_LOST",
-                                                 "9");  // two launches take the first step size to its end
+            const test::EnvironmentVariable lost("FAKE_CUDA_LOST", "9");
             CHECK(place.refusal("lost.csv", on_device, 4) ==
                   "lobatto: the GPU no real GPU does not begin the steps: unspecified launch failure "
                   "(CUDA_ERROR_LAUNCH_FAILED); or compute with --device cpu\n");
