@@ -55,7 +55,7 @@ public:
     int stop(std::size_t lane) const override { return static_cast<int>(row_of(static_cast<std::int64_t>(lane))[0]); }
     double stop_time(std::size_t lane) const override { return row_of(static_cast<std::int64_t>(lane))[parts_]; }
     std::vector<double> reduced(std::size_t lane) const override;
-    bool takes_turns() const override { return !is_watched(); }
+    bool queues_fairly() const override { return !is_watched(); }
     bool is_cut_short() const override { return is_cut_short_; }
 
 private:

@@ -163,12 +163,12 @@ private:
             return std::any_of(ended.begin(), ended.end(), [](const Ended& e) { return e.goes_on(); });
         };
         const auto side_by_side = static_cast<std::int64_t>(ended.size());
-        std::optional<Turns::Turn> turn;
-        if (lanes_->takes_turns()) turn.emplace(shared_.turns);
+        std::optional<FairQueue::Flow> flow;
+        if (lanes_->queues_fairly()) flow.emplace(shared_.queue);
         std::int64_t done = 0;
         while (done < request_.steps && active()) {
             if (shared_.halted.load(std::memory_order_relaxed)) return false;
-            if (turn) turn->wait();
+            if (flow) flow->wait();
             const double start = seconds_of_work();
             const std::int64_t from = done, target = done + std::min(steps_of_chunk(), request_.steps - done);
             while (done < target && active()) {

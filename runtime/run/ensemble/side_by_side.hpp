@@ -34,8 +34,8 @@ public:
     // From the start on everything is handed to the reducer of a single trajectory; what it, or a device, made of it.
     virtual void reduce(const EnsembleStart&) {}
     virtual std::vector<double> reduced(std::size_t) const { return {}; }
-    // Whether others wait for the same device, and `advance` only for the device.
-    virtual bool takes_turns() const { return false; }
+    // Whether `advance` is a launch on a device that others wait for too, and nothing else.
+    virtual bool queues_fairly() const { return false; }
     // Whether the last call of `advance` was interrupted on its way.
     virtual bool is_cut_short() const { return false; }
 };
