@@ -127,8 +127,7 @@ TEST_CASE("what other numbers cannot do is refused") {
                                         "\"double-double\"; remove the clock, or give --numbers double"));
     const test::Finished asked = place.run({"run", comet, "--clock", "auto", "--numbers", "double-double", "-o", csv});
     CHECK(asked.exit_code == 2);
-    CHECK(
-        contains(asked.err, comet + ": clock = \"auto\", from an option: with a clock `lobatto run` computes"));
+    CHECK(contains(asked.err, comet + ": clock = \"auto\", from an option: with a clock `lobatto run` computes"));
 }
 
 TEST_CASE("a sweep computes in the numbers that are asked for, with the digits of a run") {
