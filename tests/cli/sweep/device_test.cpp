@@ -27,7 +27,7 @@ while [ $# -gt 0 ]; do
     esac
     shift
 done
-exec ${CXX:-g++} -x c++ -std=c++17 -O2 -march=native -ffp-contract=off -fno-math-errno -fPIC -shared -w "$source" -o "$object"
+exec ${CXX:-g++} -x c++ -std=c++17 -O0 -march=native -ffp-contract=off -fno-math-errno -fPIC -shared -w "$source" -o "$object"
 )";
 
 class FakeDevice {
@@ -214,10 +214,8 @@ TEST_SUITE("slow") {
         check_to_rounding(place.file("disk.toml"),
                           {"--vary", "x=0.1:3:7", "--steps", "200", "--unmeasured", "--keep", "max(H), mean(x'^2 + 1)"},
                           1e-13);
-        check_same_bytes(scene_file("harmonic_oscillator"),  // a linear map; with an event it is none
+        check_same_bytes(scene_file("harmonic_oscillator"),  // a linear map
                          {"--vary", "q=0.1:3:70", "--steps", "200", "--keep", "max(H), mean(q^2), last(p_q)"});
-        check_same_bytes(scene_file("harmonic_oscillator"),
-                         {"--vary", "q=0.1:3:70", "--steps", "200", "--keep", "first(q = 0), max(q)"});
         check_same_bytes(scene_file("henon_heiles"),
                          {"--splitting", "6", "--random", "70", "--draw", "y ~ uniform(-0.2, 0.2)", "--steps", "200",
                           "--keep", "max(x), count(y = 0), mean(H)"});
