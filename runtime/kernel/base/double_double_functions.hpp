@@ -16,6 +16,7 @@
 #include "pack.hpp"
 #include "trigonometry.hpp"
 
+// Functions that are long, so that they are called, and those that are seldom called. nvcc decides for itself.
 #ifdef __CUDACC__
 #define LOBATTO_CALLED LOBATTO_DEVICE inline
 #define LOBATTO_RARE LOBATTO_DEVICE

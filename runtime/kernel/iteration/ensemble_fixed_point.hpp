@@ -166,15 +166,15 @@ private:
     // The measures of increments, and X from the polynomial of the step before. Each coordinate has its own: increments
     // as small as its rounding are so whatever the others do.
     LOBATTO_INLINE void begin_step(const T* q, const T* u, Arrays& a) const {
-        constexpr EndWeights weight_of{};
+        constexpr EndWeights end_weight{};
         for (int c = 0; c < n; ++c) {
             const T W0 = w[c * s + s - 1], position = fabs(q[c]);
-            a.rate[c] = fused(T(-h * weight_of.first), W0, u[c]);
+            a.rate[c] = fused(T(-h * end_weight.first), W0, u[c]);
             const T moved = T(fabs(h)) * (fabs(a.rate[c]) + fabs(T(h) * W0));
             a.inverse_scale[c] = T(real(1)) / maximum(moved, fused(T(settled.part), position, T(settled.least)));
             a.inverse_next[c] = reach * a.inverse_scale[c];
             a.inverse_linear[c] = T(real(1)) / maximum(moved, fused(T(near.part), position, T(near.least)));
-            const T rate = fused(T(-h * (weight_of.first + weight_of.last)), W0, drifting[c]);
+            const T rate = fused(T(-h * (end_weight.first + end_weight.last)), W0, drifting[c]);
             const auto& of = map_of(c);
             const T* last;
             if constexpr (absorbs)
@@ -385,17 +385,17 @@ private:
     // (D16), (D17): the end of the step, each sum of increments rounded once; then the memory of the step.
     template <class Given, class Time>
     LOBATTO_INLINE ActiveMask finish(const Given& k, const Time& time, T* q, T* u, ActiveMask solved, const Arrays& a) {
-        constexpr EndWeights weight_of{};
+        constexpr EndWeights end_weight{};
         T q1[n], u1[n], W1[n], change[n];
         for (int c = 0; c < n; ++c) {
             const T* const W = a.W + c;
             q1[c] = q[c] + sum_over_nodes(T(h) * a.rate[c], arrival, W);
-            change[c] = sum_over_nodes(T(-h * weight_of.first) * w[c * s + s - 1], weight, W);
+            change[c] = sum_over_nodes(T(-h * end_weight.first) * w[c * s + s - 1], weight, W);
         }
         Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
         T not_finite = T(real(0));
         for (int c = 0; c < n; ++c) {
-            u1[c] = u[c] + fused(T(-h * weight_of.last), W1[c], change[c]);
+            u1[c] = u[c] + fused(T(-h * end_weight.last), W1[c], change[c]);
             not_finite = fused(T(real(0)), q1[c] + u1[c], not_finite);
         }
         solved = solved & (not_finite == T(real(0)));

@@ -166,8 +166,8 @@ void DeviceTrajectories::upload_progress() {
     queue_.wait();
 }
 
-// The lanes of `order_`, from `begin` to the target: by several launches, which wait in the queue, so that the device
-// has something to do while the host looks at the progress, and takes turns between queues.
+// The lanes of `order_`, from `begin` to the target: by several launches one behind another in the queue. Each is
+// short, so that the device takes launches of other queues in between.
 void DeviceTrajectories::launch(std::int64_t begin) {
     lobatto_device_call call = there_;
     call.most = here_.most;

@@ -61,7 +61,7 @@ struct Shared {
     explicit Shared(const Chunk& of_device) : chunk(of_device) {}
     std::atomic<std::int64_t> steps_gone{0};
     std::atomic<bool> halted{false};
-    FairQueue queue;  // of launches on a device
+    FairQueue queue;  // of calls on a device
 
     // Where all wait for one device they take the same number of steps at a time: else those that wait longer would
     // take fewer, and end last.

@@ -74,7 +74,7 @@ struct EnsembleRequest {
     Arrivals arrivals;                                      // of kernels with a clock
     std::int64_t every = 0;                                 // keep every such state; 0: the last one alone
     bool stops = false;                                     // the kernel's stops end trajectories
-    std::function<std::unique_ptr<Reducer>()> reducer;      // one a thread; nothing: none. Of kernels without lanes
+    std::function<std::unique_ptr<Reducer>()> reducer;      // one a thread or lane; nothing: none
     std::shared_ptr<const DeviceKernel> device;             // takes the steps; nothing: the processor. Without clock;
                                                             // reduces as it was compiled to, if there is a reducer
     int threads = 0;                                        // that compute; 0: as many as the machine runs at once

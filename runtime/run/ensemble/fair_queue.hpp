@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Fair queueing of launches on one device: of several threads none gets ahead of another by more than a launch,
-// whatever the device takes first. Else the last of them ends long after the others, and alone.
+// Fair queueing on one device: of several threads none has begun more than one call more than another (a call is a few
+// launches), whatever the device takes first. Else the last of them ends long after the others, and alone.
 #pragma once
 
 #include <algorithm>
@@ -13,12 +13,12 @@ namespace lobatto {
 
 class FairQueue {
 public:
-    // The launches of one thread, while it has some; it begins where the last of the others is.
+    // The calls of one thread, while it has some. A new one counts as many calls as the slowest of the others.
     class Flow {
     public:
         explicit Flow(FairQueue& queue) : queue_(queue) {
             const std::lock_guard lock(queue_.mutex_);
-            launches_ = queue_.least();
+            calls_ = queue_.least();
             queue_.flows_.push_back(this);
         }
         ~Flow() {
@@ -31,12 +31,12 @@ public:
         Flow(const Flow&) = delete;
         Flow& operator=(const Flow&) = delete;
 
-        // Before a launch: until the others have begun as many as this one.
+        // Before a call: until the others have begun as many as this one.
         void wait() {
             {
                 std::unique_lock lock(queue_.mutex_);
-                queue_.news_.wait(lock, [&] { return launches_ <= queue_.least(); });
-                ++launches_;
+                queue_.news_.wait(lock, [&] { return calls_ <= queue_.least(); });
+                ++calls_;
             }
             queue_.news_.notify_all();
         }
@@ -44,14 +44,14 @@ public:
     private:
         friend class FairQueue;
         FairQueue& queue_;
-        std::int64_t launches_ = 0;
+        std::int64_t calls_ = 0;
     };
 
 private:
     std::int64_t least() const {
         const auto first = std::min_element(flows_.begin(), flows_.end(),
-                                            [](const Flow* a, const Flow* b) { return a->launches_ < b->launches_; });
-        return first == flows_.end() ? 0 : (*first)->launches_;
+                                            [](const Flow* a, const Flow* b) { return a->calls_ < b->calls_; });
+        return first == flows_.end() ? 0 : (*first)->calls_;
     }
 
     std::mutex mutex_;
