@@ -11,24 +11,14 @@
 #include <vector>
 
 #include "generator/mechanics/repeated/elements.hpp"
+#include "generator/mechanics/structure/closed_solution.hpp"
+#include "generator/mechanics/structure/findings.hpp"
+#include "generator/mechanics/structure/groups.hpp"
 #include "generator/mechanics/structure/hamiltonian.hpp"
 #include "generator/mechanics/system/system.hpp"
 #include "generator/method/quadrature.hpp"
 
 namespace lobatto {
-
-struct Finding {
-    std::string name;  // "linear system"
-    bool holds = false;
-    std::string reason;  // "every second derivative of V is free of q"
-};
-
-// A one-coordinate system with a solution in closed form.
-struct ClosedSolution {
-    enum class Kind { harmonic, pendulum };  // q'' = -w2 q; q'' = -w2 sin(q) (Jacobi elliptic functions)
-    Kind kind = Kind::harmonic;
-    GiNaC::ex omega_squared;  // w2, in parameters
-};
 
 // L without the cyclic coordinates: their velocities eliminated for their momenta P (Routh). Variables z = (v, q, P),
 // v and q of the active coordinates. Without cyclic coordinates R = L.
@@ -40,12 +30,6 @@ struct Routhian {
     std::vector<GiNaC::symbol> z;     // 2 active + cyclic + multipliers
     std::vector<GiNaC::ex> gradient;  // dR/dz; beside dR/dq stands the force F; dR/dP = -v of the cyclic
     SparseMatrix second;              // its derivative in z, not symmetric where forces are
-};
-
-// Coordinates whose equations are solved together, in an order that keeps coupled ones near.
-struct Group {
-    std::vector<int> coordinates;  // indices into the unknowns' coordinates, and after these into the constraints
-    int bandwidth = 0;             // the largest distance in this order of two that are coupled
 };
 
 // The forms of a step, each with what was found for it.
