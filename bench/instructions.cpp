@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "analysis/kernel/kernel_of.hpp"
-#include "bench/kernels.hpp"
+#include "bench/contestants/kernels.hpp"
 #include "runtime/build/cache.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/process.hpp"

@@ -9,8 +9,8 @@
 #include <limits>
 #include <map>
 
-#include "bench/clocked_kernels.hpp"
-#include "bench/kernels.hpp"
+#include "bench/contestants/clocked_kernels.hpp"
+#include "bench/contestants/kernels.hpp"
 #include "bench/reference.hpp"
 
 namespace lobatto::bench {

@@ -5,7 +5,7 @@
 #include <array>
 #include <optional>
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 
 namespace lobatto::bench {
 

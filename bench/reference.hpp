@@ -3,7 +3,7 @@
 // each run.
 #pragma once
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 
 namespace lobatto::bench {
 

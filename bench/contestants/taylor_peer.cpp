@@ -3,7 +3,7 @@
 // it; compiled by clang++ a second time where that is installed.
 #include <memory>
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 #include "bench/peers/taylor.hpp"
 
 namespace lobatto::bench {

@@ -9,7 +9,7 @@
 #include <map>
 #include <memory>
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 
 namespace lobatto::bench {
 

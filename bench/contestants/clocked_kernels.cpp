@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "bench/clocked_kernels.hpp"
+#include "bench/contestants/clocked_kernels.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "analysis/gradients.hpp"
-#include "bench/kernels.hpp"
+#include "bench/contestants/kernels.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto::bench {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Our own implementations of published methods, as contestants.
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 #include "bench/peers/gauss.hpp"
 #include "bench/peers/nystrom.hpp"
 #include "bench/peers/radau.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "bench/kernels.hpp"
+#include "bench/contestants/kernels.hpp"
 
 #include <fmt/format.h>
 

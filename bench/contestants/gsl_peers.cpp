@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 
 namespace lobatto::bench {
 

@@ -2,7 +2,7 @@
 // Our contestants whose steps follow the motion: kernels of the scenes of bench/scenes/ with a clock.
 #pragma once
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 
 namespace lobatto::bench {
 

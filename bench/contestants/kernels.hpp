@@ -2,7 +2,7 @@
 // Our own contestants: kernels derived from the scenes of bench/scenes/, compiled and loaded as `lobatto run` does.
 #pragma once
 
-#include "bench/contestant.hpp"
+#include "bench/contestants/contestant.hpp"
 #include "generator/emit/kernel.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/build/library.hpp"
