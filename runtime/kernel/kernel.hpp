@@ -15,6 +15,7 @@
 #include "base/grouped.hpp"
 #include "base/numbers.hpp"
 #include "base/pack.hpp"
+#include "base/registers.hpp"
 #include "base/rows.hpp"
 #include "base/shifts.hpp"
 #include "base/spline.hpp"
@@ -50,5 +51,6 @@
 #include "steppers/separable.hpp"
 #include "steppers/shortened.hpp"
 #include "steppers/splitting.hpp"
+#include "steppers/watched_stepper.hpp"
 
 #endif

@@ -7,7 +7,7 @@
 //   linear       the second derivatives are constant, so that one correction solves a step
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
 //   events       how many; event(k, q, velocity, value) gives all their values, event_direction[] is 1 for rising, -1
-//                for falling, 0 for both. More of them: steppers/events.hpp
+//                for falling, 0 for both. More of them: steppers/watched_stepper.hpp
 // Form::linear_map and Form::separable: is_explicit; of splitting methods they have c, b and drift_length[s - 1], the
 //   way between nodes, and neither A nor E nor what orders unknowns.
 // Form::linear_map: energy(k, q, p), momentum(k, velocity, p), velocity(k, p, velocity), minus_acceleration(k, q, W),

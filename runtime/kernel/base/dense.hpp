@@ -118,9 +118,11 @@ struct DenseMatrix {
     // Row: unknown j of block u; column: unknown k of block v.
     real& operator()(int u, int j, int v, int k) { return values[Layout::index(u, j) * size + Layout::index(v, k)]; }
 
-    bool factor() { return factor_dense(values, pivots, std::integral_constant<int, size>{}); }
+    LOBATTO_APART bool factor() { return factor_dense(values, pivots, std::integral_constant<int, size>{}); }
     // x becomes the solution.
-    void solve(real* x) const { solve_dense(values, pivots, x, std::integral_constant<int, size>{}); }
+    LOBATTO_APART void solve(real* x) const {
+        solve_dense(values, pivots, x, std::integral_constant<int, size>{});
+    }
 };
 
 // `size` unknowns, each a block of one.

@@ -224,7 +224,7 @@ protected:
     }
 
     // sum_i h b_i T_i^T g_i in the order of the solver: the residual without p0.
-    void sum_over_nodes(const real* g, real* sum) const {
+    LOBATTO_APART void sum_over_nodes(const real* g, real* sum) const {
         for (int a = 0; a < active; ++a)
             for (int j = 0; j < m; ++j) {
                 real from_velocity = real(0), from_position = real(0);
@@ -302,7 +302,7 @@ protected:
 
     // J = sum_i h b_i T_i^T H_i T_i into at(block, unknown; block, unknown), which begins at zero.
     template <class At>
-    void assemble(const real* H, int stride, At&& at) const {
+    LOBATTO_APART void assemble(const real* H, int stride, At& at) const {
         for (int e = 0; e < K::entries; ++e) {
             switch (Tables::kind(K::entry_row[e])) {
                 case Slot::velocity:

@@ -90,7 +90,7 @@ private:
     }
 
     // Both equations at x; whether they have values there.
-    static bool evaluate(const State& at, const real* x, Arrays& a) {
+    LOBATTO_APART static bool evaluate(const State& at, const real* x, Arrays& a) {
         Formulas<K>::legendre(at.k, at.time, at.q, x, a.p, a.mass);
         for (int i = 0; i < n; ++i) a.residual[i] = at.p[i] - a.p[i];
         for (int c = 0; c < constraints; ++c) a.residual[n + c] = -a.phi_t[c];
@@ -155,7 +155,7 @@ private:
     }
 
     // Whether what is left is within a bound of what it is computed from.
-    static bool is_near(const State& at, const Arrays& a, real bound) {
+    LOBATTO_APART static bool is_near(const State& at, const Arrays& a, real bound) {
         real size[unknowns];
         for (int i = 0; i < n; ++i) size[i] = fabs(at.p[i]);
         for (int c = 0; c < constraints; ++c) size[n + c] = fabs(a.phi_t[c]);
@@ -186,7 +186,7 @@ private:
     }
 
     // x = matrix^-1 residual; sum |x_i residual_i|.
-    static real solve_for(const Arrays& a, real* x) {
+    LOBATTO_APART static real solve_for(const Arrays& a, real* x) {
         real sorted[unknowns], length = real(0);
         for (int i = 0; i < unknowns; ++i) sorted[Layout::index(i, 0)] = a.residual[i];
         a.matrix.solve(sorted);

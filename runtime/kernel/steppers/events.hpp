@@ -1,74 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Between two steps: states on the polynomial of the last step, and where event functions change their sign.
+// Where event functions change their sign between two steps.
 //
 // An event of g(t, q, q') = 0 happens where the sign of g changes. Its places are isolated on the step's polynomial: g
 // is sampled at twice as many pieces as the step has nodes, and between samples where |g| is least. What decides is
 // not the polynomial, of lower order than the steps, but g at the end of a step of the same method from the same
 // start, shortened to theta h: the signs, and the root between them. Most places where |g| is least are far from zero,
 // and are told by the samples alone (is_no_dip).
-//
-// Of the K::events functions the last are walls (impacts.hpp), on one side of which the motion is until it meets them;
-// values that are rounding there are zero. Of these K::impacts throw it back, and K::switches, the very last, change
-// its formulas: their sides, 1 or -1, are the last parameters. The K::stops before the walls end the motion. impact(k,
-// q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not below 0,
-// reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
 #ifndef LOBATTO_KERNEL_EVENTS_HPP
 #define LOBATTO_KERNEL_EVENTS_HPP
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "watched_stepper.hpp"
 
 namespace lobatto {
-
-template <class K>
-struct Between {
-    using real = typename K::real;
-    using S = Stepper<K>;
-    static constexpr int n = K::coordinates, columns = 1 + 2 * n;
-
-    static real time(const S& stepper, real theta) {
-        if constexpr (is_clocked<K>())
-            return stepper.time_within(theta);
-        else
-            return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
-    }
-
-    // t, q[n], p[n] at t + theta h of the last step.
-    static void row(const S& stepper, real theta, real* row) {
-        real velocity[n];
-        row[0] = time(stepper, theta);
-        stepper.polynomial(theta, row + 1, velocity);
-        stepper.momentum(row[0], row + 1, velocity, row + 1 + n);
-        if constexpr (K::form == Form::general) {  // conserved exactly
-            for (int c = 0; c < K::cyclic; ++c) row[1 + n + K::cyclic_index[c]] = stepper.p[K::cyclic_index[c]];
-        }
-    }
-};
-
-// The functions at the end of those that are watched: of walls, and before them of stops.
-template <class K>
-constexpr int impacts_of() {
-    if constexpr (K::events > 0)
-        return K::impacts;
-    else
-        return 0;
-}
-template <class K>
-constexpr int stops_of() {
-    if constexpr (K::events > 0)
-        return K::stops;
-    else
-        return 0;
-}
-
-template <class K>
-constexpr int switches_of() {
-    if constexpr (K::events > 0)
-        return K::switches;
-    else
-        return 0;
-}
 
 // Of |g| at equal distances, y[0] ... y[pieces], least around place i: whether g is zero nowhere near. It is so where
 // all of y is of one size, and second differences vary by less than a factor of two, so that nothing narrow is there:
@@ -82,49 +28,6 @@ LOBATTO_DEVICE inline auto is_no_dip(const T* y, int i, const T& largest) {
     return (y[i] >= T(real(0.5)) * largest) & (half < before) & (half < after) & (before < here + here) &
            (after < here + here);
 }
-
-// A stepper that knows its parameters, for steps of other lengths.
-template <class K>
-struct WatchedStepper : Stepper<K> {
-    using real = typename K::real;
-    typename K::Parameters parameters{};
-    static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
-    real wall_scale[wall_room]{};  // the most that went into each wall's function so far
-
-    // At a state at one of its own times.
-    Status restart(const real* position, const real* momentum, std::int64_t steps_since) {
-        const real begin = this->start_time;
-        this->steps = steps_since;
-        const Status status = this->start(this->time(), position, momentum);
-        this->start_time = begin;
-        this->steps = steps_since;
-        for (bool& begins : this->event_begins) begins = true;
-        return status;
-    }
-
-    // The side of a switch: 1 or -1.
-    real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
-};
-
-// What was last known of the events of a motion that goes on in another stepper, or in this one after a restart.
-template <class S>
-struct KnownEvents {
-    typename S::real values[S::event_room];
-    bool begins[S::event_room];
-
-    explicit KnownEvents(const S& stepper) {
-        for (int e = 0; e < S::event_room; ++e) {
-            values[e] = stepper.event_values[e];
-            begins[e] = stepper.event_begins[e];
-        }
-    }
-    void put(S& stepper) const {
-        for (int e = 0; e < S::event_room; ++e) {
-            stepper.event_values[e] = values[e];
-            stepper.event_begins[e] = begins[e];
-        }
-    }
-};
 
 // One function of the motion, sampled over a step.
 template <class real>
@@ -269,14 +172,14 @@ private:
         step->polynomial(theta, position, velocity);
         Formulas<K>::event(step->coefficients, Between<K>::time(*step, theta), position, velocity, values);
     }
-    real on_polynomial(real theta, int e) const {
+    LOBATTO_APART real on_polynomial(real theta, int e) const {
         real values[K::events];
         on_polynomial(theta, values);
         return values[e];
     }
 
     // t, q, p at t + theta h, by a step of that length.
-    void state_at(real theta, real* row) {
+    LOBATTO_APART void state_at(real theta, real* row) {
         row[0] = Between<K>::time(*step, theta);
         real* const momentum = row + 1 + n;
         if (theta == real(1)) {
@@ -307,7 +210,7 @@ private:
         for (int k = 0; k < n; ++k) row[1 + k] = partial->q[k];
         partial->momentum(momentum);
     }
-    real exactly(real theta, int e) {
+    LOBATTO_APART real exactly(real theta, int e) {
         real values[K::events];
         if (theta == real(0) || theta == real(1)) {
             const int end = theta == real(0) ? 0 : 1;
@@ -346,14 +249,12 @@ private:
         if constexpr (walls > 0) {
             if (is_wall(e) && !begin_at_wall(e)) return;
         }
-        const auto exact = [&](real theta) { return exactly(theta, e); };
-        const auto polynomial = [&](real theta) { return on_polynomial(theta, e); };
-        reach_undefined(false, polynomial);
-        for (int i = 1; i + 1 < sample_count; ++i) i += refine_between(i, polynomial, exact);
+        reach_undefined(false, e);
+        for (int i = 1; i + 1 < sample_count; ++i) i += refine_between(i, e);
         make_exact(samples[0], e);
         make_exact(samples[sample_count - 1], e);
         decide_signs(e);
-        reach_undefined(true, exact);  // where the motion, not only its polynomial, leaves the domain of g
+        reach_undefined(true, e);  // where the motion, not only its polynomial, leaves the domain of g
         walk(e, until);
     }
 
@@ -378,8 +279,8 @@ private:
     }
 
     // In pieces at one end of which g is not defined: a sample where its domain ends, and one half way to it.
-    template <class G>
-    void reach_undefined(bool is_exact, const G& g) {
+    void reach_undefined(bool is_exact, int e) {
+        const auto g = [&](real theta) { return is_exact ? exactly(theta, e) : on_polynomial(theta, e); };
         for (int i = 0; i + 1 < sample_count; ++i) {
             const bool is_first = is_finite(samples[i].value);
             const Sample inside = samples[is_first ? i : i + 1], outside = samples[is_first ? i + 1 : i];
@@ -397,19 +298,21 @@ private:
 
     // Around sample i, where |g| may be least without a change of sign at the samples: a sample there, if the sign
     // changes. How many were inserted.
-    template <class Polynomial, class Exact>
-    int refine_between(int i, const Polynomial& polynomial, const Exact& exact) {
+    int refine_between(int i, int e) {
+        bool is_exact = false;
+        const auto g = [&](real theta) { return is_exact ? exactly(theta, e) : on_polynomial(theta, e); };
         const Sample a = samples[i - 1], middle = samples[i], b = samples[i + 1];
         if (!has_sign(a.value) || !has_sign(middle.value) || !has_sign(b.value)) return 0;
         if (changes(a.value, middle.value) || changes(middle.value, b.value)) return 0;
         if (!(fabs(middle.value) <= fabs(a.value) && fabs(middle.value) < fabs(b.value))) return 0;
         if (sees_no_dip(i)) return 0;
-        Sample least = least_between(a, middle, b, polynomial);
-        const real there = exact(least.theta), error = fabs(there - least.value);
+        Sample least = least_between(a, middle, b, g);
+        const real there = exactly(least.theta, e), error = fabs(there - least.value);
         // So near to zero that the polynomial cannot tell.
         const bool is_near = !changes(there, a.value) && fabs(there) <= real(8) * error;
         least = {least.theta, there, true};
-        if (is_near) least = least_between(a, least, b, exact);
+        is_exact = true;
+        if (is_near) least = least_between(a, least, b, g);
         least.is_exact = true;
         if (!changes(least.value, a.value)) return 0;
         insert(least.theta < middle.theta ? i : i + 1, least);

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// A stepper whose motion is watched: states between its steps, and what is known of its events and walls.
+//
+// Of the K::events functions the last are walls (impacts.hpp), on one side of which the motion is until it meets them;
+// values that are rounding there are zero. Of these K::impacts throw it back, and K::switches, the very last, change
+// its formulas: their sides, 1 or -1, are the last parameters. The K::stops before the walls end the motion. impact(k,
+// q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not below 0,
+// reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
+#ifndef LOBATTO_KERNEL_WATCHED_STEPPER_HPP
+#define LOBATTO_KERNEL_WATCHED_STEPPER_HPP
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+
+namespace lobatto {
+
+template <class K>
+struct Between {
+    using real = typename K::real;
+    using S = Stepper<K>;
+    static constexpr int n = K::coordinates, columns = 1 + 2 * n;
+
+    static real time(const S& stepper, real theta) {
+        if constexpr (is_clocked<K>())
+            return stepper.time_within(theta);
+        else
+            return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
+    }
+
+    // t, q[n], p[n] at t + theta h of the last step.
+    static void row(const S& stepper, real theta, real* row) {
+        real velocity[n];
+        row[0] = time(stepper, theta);
+        stepper.polynomial(theta, row + 1, velocity);
+        stepper.momentum(row[0], row + 1, velocity, row + 1 + n);
+        if constexpr (K::form == Form::general) {  // conserved exactly
+            for (int c = 0; c < K::cyclic; ++c) row[1 + n + K::cyclic_index[c]] = stepper.p[K::cyclic_index[c]];
+        }
+    }
+};
+
+// The functions at the end of those that are watched: of walls, and before them of stops.
+template <class K>
+constexpr int impacts_of() {
+    if constexpr (K::events > 0)
+        return K::impacts;
+    else
+        return 0;
+}
+template <class K>
+constexpr int stops_of() {
+    if constexpr (K::events > 0)
+        return K::stops;
+    else
+        return 0;
+}
+
+template <class K>
+constexpr int switches_of() {
+    if constexpr (K::events > 0)
+        return K::switches;
+    else
+        return 0;
+}
+
+// A stepper that knows its parameters, for steps of other lengths.
+template <class K>
+struct WatchedStepper : Stepper<K> {
+    using real = typename K::real;
+    typename K::Parameters parameters{};
+    static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
+    real wall_scale[wall_room]{};  // the most that went into each wall's function so far
+
+    // At a state at one of its own times.
+    Status restart(const real* position, const real* momentum, std::int64_t steps_since) {
+        const real begin = this->start_time;
+        this->steps = steps_since;
+        const Status status = this->start(this->time(), position, momentum);
+        this->start_time = begin;
+        this->steps = steps_since;
+        for (bool& begins : this->event_begins) begins = true;
+        return status;
+    }
+
+    // The side of a switch: 1 or -1.
+    real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
+};
+
+// What was last known of the events of a motion that goes on in another stepper, or in this one after a restart.
+template <class S>
+struct KnownEvents {
+    typename S::real values[S::event_room];
+    bool begins[S::event_room];
+
+    explicit KnownEvents(const S& stepper) {
+        for (int e = 0; e < S::event_room; ++e) {
+            values[e] = stepper.event_values[e];
+            begins[e] = stepper.event_begins[e];
+        }
+    }
+    void put(S& stepper) const {
+        for (int e = 0; e < S::event_room; ++e) {
+            stepper.event_values[e] = values[e];
+            stepper.event_begins[e] = begins[e];
+        }
+    }
+};
+
+}  // namespace lobatto
+
+#endif
