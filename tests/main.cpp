@@ -3,6 +3,7 @@
 // one of them takes the program down.
 #define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,9 +22,25 @@ using lobatto::test::EnvironmentVariable;
 
 std::set<std::string> files_asked_for;  // by the last query
 
+// A listener that need not say what it does not listen to.
+class Listener : public doctest::IReporter {
+    void report_query(const doctest::QueryData&) override {}
+    void test_run_start() override {}
+    void test_run_end(const doctest::TestRunStats&) override {}
+    void test_case_start(const doctest::TestCaseData&) override {}
+    void test_case_reenter(const doctest::TestCaseData&) override {}
+    void test_case_end(const doctest::CurrentTestCaseStats&) override {}
+    void test_case_exception(const doctest::TestCaseException&) override {}
+    void subcase_start(const doctest::SubcaseSignature&) override {}
+    void subcase_end() override {}
+    void log_assert(const doctest::AssertData&) override {}
+    void log_message(const doctest::MessageData&) override {}
+    void test_case_skipped(const doctest::TestCaseData&) override {}
+};
+
 // Keeps one line in the file $LOBATTO_TEST_NOTES: tests passed, tests failed, the test that is running (nothing between
 // tests).
-class Notes : public doctest::IReporter {
+class Notes : public Listener {
 public:
     explicit Notes(const doctest::ContextOptions&) {
         if (const char* path = std::getenv("LOBATTO_TEST_NOTES")) path_ = path;
@@ -38,16 +55,6 @@ public:
         for (unsigned i = 0; i < query.num_data; ++i) files_asked_for.insert(query.data[i]->m_file.c_str());
     }
 
-    void test_run_start() override {}
-    void test_run_end(const doctest::TestRunStats&) override {}
-    void test_case_reenter(const doctest::TestCaseData&) override {}
-    void test_case_exception(const doctest::TestCaseException&) override {}
-    void subcase_start(const doctest::SubcaseSignature&) override {}
-    void subcase_end() override {}
-    void log_assert(const doctest::AssertData&) override {}
-    void log_message(const doctest::MessageData&) override {}
-    void test_case_skipped(const doctest::TestCaseData&) override {}
-
 private:
     void write(const char* running) const {
         if (!path_.empty()) std::ofstream(path_) << passed_ << ' ' << failed_ << ' ' << running << '\n';
@@ -56,6 +63,49 @@ private:
     std::string path_;
     int passed_ = 0;
     int failed_ = 0;
+};
+
+// Files whose time is that of compilers: their kernels are compiled with -Og, which takes half of it. Nothing is fused
+// or reordered (runtime/build/compiler.cpp), so they have the same bits; machines_test checks that. All other tests
+// have the flags of users. A compiler that $CXX names stays as it is.
+constexpr const char* compiled_quickly[] = {
+    "/analysis/bodies_test.cpp",
+    "/analysis/clock_test.cpp",
+    "/analysis/constraints_test.cpp",
+    "/analysis/eliminated_test.cpp",
+    "/analysis/impacts_test.cpp",
+    "/analysis/measured_test.cpp",
+    "/analysis/tradeoff_kinds_test.cpp",
+    "/analysis/tradeoff_test.cpp",
+    "/cli/run/many_digits_test.cpp",
+    "/cli/run/roundoff_test.cpp",
+    "/generator/mechanics/repeated/all_pairs_test.cpp",
+    "/generator/mechanics/structure/shortcut_test.cpp",
+    "/generator/method/splitting_test.cpp",
+    "/library/inputs_test.cpp",
+    "/library/library_test.cpp",
+    "/runtime/kernel/clocked_lanes_test.cpp",
+    "/runtime/kernel/fixed_point_test.cpp",
+    "/runtime/kernel/refilled_test.cpp",
+    "/runtime/measure/order_test.cpp",
+};
+
+class Flags : public Listener {
+public:
+    explicit Flags(const doctest::ContextOptions&) {}
+
+    void test_case_start(const doctest::TestCaseData& test) override {
+        if (is_chosen_) return;
+        const std::string file = test.m_file.c_str();
+        if (std::any_of(std::begin(compiled_quickly), std::end(compiled_quickly),
+                        [&](const char* ending) { return file.ends_with(ending); }))
+            ::setenv("CXX", "g++ -Og", 1);
+        else
+            ::unsetenv("CXX");
+    }
+
+private:
+    const bool is_chosen_ = std::getenv("CXX") != nullptr;
 };
 
 // One file's tests in a process of their own, their output in `log`.
@@ -123,7 +173,8 @@ private:
 
     void wait_for_one() {
         int status = 0;
-        const pid_t pid = ::wait(&status);
+        struct rusage used {};
+        const pid_t pid = ::wait4(-1, &status, 0, &used);
         const Worker worker = running_.at(pid);
         running_.erase(pid);
         std::fputs(lobatto::test::read_file(worker.log).c_str(), stdout);
@@ -141,7 +192,9 @@ private:
         }
         passed_ += passed;
         failed_ += failed;
-        std::printf("%-36s %3d passed, %d failed\n", worker.file.c_str(), passed, failed);
+        const auto seconds = [](const timeval& time) { return double(time.tv_sec) + 1e-6 * double(time.tv_usec); };
+        std::printf("%-44s %3d passed, %d failed %7.1f s of processor time\n", worker.file.c_str(), passed, failed,
+                    seconds(used.ru_utime) + seconds(used.ru_stime));
         std::fflush(stdout);
         if (const char* path = std::getenv("LOBATTO_TEST_NOTES"))
             std::ofstream(path) << passed_ << ' ' << failed_ << " \n";
@@ -158,6 +211,7 @@ private:
 }  // namespace
 
 DOCTEST_REGISTER_LISTENER("notes", 1, Notes);
+DOCTEST_REGISTER_LISTENER("flags", 1, Flags);
 
 // $LOBATTO_TEST_WORKERS: how many files' tests run at a time, each file in a process of its own. Kernels that no test
 // keeps to itself go to one cache of all processes, $LOBATTO_TEST_CACHE, or a folder that goes away with the run.

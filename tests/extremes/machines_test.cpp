@@ -200,3 +200,14 @@ TEST_CASE("every precision ends in its own right answer") {
 TEST_CASE("every member, compiler and instruction set ends in the right answer" * doctest::test_suite("slowest")) {
     long_table.check();
 }
+
+TEST_CASE("kernels compiled with -Og, as some tests do, have the bits of those that users have") {
+    for (const lobatto::test::Motion* motion :
+         {&lobatto::test::pendulum, &lobatto::test::henon_heiles, &lobatto::test::spherical_pendulum,
+          &lobatto::test::double_pendulum, &lobatto::test::driven_pendulum}) {
+        const State<double> usual = state_by("g++", "", *motion), quick = state_by("g++", "-Og", *motion);
+        CHECK(usual.status == LOBATTO_OK);
+        CHECK(usual.q == quick.q);
+        CHECK(usual.p == quick.p);
+    }
+}

@@ -138,6 +138,14 @@ TEST_CASE("the command names the compiler that CXX names and all flags, and fuse
     CHECK(compile(answer).command.starts_with(compiler + " '-DLOBATTO_UNUSED='\\''a'\\''' -O2 "));
 }
 
+TEST_CASE("a level of optimisation that CXX names takes the place of ours") {
+    const KernelBuilder kernel_builder;
+    const std::string compiler = (kernel_builder.folder / "compiler").string();
+    const EnvironmentVariable words("CXX", compiler + " -Og");
+    CHECK(compile({answer.name, answer.text, false, 0, true})
+              .command.starts_with(compiler + " -Og -march=native -fno-math-errno -ffp-contract=off "));
+}
+
 TEST_CASE("a product is rounded before it is added to, on every processor") {
     const KernelBuilder kernel_builder;
     const Compiled compiled =
