@@ -113,8 +113,8 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     // half as long again. clang++ does so anyway. The general form (steppers/general.hpp) compiles in a sixth less
     // time, to the same speed, where only loops of up to 60 instructions are, not 200.
     // A level of optimisation among the words of CXX takes the place of this.
-    const bool has_level = std::any_of(arguments.begin(), arguments.end(),
-                                       [](const std::string& word) { return word.starts_with("-O"); });
+    const bool has_level =
+        std::any_of(arguments.begin(), arguments.end(), [](const std::string& word) { return word.starts_with("-O"); });
     if (!has_level) arguments.push_back("-O2");
     if (!has_level && !is_clang(*find_program(compiler.words.front()))) {
         arguments.push_back("-fpeel-loops");

@@ -120,9 +120,7 @@ struct DenseMatrix {
 
     LOBATTO_APART bool factor() { return factor_dense(values, pivots, std::integral_constant<int, size>{}); }
     // x becomes the solution.
-    LOBATTO_APART void solve(real* x) const {
-        solve_dense(values, pivots, x, std::integral_constant<int, size>{});
-    }
+    LOBATTO_APART void solve(real* x) const { solve_dense(values, pivots, x, std::integral_constant<int, size>{}); }
 };
 
 // `size` unknowns, each a block of one.
