@@ -55,7 +55,6 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
     : kernel_(kernel),
       parts_(static_cast<std::size_t>(kernel->parts)),
       groups_(amplitude_groups(outline.scene)),
-      order_(outline.quadrature.order()),
       rows_a_step_(1 + request.dense),
       narrow_(outline.system) {
     narrow_.set_parameters(request.parameters);
@@ -383,7 +382,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     } worst;
     const std::size_t count = std::min(run_.size(), companion_.size());
     for (std::size_t j = 0; j < count; ++j) {
-        const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -order_));
+        const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
         error.until = time_after(request_, run_[j].steps);
         error.end = 0;
         double apart = 0;

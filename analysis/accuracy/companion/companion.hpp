@@ -107,7 +107,7 @@ private:
     std::size_t parts_;  // of its numbers
     TrajectoryRequest request_;
     std::vector<int> groups_;
-    int order_, rows_a_step_;
+    int rows_a_step_;
     std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
     NarrowTerms narrow_;         // likewise, where the motion meets them
     std::int64_t looked_ = 0;    // steps of the companion at which that was looked at

@@ -51,7 +51,6 @@ EnsembleCompanion::EnsembleCompanion(const Outline& outline, const Kernel& kerne
       parts_(static_cast<std::size_t>(kernel->parts)),
       request_(request),
       groups_(amplitude_groups(outline.scene)),
-      order_(outline.quadrature.order()),
       narrow_(outline.system),
       stepper_(plain) {}
 
@@ -215,7 +214,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
                              : static_cast<double>(steps_taken(every)) / static_cast<double>(every),
-                 of_run = 1 / (1 - std::pow(ratio, -order_));
+                 of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
     Error error{0, false};
     double largest = 0;
     for (std::int64_t j = 0; j < comparisons; ++j) {

@@ -51,7 +51,6 @@ private:
     std::size_t parts_;
     const EnsembleRequest& request_;
     std::vector<int> groups_;
-    int order_;
     std::vector<double> pulse_parameters_;  // those that were asked for last
     bool has_pulses_ = false;               // with these
     NarrowTerms narrow_;
