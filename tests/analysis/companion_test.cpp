@@ -50,7 +50,7 @@ double absolute_error(const std::string& table) {
 
 }  // namespace
 
-TEST_CASE("the measured error is the true one within a factor of two, by any method") {
+TEST_CASE("where the step decides the error, the measured one is the true one to a tenth, by any method") {
     // Against the same motion with a step that leaves rounding alone.
     const std::string lagrangian = "x'^2/2 + y'^2/2 - (x^2 + y^2)/2 - x^2*y + y^3/3";
     const std::string coordinates = "x = { position = 0.3, velocity = 0.1 }\ny = { position = 0.1, velocity = 0.3 }";
@@ -71,8 +71,9 @@ TEST_CASE("the measured error is the true one within a factor of two, by any met
         REQUIRE(done.exit_code == 0);
         const std::vector<double> end = place.end();
         const double error = std::fmax(std::fabs(end[1] - truth[1]), std::fabs(end[2] - truth[2]));
-        CHECK(absolute_error(done.out) > error / 2);
-        CHECK(absolute_error(done.out) < error * 2);
+        // Within 2.3 %, the rounding of two digits included. With order 6 in place of 2 Lobatto 2 errs by 29 %.
+        CHECK(absolute_error(done.out) > error * 0.9);
+        CHECK(absolute_error(done.out) < error * 1.1);
     }
 }
 
@@ -148,8 +149,9 @@ TEST_CASE("what a pulse between the nodes does is measured") {
         REQUIRE(fine.run({"--every", "100"}).exit_code == 0);
         const double error = std::fabs(coarse.end()[1] - fine.end()[1]);
         if (done.out.find("as large as the motion") != std::string::npos) continue;
-        CHECK(absolute_error(done.out) > error / 2);
-        CHECK(absolute_error(done.out) < error * 2);
+        // Within 2.3 %, the rounding of two digits included. With order 6 in place of 2 Lobatto 2 errs by 29 %.
+        CHECK(absolute_error(done.out) > error * 0.9);
+        CHECK(absolute_error(done.out) < error * 1.1);
     }
 }
 
