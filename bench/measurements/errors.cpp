@@ -86,7 +86,6 @@ Row row_of(const Experiment& experiment, const Kernel& kernel, const ExactStart&
     Derivation derivation = experiment.derivation();
     derivation.scene = experiment.scene();
     derivation.scene.method = member.method();
-    derivation.quadrature = quadrature_of(member.method());
     Companion companion(derivation, kernel, request);
     request.sink = [&](const Records& records) { companion.observe(records); };
     companion.start();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Findings about a scene, and those that change no formula of a kernel.
+// Findings that are only told: what a scene asks for, and why a system is not linear.
 #pragma once
 
 #include <string>

@@ -231,6 +231,8 @@ private:
             for (int e = 0; e < K::events; ++e) values[e] = real(0);
     }
 
+    real value_at(real theta, int e, bool is_exact) { return is_exact ? exactly(theta, e) : on_polynomial(theta, e); }
+
     void insert(int place, Sample sample) {
         if (sample_count == room) return;
         for (int i = sample_count++; i > place; --i) samples[i] = samples[i - 1];
@@ -280,7 +282,7 @@ private:
 
     // In pieces at one end of which g is not defined: a sample where its domain ends, and one half way to it.
     void reach_undefined(bool is_exact, int e) {
-        const auto g = [&](real theta) { return is_exact ? exactly(theta, e) : on_polynomial(theta, e); };
+        const auto g = [&](real theta) { return value_at(theta, e, is_exact); };
         for (int i = 0; i + 1 < sample_count; ++i) {
             const bool is_first = is_finite(samples[i].value);
             const Sample inside = samples[is_first ? i : i + 1], outside = samples[is_first ? i + 1 : i];
@@ -300,7 +302,7 @@ private:
     // changes. How many were inserted.
     int refine_between(int i, int e) {
         bool is_exact = false;
-        const auto g = [&](real theta) { return is_exact ? exactly(theta, e) : on_polynomial(theta, e); };
+        const auto g = [&](real theta) { return value_at(theta, e, is_exact); };
         const Sample a = samples[i - 1], middle = samples[i], b = samples[i + 1];
         if (!has_sign(a.value) || !has_sign(middle.value) || !has_sign(b.value)) return 0;
         if (changes(a.value, middle.value) || changes(middle.value, b.value)) return 0;
