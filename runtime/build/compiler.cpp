@@ -112,13 +112,17 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     // -fpeel-loops: loops over the nodes and coordinates of small systems are written out, as with -O3, which takes
     // half as long again. clang++ does so anyway. The general form (steppers/general.hpp) compiles in a sixth less
     // time, to the same speed, where only loops of up to 60 instructions are, not 200.
-    // A level of optimisation among the words of CXX takes the place of this.
-    const bool has_level =
-        std::any_of(arguments.begin(), arguments.end(), [](const std::string& word) { return word.starts_with("-O"); });
-    if (!has_level) arguments.push_back("-O2");
-    if (!has_level && !is_clang(*find_program(compiler.words.front()))) {
-        arguments.push_back("-fpeel-loops");
-        if (translation.short_loops) arguments.insert(arguments.end(), {"--param", "max-completely-peeled-insns=60"});
+    // A level of optimisation among the words of CXX takes the place of these; not -Ofast, which is -ffast-math.
+    const bool has_level = std::any_of(arguments.begin(), arguments.end(), [](const std::string& word) {
+        return word.starts_with("-O") && word != "-Ofast";
+    });
+    if (!has_level) {
+        arguments.push_back("-O2");
+        if (!is_clang(*find_program(compiler.words.front()))) {
+            arguments.push_back("-fpeel-loops");
+            if (translation.short_loops)
+                arguments.insert(arguments.end(), {"--param", "max-completely-peeled-insns=60"});
+        }
     }
     for (const char* flag :
          {"-march=native", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden"})

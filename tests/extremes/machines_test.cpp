@@ -110,10 +110,11 @@ double family_error(bool gauss) {
 
 // After 200 steps, from the kernel of a compiler and an instruction set of its own, by a script in place of the
 // compiler.
-State<double> state_by(const std::string& compiler, const std::string& flags, const lobatto::test::Motion& motion) {
+State<double> state_by(const std::string& compiler, const std::string& flags, const lobatto::test::Motion& motion,
+                       const std::string& words_of_user = "") {
     const TemporaryFolder folder;
     write_script(folder / compiler, "exec /usr/bin/" + compiler + " \"$@\" " + flags + "\n");
-    const EnvironmentVariable program("CXX", (folder / compiler).string());
+    const EnvironmentVariable program("CXX", (folder / compiler).string() + words_of_user);
     const EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
     const Kernel kernel = kernel_in_own_cache(derivation_of(motion, "points = 4"), Precision::double_);
     return travel(kernel, motion.parameters, motion.q, motion.v, motion.step, 200);
@@ -205,7 +206,7 @@ TEST_CASE("kernels compiled with -Og, as some tests do, have the bits of those t
     for (const lobatto::test::Motion* motion :
          {&lobatto::test::pendulum, &lobatto::test::henon_heiles, &lobatto::test::spherical_pendulum,
           &lobatto::test::double_pendulum, &lobatto::test::driven_pendulum}) {
-        const State<double> usual = state_by("g++", "", *motion), quick = state_by("g++", "-Og", *motion);
+        const State<double> usual = state_by("g++", "", *motion), quick = state_by("g++", "", *motion, " -Og");
         CHECK(usual.status == LOBATTO_OK);
         CHECK(usual.q == quick.q);
         CHECK(usual.p == quick.p);
