@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "library/opened_run.hpp"
 
+#include <fmt/format.h>
+
 #include <thread>
 
 #include "analysis/columns.hpp"
@@ -13,10 +15,35 @@ void OpenedRun::Destroy::operator()(Parts* parts) const {
     DestroyInAlgebra()(parts);
 }
 
+namespace {
+
+// Of the companion, if it computes in other numbers than the run. InputError for what it cannot have.
+std::optional<Method> companion_method(const lobatto::Scene& scene, const RunOptions& options) {
+    if (options.companion.empty()) return {};
+    const auto fail = [](const std::string& why) { throw lobatto::InputError("--companion: " + why); };
+    if (!options.measure) fail("a run without a measured error has no companion; leave one of the two out");
+    const std::optional<Precision> numbers = precision_of(options.companion);
+    if (!numbers) fail("unknown numbers; there are " + precision_list());
+    if (rounding_of(*numbers) >= rounding_of(scene.method.numbers))
+        fail(fmt::format("the run itself computes in {}; a companion needs finer numbers{}",
+                         precision_name(scene.method.numbers),
+                         scene.method.numbers < Precision::double_double ? ", such as double-double" : ""));
+    if (scene.clock) fail("with a clock the companion has the numbers of the run; leave it out, or give --clock none");
+    Method method = scene.method;
+    method.numbers = *numbers;
+    method.arithmetic = StepArithmetic::plain;  // finer numbers have digits to spare
+    if (const std::string reason = reason_against_numbers(method); !reason.empty()) fail(reason);
+    need_digits_for(*numbers);
+    return method;
+}
+
+}  // namespace
+
 OpenedRun::OpenedRun(const Scene& scene, const RunOptions& options, bool general)
     : beyond_horizon_(options.beyond_horizon) {
     in_algebra([&] {
-        parts_.reset(new Parts{prepare_run(with_method(scene, options), overrides_of(options), general)});
+        const lobatto::Scene chosen = with_method(scene, options);
+        parts_.reset(new Parts{prepare_run(chosen, overrides_of(options), general, companion_method(chosen, options))});
         const PreparedRun& prepared = parts_->prepared;
         TrajectoryRequest& request = parts_->request;
         LoadedStepper<double> stepper(prepared.plain);

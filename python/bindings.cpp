@@ -204,11 +204,12 @@ py::dict dict_of(lob::Trajectory&& run) {
     return dict;
 }
 
-py::dict run(const lob::Scene& scene, bool measure, bool beyond_horizon, const py::object& progress,
-             const py::kwargs& given) {
+py::dict run(const lob::Scene& scene, bool measure, const std::string& companion, bool beyond_horizon,
+             const py::object& progress, const py::kwargs& given) {
     lob::RunOptions options;
     static_cast<lob::Settings&>(options) = settings_of(given);
     options.measure = measure;
+    options.companion = companion;
     options.beyond_horizon = beyond_horizon;
     options.progress = watched<double>(progress);
     return dict_of(unlocked([&] { return lob::run(scene, options); }));
@@ -443,7 +444,8 @@ PYBIND11_MODULE(_lobatto, module) {
     add_errors(module);
     add_scene(module);
     add_stepper(module);
-    module.def("run", &run, py::arg("scene"), py::arg("measure"), py::arg("beyond_horizon"), py::arg("progress"));
+    module.def("run", &run, py::arg("scene"), py::arg("measure"), py::arg("companion"), py::arg("beyond_horizon"),
+               py::arg("progress"));
     module.def("sweep", &sweep, py::arg("scene"), py::arg("starts"), py::arg("keep"), py::arg("threads"),
                py::arg("measure"), py::arg("beyond_horizon"), py::arg("progress"));
     module.def("tune", &tune, py::arg("scene"), py::arg("error"), py::arg("budget"), py::arg("progress"));

@@ -109,7 +109,7 @@ std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request,
 
 }  // namespace
 
-PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
+PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, std::optional<Method> companion) {
     const auto start = std::chrono::steady_clock::now();
     if (scene.clock && scene.method.numbers != Precision::double_)
         fail_at_clock(scene, "with a clock `lobatto run` computes in double, but numbers are \"" +
@@ -117,11 +117,16 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
                                  "\"; remove the clock, or give --numbers double");
     const Precision numbers = scene.method.numbers;
     const DerivedKernel derived = derived_kernel(scene, {numbers, general, EnergyWatch::can_watch});
-    KernelSource in_double;
-    if (numbers != Precision::double_)
-        in_double =
-            derived_kernel(scene, {Precision::double_, general, EnergyWatch::can_watch}, derived.derivation.get())
-                .source;
+    const auto source_in = [&](Precision others, const Method& method) {
+        Scene beside = scene;
+        beside.method = method;
+        const bool is_known = method.arithmetic == scene.method.arithmetic;
+        const KernelWish wish{others, general, EnergyWatch::can_watch};
+        return derived_kernel(beside, wish, is_known ? derived.derivation.get() : nullptr).source;
+    };
+    KernelSource in_double, in_finer;
+    if (numbers != Precision::double_) in_double = source_in(Precision::double_, scene.method);
+    if (companion) in_finer = source_in(companion->numbers, *companion);
     const std::chrono::duration<double> derivation_time = std::chrono::steady_clock::now() - start;
     apply(overrides, scene);  // after the derivation: one kernel serves all values
     if (!overrides.set.empty()) check_domains(scene);
@@ -129,8 +134,10 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general) {
     Compiled compiled;
     const Kernel kernel = kernel_of(derived.source, numbers, &compiled);
     const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(in_double, Precision::double_);
-    return {scene, derived.outline, derived.from_cache,     derived.source, compiled, kernel,
-            plain, steps,           derivation_time.count()};
+    std::optional<Kernel> finer;
+    if (companion) finer = kernel_of(in_finer, companion->numbers);
+    return {scene, derived.outline, derived.from_cache,     derived.source, compiled, kernel, plain,
+            finer, steps,           derivation_time.count()};
 }
 
 RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
@@ -138,10 +145,16 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
     const Scene& scene = run.scene;
     RunVerdict verdict;
     if (observers.companion) verdict.error = observers.companion->finish(result);
+    if (observers.began_unmeasured)
+        verdict.warnings.emplace_back(
+            "the error is not measured, because an earlier part of the run had no companion, "
+            "or one in other numbers");
     std::string departure = departure_of(run, request, result, observers);
     if (departure.empty() && !accepts_lost && !scene.run.beyond_horizon)
         departure = loss_of(scene, request, verdict.error);
-    if (verdict.error && departure.empty()) verdict.warnings = warnings_of(*verdict.error, scene.run.error);
+    if (verdict.error && departure.empty())
+        for (const std::string& warning : warnings_of(*verdict.error, scene.run.error))
+            verdict.warnings.push_back(warning);
     if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.outline, run.plain, request, result)))

@@ -26,15 +26,18 @@ struct PreparedRun {
     bool derived_from_cache;
     KernelSource source;
     Compiled compiled;
-    Kernel kernel;  // in the scene's numbers
-    Kernel plain;   // the same in double, for what looks at states in doubles
+    Kernel kernel;                // in the scene's numbers
+    Kernel plain;                 // the same in double, for what looks at states in doubles
+    std::optional<Kernel> finer;  // the same in finer numbers, for a companion that computes in these
     Steps steps;
     double derivation_seconds;
 };
 
 // The overrides are applied after the derivation: one kernel serves all values. `general`: with no shortcut.
+// `companion`: the method in finer numbers, for a companion that computes in these.
 // Throws InputError, ComputationError, MachineError.
-PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general = false);
+PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general = false,
+                        std::optional<Method> companion = {});
 
 // All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
 class RunObservers {
@@ -51,7 +54,10 @@ public:
           domains(run.scene, run.outline.system),
           parameters(request.parameters),
           counts(1 + run.scene.reported().size(), 0) {
-        if (measures) companion.emplace(run.outline, run.kernel, request);
+        if (!measures) return;
+        TrajectoryRequest beside = request;
+        if (run.finer) add_digits(beside, run.scene, *run.finer);
+        companion.emplace(run.outline, run.finer.value_or(run.kernel), beside, run.finer.has_value());
     }
 
     void observe(const Records& records) {
@@ -82,7 +88,10 @@ public:
         watch.restore(saved.at("watch"));
         judge.restore(saved.at("step judge"));
         energy.restore(saved.at("energy watch"));
-        if (companion) companion->restore(saved.at("companion"));
+        if (companion && !companion->restore(saved.at("companion"))) {
+            companion.reset();
+            began_unmeasured = true;
+        }
         left_domain = saved.at("left domain");
     }
 
@@ -90,6 +99,7 @@ public:
     StepJudge judge;
     EnergyWatch energy;
     std::optional<Companion> companion;
+    bool began_unmeasured = false;  // in an earlier part of the run, so that nothing can be compared
     Domains domains;
     std::vector<double> parameters;
     std::vector<double> left_domain;  // t, q, p: the first state where a formula has no value

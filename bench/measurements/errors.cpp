@@ -2,10 +2,11 @@
 // How well the error that `lobatto run` measures follows the true one, over the scenes, members and steps
 // (docs/errors.md).
 //
-//   bench_errors FILE.csv SCENE...
-//   bench_errors --page FILE.csv docs
+//   bench_errors [--companion NUMBERS] FILE.csv SCENE...
+//   bench_errors --page FILE.csv FINER.csv docs
 //
-// A scene's rows are appended to FILE.csv when all are known; scenes that are there are not measured again.
+// FINER.csv: by companions in double-double. A scene's rows are appended to FILE.csv when all are known; scenes that
+// are there are not measured again.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,11 +18,13 @@
 #include <sstream>
 
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/motion.hpp"
 #include "analysis/tradeoff/experiment.hpp"
 #include "cli/print/drawing.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
+#include "runtime/run/parts.hpp"
 
 using namespace lobatto;
 
@@ -29,6 +32,7 @@ namespace {
 
 constexpr double seconds_a_scene = 60;  // of which the reference takes a part
 constexpr double longest_run = 0.4;     // seconds
+constexpr double longest_finer = 0.04;  // with a companion in finer numbers, for which the run waits
 constexpr double least = 1e-13;         // smaller errors are the rounding of the states themselves
 constexpr double gone = 0.1;            // of the amplitude: what is to be told is that, no longer how much
 constexpr double fewest_radians = 4;    // h omega of the coarsest steps
@@ -74,8 +78,9 @@ End end_of(const Reference& reference) {
     return {of(reference.high, last), of(reference.low, last), of(reference.scale, 0)};
 }
 
-Row row_of(const Experiment& experiment, const Kernel& kernel, const ExactStart& exact, const Member& member,
-           std::int64_t steps, const End& end, double& seconds) {
+// `finer`: of a companion in finer numbers.
+Row row_of(const Experiment& experiment, const Kernel& kernel, const std::optional<Kernel>& finer,
+           const ExactStart& exact, const Member& member, std::int64_t steps, const End& end, double& seconds) {
     TrajectoryRequest request;
     request.step = experiment.until() / static_cast<double>(steps);
     request.steps = steps;
@@ -86,7 +91,13 @@ Row row_of(const Experiment& experiment, const Kernel& kernel, const ExactStart&
     Derivation derivation = experiment.derivation();
     derivation.scene = experiment.scene();
     derivation.scene.method = member.method();
-    Companion companion(derivation, kernel, request);
+    TrajectoryRequest beside = request;
+    if (finer) {
+        add_digits(beside, experiment.scene(), *finer);
+        beside.whole_step =
+            times_fraction(as_parts({experiment.until()}, static_cast<std::size_t>((*finer)->parts)), 1, steps);
+    }
+    Companion companion(derivation, finer.value_or(kernel), beside, finer.has_value());
     request.sink = [&](const Records& records) { companion.observe(records); };
     companion.start();
     const TrajectoryResult result = integrate(kernel, request);
@@ -105,7 +116,7 @@ Row row_of(const Experiment& experiment, const Kernel& kernel, const ExactStart&
     return row;
 }
 
-void measure(const std::string& path, const std::string& file) {
+void measure(const std::string& path, const std::string& file, std::optional<Precision> companion) {
     const Scene scene = read_scene(path);
     if (has(file, scene.name) || !scene.constraints.empty()) return;  // there is no reference with constraints
     ExperimentRequest wish;
@@ -123,13 +134,18 @@ void measure(const std::string& path, const std::string& file) {
     std::string rows;
     int count = 0;
     for (const Member& member : list) {
+        Member in_finer = member;
+        in_finer.precision = companion.value_or(member.precision);
+        if (!experiment.kernel_builder().allows(in_finer)) continue;  // coefficients with too few digits
         const Kernel kernel = experiment.kernel_builder().kernel(member);
+        std::optional<Kernel> finer;
+        if (companion) finer = experiment.kernel_builder().kernel(in_finer);
         double best = std::numeric_limits<double>::infinity();
         int no_better = 0;
         const double coarsest = reference.until * reference.frequency / fewest_radians;
         for (double steps = std::max(1.0, coarsest); steps < 1e6; steps = std::ceil(steps * ratio_of_steps)) {
             double seconds = 0;
-            const Row row = row_of(experiment, kernel, start, member, std::llround(steps), end, seconds);
+            const Row row = row_of(experiment, kernel, finer, start, member, std::llround(steps), end, seconds);
             const bool ended = std::isfinite(row.true_error);
             no_better = ended && row.true_error < 0.7 * best ? 0 : no_better + 1;
             if (ended) best = std::min(best, row.true_error);
@@ -139,7 +155,7 @@ void measure(const std::string& path, const std::string& file) {
                                 row.steps, row.true_error, row.printed, row.is_told ? 1 : 0, row.is_warned ? 1 : 0);
                 ++count;
             }
-            if (seconds > longest_run || (no_better >= 4 && best < 1e-6)) break;
+            if (seconds > (finer ? longest_finer : longest_run) || (no_better >= 4 && best < 1e-6)) break;
         }
     }
     if (count == 0) rows = scene.name + ",,,,,,,\n";  // nobody knows this motion to its end
@@ -147,8 +163,10 @@ void measure(const std::string& path, const std::string& file) {
     fmt::print(stderr, "{}: {} runs in {:.0f} s\n", scene.name, count, experiment.elapsed());
 }
 
-std::map<std::string, std::vector<Row>> read(const std::string& path) {
-    std::map<std::string, std::vector<Row>> result;
+using Scenes = std::map<std::string, std::vector<Row>>;
+
+Scenes read(const std::string& path) {
+    Scenes result;
     std::ifstream in(path);
     for (std::string line; std::getline(in, line);) {
         std::vector<std::string> cells;
@@ -222,9 +240,34 @@ constexpr const char* header =
     "| runs | 5 % | 50 % | 95 % | largest | lost | of these told | missed |\n"
     "|---|---|---|---|---|---|---|---|---|\n";
 
-std::string tables_of(const std::map<std::string, std::vector<Row>>& scenes) {
-    std::string by_scene, by_member, unknown;
+// All runs, and of them those whose error the step decides, and those where rounding does.
+struct Summary {
     Tally all, by_steps, by_rounding;
+
+    explicit Summary(const Scenes& scenes) {
+        for (const auto& [scene, list] : scenes) {
+            std::map<Member, std::vector<Row>> rows_of;
+            for (const Row& row : list) {
+                all.add(row);
+                rows_of[row.member].push_back(row);
+            }
+            for (const auto& [member, rows] : rows_of) {
+                const std::vector<bool> rounding = decided_by_rounding(rows);
+                for (std::size_t i = 0; i < rows.size(); ++i) (rounding[i] ? by_rounding : by_steps).add(rows[i]);
+            }
+        }
+    }
+    std::string rows(const std::string& companion) const {
+        std::string text;
+        for (const auto& [name, tally] : {std::pair{"all", &all}, {"the step", &by_steps}, {"rounding", &by_rounding}})
+            text += fmt::format("| {} | {} | {} | {:.1f} % | {:.2f} % | {} |\n", companion, name, tally->ratios.size(),
+                                tally->share(0.5, 2), tally->share(0.1, 10), tally->missed);
+        return text;
+    }
+};
+
+std::string tables_of(const Scenes& scenes, const Scenes& finer) {
+    std::string by_scene, by_member, unknown;
     std::map<Member, Tally> of_member;
     for (const auto& [scene, list] : scenes) {
         if (list.empty()) {
@@ -234,30 +277,23 @@ std::string tables_of(const std::map<std::string, std::vector<Row>>& scenes) {
         Tally tally;
         for (const Row& row : list) {
             tally.add(row);
-            all.add(row);
             of_member[row.member].add(row);
-        }
-        std::map<Member, std::vector<Row>> rows_of;
-        for (const Row& row : list) rows_of[row.member].push_back(row);
-        for (const auto& [member, rows] : rows_of) {
-            const std::vector<bool> rounding = decided_by_rounding(rows);
-            for (std::size_t i = 0; i < rows.size(); ++i) (rounding[i] ? by_rounding : by_steps).add(rows[i]);
         }
         by_scene += table_row(fmt::format("`{}`", scene), tally);
     }
     for (const auto& [member, tally] : of_member) by_member += table_row(Candidate{member, 0, 0}.name(), tally);
+    const Summary summary(scenes);
     return fmt::format(
-        "| scene {0}{1}{2}\n| member {0}{3}\nThe true error is within a factor of 2 of the printed one in {4:.1f} % of "
-        "{5} runs, of 10 in {6:.2f} %.\nWhere the step decides the error, these are {8:.1f} % and {9:.2f} % of {10} "
-        "runs; where rounding decides it, {11:.1f} %\nand {12:.2f} % of {13} runs.\n{7}",
-        header, by_scene, table_row("all", all), by_member, all.share(0.5, 2), all.ratios.size(), all.share(0.1, 10),
-        unknown.empty() ? "" : "\nNot here, because nobody knows the motion to its end: " + unknown + ".\n",
-        by_steps.share(0.5, 2), by_steps.share(0.1, 10), by_steps.ratios.size(), by_rounding.share(0.5, 2),
-        by_rounding.share(0.1, 10), by_rounding.ratios.size());
+        "| companion in | error decided by | runs | within a factor of 2 | of 10 | missed "
+        "|\n|---|---|---|---|---|---|\n"
+        "{}{}\n| scene {}{}{}\n| member {}{}{}",
+        summary.rows("double"), Summary(finer).rows("double-double"), header, by_scene, table_row("all", summary.all),
+        header, by_member,
+        unknown.empty() ? "" : "\nNot here, because nobody knows the motion to its end: " + unknown + ".\n");
 }
 
 // How often which ratio: in per cent of the runs, in bins of a tenth of a decade.
-void draw_ratios(const std::map<std::string, std::vector<Row>>& scenes, const std::string& docs) {
+void draw_ratios(const Scenes& scenes, const std::string& docs) {
     Tally all;
     for (const auto& [scene, list] : scenes)
         for (const Row& row : list) all.add(row);
@@ -277,35 +313,42 @@ void draw_ratios(const std::map<std::string, std::vector<Row>>& scenes, const st
 }
 
 // What the page says of the measurements stands between two marks; the rest is written by hand.
-void write_page(const std::map<std::string, std::vector<Row>>& scenes, const std::string& docs) {
+void write_page(const Scenes& scenes, const Scenes& finer, const std::string& docs) {
     const std::string path = docs + "/errors.md", begin = "<!-- measured -->\n", end = "<!-- end -->";
     std::ostringstream text;
     text << std::ifstream(path).rdbuf();
     std::string page = text.str();
     const std::size_t from = page.find(begin), to = page.find(end);
     if (from == std::string::npos || to == std::string::npos) throw InputError(path + ": the marks are missing");
-    page.replace(from + begin.size(), to - from - begin.size(), tables_of(scenes));
+    page.replace(from + begin.size(), to - from - begin.size(), tables_of(scenes, finer));
     write_whole(path, "the page", page);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    const std::vector<std::string> words(argv + 1, argv + argc);
+    std::vector<std::string> words(argv + 1, argv + argc);
     try {
-        if (words.size() == 3 && words[0] == "--page") {
-            const auto scenes = read(words[1]);
-            draw_ratios(scenes, words[2]);
-            write_page(scenes, words[2]);
+        if (words.size() == 4 && words[0] == "--page") {
+            const Scenes scenes = read(words[1]);
+            draw_ratios(scenes, words[3]);
+            write_page(scenes, read(words[2]), words[3]);
             return 0;
         }
+        std::optional<Precision> companion;
+        if (words.size() > 2 && words[0] == "--companion") {
+            companion = precision_of(words[1]);
+            if (companion) words.erase(words.begin(), words.begin() + 2);
+        }
         if (words.size() < 2) {
-            fmt::print(stderr, "bench_errors FILE.csv SCENE...\nbench_errors --page FILE.csv docs\n");
+            fmt::print(stderr,
+                       "bench_errors [--companion NUMBERS] FILE.csv SCENE...\n"
+                       "bench_errors --page FILE.csv FINER.csv docs\n");
             return 2;
         }
         for (std::size_t i = 1; i < words.size(); ++i) {
             try {
-                measure(words[i], words[0]);
+                measure(words[i], words[0], companion);
             } catch (const ComputationError& error) {
                 fmt::print(stderr, "{}: {}\n", words[i], error.what());
             }

@@ -38,6 +38,7 @@ struct RunOptions {
     Overrides overrides;
     bool resume = false;
     bool unmeasured = false;
+    std::string companion;
     bool beyond_horizon = false;
     bool quiet = false;
     bool json = false;
@@ -267,6 +268,7 @@ api::RunOptions wish_of(const RunOptions& options) {
     api::RunOptions wish;
     static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
     wish.measure = !options.unmeasured;
+    wish.companion = options.companion;
     wish.beyond_horizon = options.beyond_horizon;
     return wish;
 }
@@ -331,7 +333,9 @@ void run(const RunOptions& options) {
     }
     Files files(options, run, header, from);
     const TrajectoryResult& result = go_into(files, opened, identity, quiet);
+    if (!quiet && !options.companion.empty()) say("measuring the error in " + options.companion);
     const RunVerdict verdict = opened.verdict();
+    say.clear();
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (options.json) {
         const bool is_exact = has_defect(run) && request.tolerance == 0 && result.steps_done > 0;
@@ -372,6 +376,11 @@ void add_run(CommandLine& program) {
         "Continue the same run where it was interrupted or killed; its files are then the same, byte for byte");
     command.flag("--unmeasured", options->unmeasured,
                  "Do not measure the error by a companion, the same run with 2/3 of the step on another processor");
+    command
+        .option("--companion", options->companion,
+                "Numbers of the companion, such as double-double: the error to two digits where rounding decides it, "
+                "too. The run waits for it")
+        .shown_as("NUMBERS");
     command.flag("--beyond-horizon", options->beyond_horizon,
                  "Go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");

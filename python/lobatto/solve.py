@@ -15,16 +15,17 @@ def _scene(scene):
     return scene if isinstance(scene, Scene) else Scene(str(scene))
 
 
-def run(scene, *, measure=True, beyond_horizon=False, progress=None, **settings):
+def run(scene, *, measure=True, companion="", beyond_horizon=False, progress=None, **settings):
     """Runs a scene (or the path of one) to its end. Returns a Trajectory.
 
-    ``measure``: its error, by a companion on another processor. ``beyond_horizon``: go on where nothing of the motion
-    is left, for the statistics of chaos. ``progress(share)`` is called about ten times a second; False ends the run.
-    Raises RunFailure where it fails on its way, with what was computed as its ``trajectory``.
+    ``measure``: its error, by a companion on another processor. ``companion``: the numbers of that one, such as
+    "double-double", which measure the error to two digits where rounding decides it, too. ``beyond_horizon``: go on
+    where nothing of the motion is left, for the statistics of chaos. ``progress(share)`` is called about ten times a
+    second; False ends the run. Raises RunFailure where it fails on its way, with what was computed as its ``trajectory``.
     """
     scene = _scene(scene)
     try:
-        values = _lobatto.run(scene, measure, beyond_horizon, progress, **settings)
+        values = _lobatto.run(scene, measure, companion, beyond_horizon, progress, **settings)
     except RunFailure as failure:
         failure.trajectory = Trajectory(scene, settings, failure.trajectory)
         raise

@@ -77,6 +77,52 @@ TEST_CASE("where the step decides the error, the measured one is the true one to
     }
 }
 
+TEST_CASE("where rounding decides the error, a companion in finer numbers measures it, and one in double does not") {
+    const std::string lagrangian = "x'^2/2 + y'^2/2 - (x^2 + y^2)/2 - x^2*y + y^3/3";
+    const std::string coordinates = "x = { position = 0.3, velocity = 0.1 }\ny = { position = 0.1, velocity = 0.3 }";
+    const Place exact(scene_of(lagrangian, coordinates, "points = 10\nnumbers = \"double-double\"", 0.05, 100));
+    REQUIRE(exact.run({"--unmeasured"}).exit_code == 0);
+    const std::vector<double> truth = exact.end();
+    double worst_finer = 0, worst_double = 0;  // powers of ten between the printed and the true error
+    for (const double step : {0.08, 0.05, 0.04, 0.032, 0.025, 0.02, 0.016, 0.0125}) {
+        const Place place(scene_of(lagrangian, coordinates, "points = 8", step, 100));
+        CAPTURE(step);
+        const test::Finished in_double = place.run(), finer = place.run({"--companion", "double-double"});
+        REQUIRE(finer.exit_code == 0);
+        const std::vector<double> end = place.end();
+        const double error = std::fmax(std::fabs(end[1] - truth[1]), std::fabs(end[2] - truth[2]));
+        CHECK(error > 1e-16);
+        CHECK(error < 1e-12);
+        worst_finer = std::fmax(worst_finer, std::fabs(std::log10(absolute_error(finer.out) / error)));
+        worst_double = std::fmax(worst_double, std::fabs(std::log10(absolute_error(in_double.out) / error)));
+    }
+    CHECK(worst_finer < std::log10(1.25));  // the end of the truth is rounded to double, too
+    CHECK(worst_double > std::log10(1.25));
+}
+
+TEST_CASE("a companion in numbers that it cannot have is refused") {
+    const Place place(scene_of("q'^2/2 - q^2/2", swinging, four, 0.1, 10));
+    const auto refusal = [&](std::vector<std::string> options) {
+        const test::Finished done = place.run(std::move(options));
+        CHECK(done.exit_code == 2);
+        return done.err;
+    };
+    CHECK(refusal({"--companion", "decimal"}).find("--companion: unknown numbers; there are \"float\"") !=
+          std::string::npos);
+    CHECK(refusal({"--companion", "double"}).find("needs finer numbers, such as double-double") != std::string::npos);
+    CHECK(refusal({"--companion", "double-double", "--unmeasured"}).find("leave one of the two out") !=
+          std::string::npos);
+    CHECK(refusal({"--companion", "quadruple", "--splitting", "11"}).find("known to 15 digits, too few") !=
+          std::string::npos);
+    const Place comet(scene_of("q'^2/2 + r'^2/2 + 1/sqrt(q^2 + r^2)",
+                               "q = { position = 1, velocity = 0 }\nr = { position = 0, velocity = 0.5 }",
+                               "points = 4\nclock = \"auto\"", 0.1, 1));
+    CHECK(comet.run({"--companion", "double-double"}).err.find("with a clock the companion has the numbers of the") !=
+          std::string::npos);
+    // In clean arithmetic, which finer numbers do not need.
+    CHECK(place.run({"--companion", "double-double", "--arithmetic", "clean"}).exit_code == 0);
+}
+
 TEST_CASE("two motions that diverged and meet again by chance are not taken for the same") {
     // The true motion has made a turn less at the end; the companion's is where the run's is, to 2e-5.
     const Place place(scene_of("x'^2/2 + cos(x)",

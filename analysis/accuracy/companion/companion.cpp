@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/accuracy/companion/companion.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -51,9 +49,10 @@ std::int64_t companion_steps(std::int64_t steps) {
     return taken;
 }
 
-Companion::Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request)
+Companion::Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, bool is_finer)
     : kernel_(kernel),
       parts_(static_cast<std::size_t>(kernel->parts)),
+      is_finer_(is_finer),
       groups_(amplitude_groups(outline.scene)),
       rows_a_step_(1 + request.dense),
       narrow_(outline.system) {
@@ -106,9 +105,12 @@ void Companion::observe(const Records& records) {
         if (number % rows_a_step_ != 0) continue;
         const std::int64_t steps = std::min(number / rows_a_step_ * request_.every, request_.steps);
         if (steps == 0 || (steps % stride_ != 0 && steps != request_.steps)) continue;
-        const double* const whole =
-            records.whole != nullptr ? records.whole + (i * records.columns + 1) * records.parts : row;
-        run_.push_back({steps, {whole, whole + count * parts_}});
+        const auto parts = static_cast<std::size_t>(records.whole != nullptr ? records.parts : 1);
+        const double* const whole = parts > 1 ? records.whole + (i * records.columns + 1) * records.parts : row;
+        Point point{steps, std::vector<double>(count * parts_, 0.0)};
+        for (std::size_t k = 0; k < count; ++k)
+            std::copy_n(whole + k * parts, parts, point.row.data() + k * parts_);  // finer numbers end with zeros
+        run_.push_back(std::move(point));
     }
 }
 
@@ -260,7 +262,7 @@ void Companion::compute() {
             if (!is_clocked()) place.time[0] += request_.time;
         }
     }
-    if (done == 0) {
+    if (done == 0 && !is_finer_) {
         std::vector<double> moved = place.q;
         for (std::size_t k = 0; k < moved.size(); k += parts_) {
             if (moved[k] == 0) continue;
@@ -288,7 +290,7 @@ void Companion::compute() {
 
 std::vector<double> Companion::save() const {
     const std::lock_guard lock(mutex_);
-    std::vector<double> all{static_cast<double>(seen_), static_cast<double>(run_.size()),
+    std::vector<double> all{kernel_->epsilon, static_cast<double>(seen_), static_cast<double>(run_.size()),
                             static_cast<double>(companion_.size())};
     for (const auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
         all.push_back(static_cast<double>(range->size()));
@@ -302,7 +304,7 @@ std::vector<double> Companion::save() const {
     return all;
 }
 
-void Companion::restore(const std::vector<double>& saved) {
+bool Companion::restore(const std::vector<double>& saved) {
     auto at = saved.begin();
     const auto take = [&](std::ptrdiff_t count) {
         if (saved.end() - at < count) return std::vector<double>();
@@ -310,18 +312,19 @@ void Companion::restore(const std::vector<double>& saved) {
         at += count;
         return part;
     };
-    const std::vector<double> counts = take(3);
-    if (counts.empty()) return;
-    seen_ = std::llround(counts[0]);
+    const std::vector<double> counts = take(4);
+    if (counts.empty() || counts[0] != kernel_->epsilon) return false;
+    seen_ = std::llround(counts[1]);
     for (auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
         const std::vector<double> size = take(1);
         if (!size.empty()) *range = take(std::llround(size[0]));
     }
-    for (const auto& [points, count] : {std::pair{&run_, counts[1]}, std::pair{&companion_, counts[2]}})
+    for (const auto& [points, count] : {std::pair{&run_, counts[2]}, std::pair{&companion_, counts[3]}})
         for (std::int64_t i = 0; i < std::llround(count); ++i) {
             const std::vector<double> point = take(1 + 2 * std::ssize(groups_) * static_cast<std::ptrdiff_t>(parts_));
             if (!point.empty()) points->push_back({std::llround(point[0]), {point.begin() + 1, point.end()}});
         }
+    return true;
 }
 
 // Where a stop ended the run before its time: whether nothing is left to compare.
@@ -336,9 +339,9 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
         const bool begins_now = !thread_.joinable();  // there is one processor: it waited until now
         if (begins_now) start();
         const auto now = std::chrono::steady_clock::now();
-        const double longest = result.seconds < short_run ? std::numeric_limits<double>::infinity()
-                               : begins_now               ? result.seconds / 2
-                                                          : 0;
+        const double longest = is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
+                               : begins_now                            ? result.seconds / 2
+                                                                       : 0;
         while (!finished_ && !has_caught_up() && seconds_since(now) < longest)
             std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
@@ -435,26 +438,6 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.at_end *= error.doubling ? std::exp2((whole - part) / *error.doubling) : whole * whole / (part * part);
     }
     return error;
-}
-
-std::string text_of(const MeasuredError& error, const Scene& scene) {
-    const std::string chaos = error.doubling ? fmt::format("; errors double every {:.3g}", *error.doubling) : "";
-    if (error.companion_stopped && error.lost_after)
-        return fmt::format("not known after t = {:.4g}, where the same run with 2/3 of the step stops",
-                           *error.lost_after);
-    if (error.lost_after)
-        return fmt::format("as large as the motion itself from t = {:.4g} on{}", *error.lost_after, chaos);
-    const std::string place = error.complete ? "at the end" : fmt::format("at t = {:.4g}", error.until);
-    std::string text = error.largest > 3 * error.end
-                           ? fmt::format("{:.1e} of the amplitude at most; {} {:.1e}", error.largest, place, error.end)
-                           : fmt::format("{:.1e} of the amplitude {}", error.end, place);
-    const Coordinate& worst = scene.coordinates[error.coordinate];
-    if (error.end > 0)
-        text +=
-            fmt::format(" ({:.1e}{} in {})", error.absolute, worst.unit.empty() ? "" : " " + worst.unit, worst.written);
-    if (!error.complete)
-        text += fmt::format(", not measured beyond; perhaps {:.0e} at the end", std::fmin(error.at_end, 1));
-    return text + chaos;
 }
 
 }  // namespace lobatto

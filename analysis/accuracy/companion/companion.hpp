@@ -9,6 +9,9 @@
 //
 // The companion begins four units in the last place beside the start: what no number of steps can know, and what grows
 // where nearby trajectories diverge, is an error too.
+//
+// A companion may compute in finer numbers than the run, from the start of the scene with all their digits. Then D is
+// the error where rounding decides, too; else it is only of the same size.
 #pragma once
 
 #include <atomic>
@@ -22,31 +25,13 @@
 #include <vector>
 
 #include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/companion/measured_error.hpp"
 #include "analysis/accuracy/formulas/narrow_terms.hpp"
 #include "analysis/accuracy/formulas/pulses.hpp"
 #include "generator/mechanics/outline.hpp"
 #include "runtime/run/trajectory.hpp"
 
 namespace lobatto {
-
-inline constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
-
-struct MeasuredError {
-    double end = 0;                      // at `until`: of the positions, relative to the amplitude of each; the largest
-    std::size_t coordinate = 0;          // of which it is
-    double absolute = 0;                 // the same in its unit
-    double largest = 0;                  // over all comparisons
-    double until = 0;                    // the time of the last comparison
-    bool complete = false;               // that is the end of the run
-    double at_end = 0;                   // `end`; of what was not compared, as errors of this run grew so far
-    std::vector<double> lost_q, lost_p;  // where the run was then
-    std::optional<double> lost_after;    // from then on the error is as large as the motion
-    std::optional<double> doubling;      // of errors that grow exponentially: the time in which they double
-    std::optional<double> companion_stopped;  // the time where the companion could not go on, though the run could
-
-    bool is_lost() const { return lost_after.has_value(); }
-    double worst() const { return std::fmax(at_end, largest); }
-};
 
 // Of a companion, for so many steps of the run: about 3/2 of them, without a common divisor.
 std::int64_t companion_steps(std::int64_t steps);
@@ -56,13 +41,11 @@ inline constexpr std::int64_t fewest_driven_steps = 8;
 // Of a companion with a clock: its steps for one of the run, both equally long in the time of the clock.
 inline constexpr double clocked_ratio = 1.5;
 
-// One line.
-std::string text_of(const MeasuredError& error, const Scene& scene);
-
 class Companion {
 public:
-    // What is handed over is copied, but for what the kernel needs. `request`: the run's.
-    Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request);
+    // What is handed over is copied, but for what the kernel needs. `request`: the run's; its whole numbers are those
+    // of `kernel`, which are the run's too, or finer.
+    Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, bool is_finer = false);
     ~Companion();
 
     // The kept states of the run go by.
@@ -72,10 +55,12 @@ public:
     // Begins to compute. Before, `restore` may say what an earlier part of the run had.
     void start();
     std::vector<double> save() const;
-    void restore(const std::vector<double>& saved);
+    // False: that part had no companion, or one in other numbers.
+    bool restore(const std::vector<double>& saved);
 
-    // Waits for the companion, where the run took less than a second of processor time, and compares what there is; of
-    // a longer run that is as much as was computed beside it. Nothing: the run was stopped, or took no step.
+    // Waits for the companion, where it computes in finer numbers or the run took less than a second of processor time,
+    // and compares what there is; else that is as much as was computed beside the run. Nothing: the run was stopped, or
+    // took no step.
     std::optional<MeasuredError> finish(const TrajectoryResult& result);
 
 private:
@@ -105,6 +90,7 @@ private:
 
     Kernel kernel_;
     std::size_t parts_;  // of its numbers
+    bool is_finer_;      // than those of the run
     TrajectoryRequest request_;
     std::vector<int> groups_;
     int rows_a_step_;

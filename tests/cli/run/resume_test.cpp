@@ -173,16 +173,21 @@ struct Interrupted {
     std::string scene = folder / "scene.toml";
     Finished ended;
 
-    Interrupted() {
+    explicit Interrupted(const std::vector<std::string>& options = {}) {
         std::string text = subjects[0].text;
         text.replace(text.find("200000"), 6, "600000");
         write_text(scene, text);
         const std::string err = folder / "err";
+        std::vector<std::string> words{LOBATTO_PROGRAM, "run", scene, "-o", out};
+        words.insert(words.end(), options.begin(), options.end());
+        std::vector<char*> arguments;
+        for (std::string& word : words) arguments.push_back(word.data());
+        arguments.push_back(nullptr);
         const pid_t pid = ::fork();
         if (pid == 0) {
             ::dup2(::open("/dev/null", O_WRONLY), 1);
             ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT, 0600), 2);
-            ::execl(LOBATTO_PROGRAM, LOBATTO_PROGRAM, "run", scene.c_str(), "-o", out.c_str(), nullptr);
+            ::execv(LOBATTO_PROGRAM, arguments.data());
             ::_exit(127);
         }
         for (int tries = 0; tries < 6000; ++tries) {
@@ -231,6 +236,14 @@ TEST_CASE("an interrupted run keeps its file under its name, and goes on from th
     CHECK(read_file(stopped.out) == read_file(stopped.folder / "whole.csv"));
     CHECK(read_file(stopped.folder / "run.events.csv") == read_file(stopped.folder / "whole.events.csv"));
     CHECK(report_of(done.out) == report_of(whole.out));
+}
+
+TEST_CASE("a run whose beginning was not measured goes on without a measured error, and says so") {
+    const Interrupted stopped({"--unmeasured"});
+    const Finished done = stopped.resume();
+    CHECK(done.exit_code == 0);
+    CHECK(contains(done.err, "the error is not measured, because an earlier part of the run had no companion"));
+    CHECK(!contains(done.out, "measured error"));
 }
 
 TEST_CASE("with nothing left to resume a run starts again, and says so") {
