@@ -20,7 +20,7 @@ struct pendulum {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "0c137ae9d1bc4305";
+    static constexpr const char* digest = "8e331e69d8b61b41";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -48,7 +48,6 @@ struct pendulum {
     static constexpr int group_count = 1;       // groups of coupled coordinates
     static constexpr int group_first[2] = {0, 1};
     static constexpr int group_bandwidth[1] = {0};
-    static constexpr bool has_remainder = false;  // forces have no function without a part
     static constexpr bool uses_hessian = true;  // forces are evaluated less often for having second derivatives
 
     // nodes on [0, 1]: 0; 1/2 - sqrt(5)/10; sqrt(5)/10 + 1/2; 1

@@ -51,7 +51,7 @@ Kernel compile(const Scene& scene, const Settings& settings) {
         const KernelSource source = derived_kernel(changed, {}).source;
         const Overrides overrides = overrides_of(settings);
         apply(overrides, changed);
-        if (!overrides.set.empty()) check_domains(changed);
+        if (!overrides.set.empty()) check_values(changed);
         const Steps steps = steps_of(changed, overrides);
         const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
         LoadedStepper<double> stepper(kernel);

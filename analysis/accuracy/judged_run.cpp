@@ -129,7 +129,7 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
     if (companion) in_finer = source_in(companion->numbers, *companion);
     const std::chrono::duration<double> derivation_time = std::chrono::steady_clock::now() - start;
     apply(overrides, scene);  // after the derivation: one kernel serves all values
-    if (!overrides.set.empty()) check_domains(scene);
+    if (!overrides.set.empty()) check_values(scene);
     const Steps steps = steps_of(scene, overrides);
     Compiled compiled;
     const Kernel kernel = kernel_of(derived.source, numbers, &compiled);

@@ -29,7 +29,7 @@ public:
     CsvStarts(const std::string& text, StartTable& table) : text_(text), table_(table) {}
 
     void read() {
-        std::size_t begin = 0;
+        std::size_t begin = text_.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // byte order mark
         while (begin < text_.size()) {
             ++line_;
             const std::size_t end = std::min(text_.find('\n', begin), text_.size());

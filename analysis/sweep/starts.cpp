@@ -157,6 +157,14 @@ void SweepStarts::find_dependents() {
         exact_base_.parameters.push_back(scene_.evaluate(parameter.value, "the parameter " + parameter.name));
         base_.parameters.push_back(exact_base_.parameters.back().to_double());
     }
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : scene_.parameters) symbols.push_back(parameter.symbol);
+    for (const Requirement& requirement : scene_.requirements)
+        if (std::any_of(columns_.begin(), columns_.end(), [&](const Column& column) {
+                return column.of.role == Role::parameter && requirement.value.has(symbols[column.of.index]);
+            }))
+            if (std::optional<Tape> value = Tape::of(requirement.value, symbols))
+                required_.push_back({std::move(*value), requirement.may_vanish});
     const auto put = [&](Role role, std::size_t k, const GiNaC::ex& value, const std::string& what,
                          std::vector<double>& numbers, std::vector<GiNaC::numeric>& exact_numbers) {
         bool depends = false;
@@ -231,6 +239,11 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
                                        : name.role == Role::position ? start.q
                                                                      : start.rate;
         numbers[name.index] = value(trajectory, c);
+    }
+    for (const Required& required : required_) {
+        const double margin = required.value(start.parameters);
+        if (!(required.may_vanish ? margin >= 0 : margin > 0))
+            start.q.front() = std::numeric_limits<double>::quiet_NaN();  // refused as what has no value
     }
     if (dependents_.empty() && !assembled_ && parts_ == 1) return;
     const std::lock_guard lock(*algebra_);

@@ -14,6 +14,7 @@
 #include "analysis/sweep/axis.hpp"
 #include "analysis/sweep/draw.hpp"
 #include "analysis/sweep/start_table.hpp"
+#include "analysis/tape.hpp"
 #include "generator/mechanics/system/system.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/run/ensemble/ensemble.hpp"
@@ -55,7 +56,8 @@ public:
     // The scene with the settings of this trajectory.
     Scene with_settings(Scene scene, std::int64_t trajectory) const;
     // Parameters, positions and rates of a trajectory; formulas of the scene that hold a varied parameter follow it.
-    // What has no value is not a number. Thread-safe.
+    // What has no value is not a number, nor is the first position where a parameter has a value that the scene
+    // refuses. Thread-safe.
     void start(std::int64_t trajectory, EnsembleStart& start) const;
 
     // "q = 0.5, omega = 2", or the settings among them
@@ -79,6 +81,11 @@ private:
     struct Dependent {
         bool position;
         std::size_t coordinate;
+    };
+    // What the values of parameters must keep (Requirement), of those that vary.
+    struct Required {
+        Tape value;
+        bool may_vanish;
     };
     // A start to all digits; what is varied, or follows from it, is replaced.
     struct Exact {
@@ -105,6 +112,7 @@ private:
     Exact exact_base_;
     std::size_t parts_ = 1;  // doubles of which a number is the sum
     std::vector<Dependent> dependents_;
+    std::vector<Required> required_;
     std::optional<System> assembled_;  // of a scene whose starts are moved onto its constraints
     mutable std::recursive_mutex own_;
     std::recursive_mutex* algebra_;

@@ -160,7 +160,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     const bool is_double = method.numbers == Precision::double_;
     Derived& known = derived_[{static_cast<int>(method.family), method.points}];
     if (!known.outline) {
-        if (number == 0 && !options_.overrides.set.empty()) check_domains(scene_);
+        if (number == 0 && !options_.overrides.set.empty()) check_values(scene_);
         // Steps and values are the kernel's arguments: the scene is derived as it was written.
         Scene scene = starts_->with_settings(as_written_, first);
         if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;

@@ -24,6 +24,11 @@ std::string number_complaint(const std::string& number) {
 
 namespace {
 
+// An empty word, as "$STEP" is where STEP is not set, must not mean that the option was not given.
+std::string empty_complaint(const std::string& word) {
+    return word.empty() ? "the value is empty; give one, or leave the option out" : "";
+}
+
 // What is wrong with a whole number for an Integer: 1e16, 2.5, or one with too many digits.
 template <class Integer>
 std::string whole_number_complaint(const std::string& number) {
@@ -143,7 +148,9 @@ Option& Option::checked_by(std::function<std::string(const std::string&)> compla
 }
 
 Option Command::option(const std::string& name, std::string& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help));
+    Option option(app_->add_option(name, target, help));
+    if (name.starts_with('-')) option.checked_by(empty_complaint);  // names of scenes have an error of their own
+    return option;
 }
 
 Option Command::option(const std::string& name, std::vector<std::string>& target, const std::string& help) {

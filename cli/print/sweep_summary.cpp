@@ -39,7 +39,9 @@ void print_settings(const SweepStudy& study, const SweepTally& tally) {
     for (std::size_t number = 0; number < std::min(count, settings_told); ++number) {
         const SettingTally& setting = tally.settings()[number];
         if (setting.trajectories == 0) continue;
-        std::string text = counted(setting.steps_done, "step", "steps");
+        // With a clock trajectories are counted by the times at which they are looked at.
+        std::string text = study.scene().clock ? counted(setting.steps_done, "state", "states")
+                                               : counted(setting.steps_done, "step", "steps");
         if (setting.failed > 0) text += fmt::format(", {} of {} failed", setting.failed, setting.trajectories);
         if (study.scene().outputs.energy && setting.energy_error.index >= 0)
             text += fmt::format(", energy error {:.2g} at most", setting.energy_error.value);

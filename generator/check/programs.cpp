@@ -210,15 +210,6 @@ private:
         }
         machine_.run("minus_acceleration");
         compare(claim, gradient, times(mass_, machine_.get("W", n_)), force_size_);
-        if (machine_.has("remainder")) {  // W = R + D q
-            machine_.run("quadratic_part");
-            machine_.run("remainder");
-            Numbers W = machine_.get("R", n_);
-            const Numbers D = machine_.get("S0", places.size()), q = values_of(system_.q);
-            for (std::size_t e = 0; e < places.size(); ++e)
-                W[static_cast<std::size_t>(places[e].first)] += D[e] * q[static_cast<std::size_t>(places[e].second)];
-            compare(claim, gradient, times(mass_, W), force_size_);
-        }
     }
     GiNaC::matrix derivatives(const std::vector<ex>& vector, const std::vector<GiNaC::symbol>& symbols) const {
         return derivative_of(vector, symbols).dense();

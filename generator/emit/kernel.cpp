@@ -112,17 +112,13 @@ private:
         const std::string name = declaration.program;
         if (name == "stage") return takes_angles(declaration);
         return d_.structure.form() == Form::separable && !d_.structure.looped &&
-               (name == "node" || name == "minus_acceleration" || name == "remainder") &&
-               optimised_.cost_of_node <= 200;
+               (name == "node" || name == "minus_acceleration") && optimised_.cost_of_node <= 200;
     }
 
     std::string costs() const {
         if (d_.structure.form() != Form::separable) return "";
-        const bool uses_hessian = optimised_.uses_hessian, remainder = optimised_.has_remainder;
-        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool has_remainder = {};", remainder),
-                           remainder ? "forces without the part in the stage map are a function of their own"
-                                     : "forces have no function without a part") +
-               fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool uses_hessian = {};", uses_hessian),
+        const bool uses_hessian = optimised_.uses_hessian;
+        return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool uses_hessian = {};", uses_hessian),
                            uses_hessian ? "forces are evaluated less often for having second derivatives"
                                         : "second derivatives would cost more than the evaluations they save");
     }
@@ -336,7 +332,6 @@ private:
     std::string body(const Declaration& declaration) const {
         const std::string name = declaration.program;
         if (d_.structure.looped && name != "event" && name != "impact" && name != "reset") return looped_.body(name);
-        if (name == "remainder" && !optimised_.has_remainder) return "";
         const auto program =
             std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
         if (program == p_.programs.end()) return "";

@@ -214,7 +214,8 @@ Programs group_by_phase(const Programs& programs) {
         for (const Id operand : node.operands)
             if (before[operand].phase <= Phase::step_size) early.push_back(operand);
         const bool minus = node.op == Op::multiply && node.phase > Phase::step_size &&
-                           graph.is_negative(operands.front()) && !named.contains(early);
+                           graph.is_constant(operands.front()) && graph.is_negative(operands.front()) &&
+                           !named.contains(early);
         if (minus) {
             operands.front() = graph.constant(-graph.constant_of(operands.front()).value,
                                               positive_label(graph.constant_of(operands.front())));

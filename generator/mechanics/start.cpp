@@ -439,7 +439,13 @@ StartOnConstraints start_on_constraints(const Scene& scene, const System& system
     return check.found();
 }
 
-void check_domains(const Scene& scene) {
+void check_values(const Scene& scene) {
+    for (const Requirement& required : scene.requirements) {
+        const GiNaC::numeric value = scene.evaluate(required.value, "what a value must keep");
+        if (required.may_vanish ? value.is_negative() : !value.is_positive())
+            scene.source.fail(required.at, required.complaint);
+    }
+    require_start_before_walls(scene);
     const Scene in_time = in_clock_time(scene);
     System system = undifferentiated(in_time);
     system.formulas = std::make_shared<const Formulas>();

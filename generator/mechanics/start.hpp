@@ -18,7 +18,9 @@ struct StartOnConstraints {
 };
 StartOnConstraints start_on_constraints(const Scene& scene, const System& system);
 
-// That part of it which formulas cannot tell after they were simplified, for values set since: sqrt(a)^2 with a < 0.
-void check_domains(const Scene& scene);
+// Of values set since the scene was read: what formulas cannot tell after they were simplified (sqrt(a)^2 with a < 0),
+// what masses, lengths and restitutions must keep, and that the start is on the right side of the walls. Else
+// InputError.
+void check_values(const Scene& scene);
 
 }  // namespace lobatto

@@ -125,27 +125,15 @@ bool hessian_pays(const Programs& programs, const Structure& structure) {
     return with_slopes + 5 * static_cast<double>(structure.constant_mass().entries.size()) <= 2 * evaluation;
 }
 
-// Whether fixed-point iterations are solved by accelerations alone, without what is taken into the stage map. Passes
-// change costs; a program that was left out before them stays out.
-bool takes_remainder(const Programs& programs, const Structure& structure) {
-    const bool is_there = std::any_of(programs.programs.begin(), programs.programs.end(),
-                                      [](const Program& program) { return program.name == "remainder"; });
-    return is_there && !structure.looped && !structure.is_explicit() && !structure.clean() &&
-           !hessian_pays(programs, structure);
-}
-
 }  // namespace
 
 OptimisedPrograms optimised_programs(const Derivation& derivation) {
     const Structure& structure = derivation.structure;
     OptimisedPrograms result;
     result.programs = build_programs(derivation);
-    if (!takes_remainder(result.programs, structure))
-        std::erase_if(result.programs.programs, [](const Program& program) { return program.name == "remainder"; });
     result.report = optimise(result.programs);
     result.cost_of_node = cost_of(result.programs, structure, "node", LoopPart::Of::node);
     result.uses_hessian = hessian_pays(result.programs, structure);
-    result.has_remainder = takes_remainder(result.programs, structure);
     return result;
 }
 

@@ -22,7 +22,6 @@ struct OptimisedPrograms {
     std::vector<PassReport> report;  // first row: as derived
     double cost_of_node = 0;         // in additions, about
     bool uses_hessian = false;       // second derivatives save more evaluations than they cost
-    bool has_remainder = false;      // forces are evaluated without the part that the stage map takes
 };
 OptimisedPrograms optimised_programs(const Derivation& derivation);
 

@@ -59,9 +59,8 @@ public:
         mechanics();
         if (d_.structure.form() == Form::linear_map) {
             if (n_ == 1) propagation_of_one();
-        } else {
-            if (d_.structure.diagonal_part() || d_.structure.absorbed()) quadratic_part();
-            if (d_.structure.diagonal_part()) remainder();
+        } else if (d_.structure.diagonal_part() || d_.structure.absorbed()) {
+            quadratic_part();
         }
         velocities_as_inputs();
         events();
@@ -125,22 +124,6 @@ private:
         for (std::size_t e = 0; e < d_.structure.constant_mass().entries.size(); ++e)
             values.push_back(stiffness(e, d_.structure.separable().constant_hessian));
         program("quadratic_part", "S0", values);
-    }
-
-    // What V leaves without its quadratic part: W - D q without what cancels in it.
-    void remainder() {
-        std::vector<GiNaC::ex> gradient = d_.system.gradient;
-        for (const auto& [place, value] : d_.structure.separable().constant_hessian.entries())
-            gradient[static_cast<std::size_t>(place.first)] -=
-                value * d_.system.q[static_cast<std::size_t>(place.second)];
-        // Expanded where that leaves fewer terms: then some cancelled.
-        const auto terms = [](const GiNaC::ex& e) { return GiNaC::is_a<GiNaC::add>(e) ? e.nops() : 1; };
-        Ids rest;
-        for (const GiNaC::ex& one : gradient) {
-            const GiNaC::ex open = expanded(one);
-            rest.push_back(convert(terms(open) < terms(one) ? open : one));
-        }
-        program("remainder", "R", times(inverse_mass_, rest));
     }
 
     // (D20): the paper's Phi for one coordinate, the shift for a constant force.

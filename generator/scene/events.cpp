@@ -107,6 +107,9 @@ void SystemReader::read_impact(const Entry& entry) {
                      fmt::format("the restitution is {:.6g}; it is the part of the normal velocity that an impact "
                                  "gives back, 0 to 1",
                                  e.to_double()));
+            for (const GiNaC::ex& margin : {impact.restitution, 1 - impact.restitution})
+                require(margin, true, fmt::format("the restitution of {} is not within 0 to 1", impact.written),
+                        restitution->value.at);
         }
         if (reset != nullptr) read_reset(*reset, impact, scope, indices);
         scene_.impacts.push_back(impact);

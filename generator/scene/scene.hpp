@@ -123,6 +123,15 @@ struct Eliminated {
     GiNaC::ex initial_position, initial_velocity;  // as the scene has them, in parameters
 };
 
+// What values that are given later must keep, as those of the scene do: a number in parameters that is above 0, or not
+// below it.
+struct Requirement {
+    GiNaC::ex value;
+    bool may_vanish = false;
+    std::string complaint;  // where it does not hold
+    Position at;
+};
+
 // A wall: the motion is on the one side of it where `when` has not happened, and is thrown back when it meets it
 // (generator/mechanics/constraints/impacts.hpp).
 struct Impact {
@@ -196,6 +205,7 @@ struct Scene {
     std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
     std::vector<TableUse> tables;             // measured values in any formula
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
+    std::vector<Requirement> requirements;    // of masses, inertia, lengths, restitutions
     Method method;
     std::optional<Clock> clock;
     Run run;

@@ -17,6 +17,8 @@
 
 namespace lobatto {
 
+GiNaC::exset symbols_of(const GiNaC::ex& expression);
+
 class SystemReader {
 public:
     // All three outlive the reader.
@@ -59,6 +61,10 @@ private:
     class Bodies;
 
     [[noreturn]] void fail(Position at, const std::string& message) const { source_.fail(at, message); }
+    // Of a value that the scene keeps: other values of its parameters must keep it, too.
+    void require(const GiNaC::ex& value, bool may_vanish, const std::string& complaint, Position at) {
+        if (!symbols_of(value).empty()) scene_.requirements.push_back({value, may_vanish, complaint, at});
+    }
 
     void read_time();
     void read_parameters();
@@ -120,6 +126,5 @@ constexpr std::size_t longest_unit = 40;
 std::string collapsed(const std::string& formula);
 // A key with brackets, "x[i]", stands in quotes, which are not a part of it.
 Text text_of_key(const Entry& entry);
-GiNaC::exset symbols_of(const GiNaC::ex& expression);
 
 }  // namespace lobatto

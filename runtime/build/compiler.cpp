@@ -85,6 +85,13 @@ Compiler find_compiler(bool quadruple) {
         }
         compiler.words[0] = *program;
     }
+    for (const char* inexact : {"-ffast-math", "-funsafe-math-optimizations", "-ffinite-math-only",
+                                "-fassociative-math", "-freciprocal-math"})
+        if (std::find(compiler.words.begin(), compiler.words.end(), inexact) != compiler.words.end())
+            throw MachineError(
+                fmt::format("the environment variable CXX asks for {}, which changes the results of "
+                            "kernels; leave it out",
+                            inexact));
     for (const std::string& word : compiler.words) {
         const auto program = word[0] == '-' ? std::nullopt : find_program(word);
         if (!program) {
@@ -107,12 +114,11 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     std::vector<std::string> arguments = compiler.words;
     // -ffp-contract=off: products and sums are fused where the text says so (`fused`), nowhere else; so g++ and clang++
     // give the same bits on one kind of processor, and the error-free sums of a kernel keep their proof (adr/0002).
-    // -ffast-math is never among the flags: it would let the compiler simplify x - x, and so the checks for finite
-    // numbers, away.
-    // -fpeel-loops: loops over the nodes and coordinates of small systems are written out, as with -O3, which takes
-    // half as long again. clang++ does so anyway. The general form (steppers/general.hpp) compiles in a sixth less
-    // time, to the same speed, where only loops of up to 60 instructions are, not 200.
-    // A level of optimisation among the words of CXX takes the place of these; not -Ofast, which is -ffast-math.
+    // -ffast-math is never among the flags, and refused in CXX: it would let the compiler simplify x - x, and so the
+    // checks for finite numbers, away. -fpeel-loops: loops over the nodes and coordinates of small systems are written
+    // out, as with -O3, which takes half as long again. clang++ does so anyway. The general form (steppers/general.hpp)
+    // compiles in a sixth less time, to the same speed, where only loops of up to 60 instructions are, not 200. A level
+    // of optimisation among the words of CXX takes the place of these; not -Ofast, which is -ffast-math.
     const bool has_level = std::any_of(arguments.begin(), arguments.end(), [](const std::string& word) {
         return word.starts_with("-O") && word != "-Ofast";
     });

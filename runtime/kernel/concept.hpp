@@ -103,7 +103,6 @@ concept SeparableKernel = KernelOfAnyForm<K> && K::form == Form::separable &&
     { K::absorbed } -> std::convertible_to<bool>;
     { K::diagonal_part } -> std::convertible_to<bool>;
     { K::uses_hessian } -> std::convertible_to<bool>;
-    { K::has_remainder } -> std::convertible_to<bool>;
     { K::entries } -> std::convertible_to<int>;
     K::entry_row[0];
     K::entry_column[0];

@@ -73,7 +73,7 @@ public:
         this->start_time = number(call.start_time);
         Status status = known_status_;
         if (status == Status::ok) status = single.start(this->start_time, q, p);
-        if (status == Status::ok) motion.start(single, p, 0);
+        if (status == Status::ok) motion.start(single, 0);
         motion.set_tolerance(tolerance);
         call.status[index] = static_cast<std::int32_t>(status);
         call.steps[index] = call.iterations[index] = 0;

@@ -302,7 +302,6 @@ struct Export {
             Sides<K>::take(local, *in(time), in(q), in(p));
             return use(local);
         } else {
-            (void)time, (void)q, (void)p;
             return use(of(stepper));
         }
     }

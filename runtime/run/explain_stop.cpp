@@ -26,8 +26,8 @@ Reason off_constraints(bool on_the_way) {
     if (on_the_way)
         return {"the reset of an impact leads to positions or momenta that do not keep the constraints",
                 "a reset that keeps them, or a restitution, which does"};
-    return {"the start does not keep the constraints: its positions or its momenta are off",
-            "positions and velocities that keep them, or assemble = true under [run] of the scene"};
+    return {"the start does not keep the constraints, or is behind a wall",
+            "positions and velocities that keep them, or assemble = true under [run] of a scene with constraints"};
 }
 
 // `smaller`: the advice of a smaller step; `more`: what else to try.
@@ -95,7 +95,9 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             break;
         case LOBATTO_TIME_STANDS_STILL:
             if (request.arrivals.interval != 0) {
-                why = "the clock is not above 0 along the step, or so small that time stands still";
+                why =
+                    "the clock comes to 0 along the step, or so near to it that time stands still or the energy is "
+                    "lost";
                 advice = "a clock that is positive wherever the motion goes";
                 break;
             }

@@ -298,6 +298,45 @@ TEST_CASE("a clock that does not stay positive ends the run, and says so") {
     for (const auto& row : rows) CHECK(std::fabs(row[1] - std::cos(row[0])) < 1e-6);  // what was computed is right
 }
 
+TEST_CASE("a motion that rounding or the step would throw back where the clock is 0 ends there, alone and in a sweep") {
+    // x = cos t comes to every one of these places, however the steps are.
+    const auto text = [](const std::string& clock, double step) {
+        return fmt::format(
+            "lagrangian = \"x'^2/2 + y'^2/2 - x^2/2 - 2*b*y^2\"\n[coordinates]\nx = {{ position = 1, velocity = 0 }}\n"
+            "y = {{ position = 0.3, velocity = 0.4 }}\n[parameters]\nb = 0.5\n[method]\npoints = 5\n"
+            "clock = \"{}\"\n[run]\nstep = {}\nuntil = 20\n",
+            clock, step);
+    };
+    const test::TemporaryFolder folder;
+    const auto finished = [&](const std::string& clock, double step) {
+        test::write_text(folder / "scene.toml", text(clock, step));
+        return test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
+    };
+    for (const std::string clock : {"x + b", "x + 0.999", "log(x + 1.5)", "y", "x^2"})
+        for (const double step : {0.1, 0.31}) {
+            const test::Finished ended = finished(clock, step);
+            INFO(clock << ", " << step << ": " << ended.err);
+            CHECK(ended.exit_code == 3);
+            CHECK(ended.err.find("the clock comes to 0 along the step, or so near to it that time stands still or the "
+                                 "energy is lost") != std::string::npos);
+            double worst = 0;  // what was computed is right
+            for (const auto& row : read_trajectory(folder / "run.csv").rows)
+                worst = std::fmax(worst, std::fabs(row[1] - std::cos(row[0])));
+            CHECK(worst < 1e-4);
+        }
+    // Clocks that become small, and stay above 0.
+    for (const std::string clock : {"x^2 + 1e-6", "x + 1.001"}) {
+        INFO(clock);
+        CHECK(finished(clock, 0.1).exit_code == 0);
+        CHECK(std::fabs(read_trajectory(folder / "run.csv").rows.back()[1] - std::cos(20)) < 1e-4);
+    }
+    test::write_text(folder / "scene.toml", text("x + b", 0.1));
+    const test::Finished swept = test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary",
+                                            "b=2,0.5,1.5,0.9", "-o", folder / "table.csv", "--quiet"});
+    CHECK(swept.exit_code == 3);
+    CHECK(swept.err.find("2 of 4 trajectories failed: 2 t + h equals t or the clock is 0.") != std::string::npos);
+}
+
 TEST_CASE("an automatic clock follows the poles of the Lagrangian") {
     const auto clock_of = [](const std::string& lagrangian) {
         const Scene scene =

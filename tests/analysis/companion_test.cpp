@@ -186,6 +186,8 @@ TEST_CASE("what a pulse between the nodes does is measured") {
                            Row{"q'^2/2 - q^2/2 + q*exp(-sin(t)^2/1e-4)", 0.001},
                            Row{"q'^2/2 - q^2/2 + 100*q*exp(-((t - 5.03)/0.001)^4)", 0.0005},
                            Row{"q'^2/2 - q^2/2 + 100*q*exp(-((t - 5.03 - q/100)/0.001)^2)", 0.0005},
+                           Row{"q'^2/2 - q^2/2 + q*if((t - 5.031)^2 < 1e-6, 100, 0)", 0.0005},
+                           Row{"q'^2/2 - q^2/2 + q*if(sin(t/2) > 0.999999, 100, 0)", 0.0005},
                            Row{"q'^2/2 - q^2/2 + 100*sin(q)*exp(-((t - 5.03)/0.001)^2*(1 + q^2))", 0.0005}}) {
         CAPTURE(row.lagrangian);
         const Place coarse(scene_of(row.lagrangian, swinging, four, 0.1, 10)),
@@ -198,6 +200,41 @@ TEST_CASE("what a pulse between the nodes does is measured") {
         // Within 2.3 %, the rounding of two digits included. With order 6 in place of 2 Lobatto 2 errs by 29 %.
         CHECK(absolute_error(done.out) > error * 0.9);
         CHECK(absolute_error(done.out) < error * 1.1);
+    }
+}
+
+TEST_CASE("what a blow in measured values does is measured, in the time and along the motion") {
+    // Knots at every 0.1, and close to the blow at every 0.0002: steps fall beside it.
+    const auto table = [](double middle) {
+        std::string text;
+        for (int i = -20; i <= 130; ++i) {
+            const double x = i / 10.0;
+            const bool is_near = std::fabs(x - middle) < 0.05;
+            for (int j = is_near ? -40 : 0; j <= (is_near ? 40 : 0); ++j) {
+                const double at = is_near ? middle + j * 0.0002 : x, u = (at - middle) / 0.001;
+                text += fmt::format("{:.17g}, {:.17g}\n", at, std::exp(-u * u));
+            }
+        }
+        return text;
+    };
+    struct Row {
+        std::string lagrangian;
+        double middle, fine;
+    };
+    for (const Row& row : {Row{"q'^2/2 - q^2/2 + 100*q*table(\\\"blow.csv\\\", t)", 3.301, 0.0005},
+                           Row{"q'^2/2 - q^2/2 + 0.1*table(\\\"blow.csv\\\", q)", 0.503, 0.00002}}) {
+        CAPTURE(row.lagrangian);
+        const Place coarse(scene_of(row.lagrangian, swinging, "points = 8", 0.1, 10)),
+            fine(scene_of(row.lagrangian, swinging, "points = 8", row.fine, 10));
+        for (const Place* place : {&coarse, &fine}) test::write_text(place->folder / "blow.csv", table(row.middle));
+        const test::Finished done = coarse.run({"--beyond-horizon"});
+        INFO(done.out << done.err);
+        REQUIRE(done.exit_code == 0);
+        REQUIRE(fine.run({"--every", "100", "--unmeasured"}).exit_code == 0);
+        const double error = std::fabs(coarse.end()[1] - fine.end()[1]);
+        CHECK(error > 1e-5);
+        CHECK(absolute_error(done.out) > error / 2);  // without looking at the table: 1e-14
+        CHECK(absolute_error(done.out) < error * 2);
     }
 }
 

@@ -149,8 +149,8 @@ TEST_CASE("starts of eliminated coordinates agree with their equations, or are l
         apply({{"l=2"}, "", "", std::nullopt}, scene);
         return scene;
     };
-    CHECK_NOTHROW(check_domains(with_length("{}")));
-    CHECK_THROWS_WITH_AS(check_domains(with_length("{ position = 1, velocity = 0 }")),
+    CHECK_NOTHROW(check_values(with_length("{}")));
+    CHECK_THROWS_WITH_AS(check_values(with_length("{ position = 1, velocity = 0 }")),
                          doctest::Contains("the position of y is 1, but the other coordinates ask for 2"), InputError);
     // One that stays may be left out too.
     std::string heavy = head;

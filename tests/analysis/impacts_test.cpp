@@ -15,6 +15,7 @@
 #include "generator/pipeline.hpp"
 #include "generator/programs/programs.hpp"
 #include "runtime/run/trajectory.hpp"
+#include "tests/support.hpp"
 
 using namespace lobatto;
 
@@ -223,6 +224,48 @@ TEST_CASE("walls that are met at once act one after another: a corner, and Newto
                  outer = 2 - std::cos(cradle.result.q[0]) - std::cos(cradle.result.q[4]) +
                          (std::pow(cradle.result.p[0], 2) + std::pow(cradle.result.p[4], 2)) / 2;
     CHECK(std::fabs(outer - energy) < 1e-12);
+}
+
+TEST_CASE("values that are set later must keep what those of the scene do") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "ball.toml",
+                     "lagrangian = \"y'^2/2 - 2*y\"\n[parameters]\ne = 1\nfloor_height = 0\n[coordinates]\n"
+                     "y = { position = 1, velocity = 0 }\n[impacts]\n"
+                     "floor = { when = \"y = floor_height falling\", restitution = \"e\" }\n"
+                     "[run]\nstep = 0.1\nuntil = 3\n");
+    test::write_text(folder / "top.toml",
+                     "[bodies]\ntop = { mass = \"m\", inertia = [\"A\", 0.2, 0.15], velocity = [0, 0, 0], "
+                     "angular_velocity = [0.1, 2, 0.1] }\n[parameters]\nm = 1\nA = 0.2\n[run]\nstep = 0.1\n"
+                     "until = 1\n");
+    struct Row {
+        const char *scene, *set, *complaint;  // no complaint: accepted
+    };
+    for (const Row& row :
+         {Row{"ball.toml", "e=1.5", ":8:60: the restitution of floor is not within 0 to 1"},
+          Row{"ball.toml", "e=-0.1", ":8:60: the restitution of floor is not within 0 to 1"},
+          Row{"ball.toml", "e=0.9", nullptr},
+          Row{"ball.toml", "floor_height=1.5", ":8:18: the start is behind the wall floor"},
+          Row{"top.toml", "m=-1", ":2:16: the mass of top is not positive"},
+          Row{"top.toml", "A=-0.1", ":2:31: the inertia of top is not positive"},
+          Row{"top.toml", "A=0.36", ":2:31: no body has the inertia of top"}, Row{"top.toml", "A=0.35", nullptr}}) {
+        CAPTURE(row.set);
+        const test::Finished done = test::run(
+            {LOBATTO_PROGRAM, "run", folder / row.scene, "--set", row.set, "-o", folder / "run.csv", "--quiet"});
+        INFO(done.err);
+        CHECK(done.exit_code == (row.complaint == nullptr ? 0 : 2));
+        if (row.complaint != nullptr) CHECK(done.err.find(row.complaint) != std::string::npos);
+    }
+    // Of a sweep such trajectories fail, each by itself.
+    const auto failed = [&](const std::string& scene, const std::string& vary) {
+        return test::run(
+                   {LOBATTO_PROGRAM, "sweep", folder / scene, "--vary", vary, "-o", folder / "table.csv", "--quiet"})
+            .err;
+    };
+    CHECK(failed("ball.toml", "e=0.9,1.5,1").find("trajectory 1, e = 1.5: not finite") != std::string::npos);
+    CHECK(failed("ball.toml", "floor_height=0,1.5")
+              .find("trajectory 1, floor_height = 1.5: start off the constraints or behind a wall") !=
+          std::string::npos);
+    CHECK(failed("top.toml", "A=0.1,-1,0.36").find("2 of 3 trajectories failed: 2 not finite.") != std::string::npos);
 }
 
 TEST_CASE("impacts that accumulate end the run, with the state before that step") {

@@ -29,7 +29,6 @@ struct HandwrittenPendulum {
     static constexpr bool autonomous = true, linear = false, has_energy = true, has_tangent = true, absorbed = false;
     static constexpr bool any_number = false, diagonal_part = false, clean = false, is_explicit = false,
                           uses_hessian = true;
-    static constexpr bool has_remainder = false;
     static constexpr int events = 0, angles = 0;
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr const char* name = "handwritten_pendulum";

@@ -16,7 +16,7 @@ constexpr number square_root(number x) {
 
 // Nodes and weights; `kappa`: Lobatto's, whose momenta of cyclic coordinates vary within a step.
 template <class number, int r, int m, bool kappa>
-struct GalerkinTables {
+struct GalerkinValues {
     number c[r]{}, b[r]{}, control[m + 1]{};
     number B[r * (m + 1)]{}, D[r * (m + 1)]{}, extrapolation[(m + 1) * (m + 1)]{}, legendre_polynomial[r]{};
 
@@ -38,8 +38,8 @@ struct GalerkinTables {
 };
 
 template <class number>
-constexpr GalerkinTables<number, 4, 3, true> lobatto_four() {
-    GalerkinTables<number, 4, 3, true> t{};
+constexpr GalerkinValues<number, 4, 3, true> lobatto_four() {
+    GalerkinValues<number, 4, 3, true> t{};
     const number inner = (1 - 1 / square_root(number(5))) / 2;
     const number c[4] = {0, inner, 1 - inner, 1},
                  b[4] = {number(1) / 12, number(5) / 12, number(5) / 12, number(1) / 12};
@@ -53,8 +53,8 @@ constexpr GalerkinTables<number, 4, 3, true> lobatto_four() {
 }
 
 template <class number>
-constexpr GalerkinTables<number, 2, 2, false> gauss_two() {
-    GalerkinTables<number, 2, 2, false> t{};
+constexpr GalerkinValues<number, 2, 2, false> gauss_two() {
+    GalerkinValues<number, 2, 2, false> t{};
     const number shift = 1 / square_root(number(12));
     t.c[0] = number(1) / 2 - shift;
     t.c[1] = number(1) / 2 + shift;
@@ -73,14 +73,14 @@ struct StaticTables {
                                   *legendre_polynomial = values.legendre_polynomial;
 };
 template <class number>
-constexpr GalerkinTables<number, 4, 3, true> lobatto_four_values = lobatto_four<number>();
+constexpr GalerkinValues<number, 4, 3, true> lobatto_four_values = lobatto_four<number>();
 template <class number>
-constexpr GalerkinTables<number, 2, 2, false> gauss_two_values = gauss_two<number>();
+constexpr GalerkinValues<number, 2, 2, false> gauss_two_values = gauss_two<number>();
 
 template <class number>
-using LobattoFour = StaticTables<number, GalerkinTables<number, 4, 3, true>, lobatto_four_values<number>, 4, 3, 6>;
+using LobattoFour = StaticTables<number, GalerkinValues<number, 4, 3, true>, lobatto_four_values<number>, 4, 3, 6>;
 template <class number>
-using GaussTwo = StaticTables<number, GalerkinTables<number, 2, 2, false>, gauss_two_values<number>, 2, 2, 4>;
+using GaussTwo = StaticTables<number, GalerkinValues<number, 2, 2, false>, gauss_two_values<number>, 2, 2, 4>;
 
 // The tables of a separable kernel with four points: Lobatto's, or Gauss's two between the ends.
 template <class number>
@@ -140,7 +140,7 @@ struct HandwrittenKernel {
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr const char* method = "by hand";
     static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false,
-                          clean = false, is_explicit = false, uses_hessian = true, has_remainder = false,
+                          clean = false, is_explicit = false, uses_hessian = true,
                           scaled_mass = false;
     static constexpr int events = 0, angles = 0;
 };

@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::size_t most_numbers = 16384;  // of all comparisons together, positions and momenta
 constexpr std::int64_t most_comparisons = 256;
-constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude
+constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude, at least
+constexpr std::int64_t most_at_once = 65536;   // steps or arrivals, before it hears that nobody waits
 constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
 constexpr double noise = 1e-10;                // of what the others move it by in a step: what cancelled forces leave
 constexpr int most_coupled = 16;               // coordinates of which that is looked for
@@ -73,7 +74,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
     request_.arrivals.keeps_chain = false;
     request_.every = request.every;
     request_.tolerance = request.tolerance;
-    pulses_ = find_pulses(outline.system, request.parameters, request.time, time_after(request, request.steps),
+    pulses_ = find_pulses(outline, request.parameters, request.time, time_after(request, request.steps),
                           std::fabs(request.step));
     const std::int64_t comparisons =
         std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
@@ -223,7 +224,7 @@ void Companion::take(Place& place, const Segment& part) {
     const double from = time_after(request_, part.begin), size = request_.step / ratio_of(part);
     const std::vector<double> whole_size =
         is_clocked() ? as_parts({size}, parts_) : times_fraction(request_.whole_step, part.steps, part.taken);
-    const std::int64_t piece = std::max<std::int64_t>(1, request_.steps / amplitude_looks);
+    const std::int64_t piece = std::clamp<std::int64_t>(request_.steps / amplitude_looks, 1, most_at_once);
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;

@@ -125,7 +125,7 @@ bool EnsembleCompanion::has_pulses(const EnsembleStart& start) {
     if (start.parameters == pulse_parameters_ && !start.parameters.empty()) return has_pulses_;
     pulse_parameters_ = start.parameters;
     const double end = request_.time + static_cast<double>(request_.steps) * request_.step;
-    has_pulses_ = !find_pulses(outline_.system, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
+    has_pulses_ = !find_pulses(outline_, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
     return has_pulses_;
 }
 

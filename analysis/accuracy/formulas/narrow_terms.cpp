@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 
+#include "analysis/accuracy/formulas/bends.hpp"
 #include "generator/formula/real.hpp"
 
 namespace lobatto {
@@ -21,9 +22,11 @@ constexpr int most_parts = 20000;  // of a formula that are looked at
 constexpr int places = 8;          // at the way
 constexpr int sections = 40;       // shorter ones
 constexpr double shorter = 0.381966;
-constexpr double smallest = 745;  // exp(-745) is the least number
-constexpr double fine = 0.25;     // of the scale on which a term changes: what it does to the motion may be large
-constexpr double flat = 20;       // tanh(20) is 1
+constexpr double smallest = 745;       // exp(-745) is the least number
+constexpr double fine = 0.25;          // of the scale on which a term changes: what it does to the motion may be large
+constexpr double flat = 20;            // tanh(20) is 1
+constexpr std::size_t most_bends = 4;  // of a table: the sharpest
+constexpr double sharp = 0.02;         // of what the table covers
 
 }  // namespace
 
@@ -44,6 +47,16 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
     };
     static const std::map<std::string, Kind> kinds{{"exp", Kind::peak},  {"tanh", Kind::step}, {"sinh", Kind::step},
                                                    {"cosh", Kind::step}, {"atan", Kind::tail}, {"log", Kind::pole}};
+    // Measured values change at a sharp bend as tanh does where it passes zero.
+    const auto add_table = [&](const ex& table) {
+        const Spline& spline = spline_of(GiNaC::ex_to<GiNaC::numeric>(table.op(0)).to_int());
+        const double span = cln::double_approx(spline.x().back() - spline.x().front());
+        std::vector<Bend> bends = bends_of(spline);
+        bends.resize(std::min(bends.size(), most_bends));
+        for (const Bend& bend : bends)
+            if (bend.width < sharp * span)
+                add(Kind::step, (table.op(2) - GiNaC::numeric(bend.place)) / GiNaC::numeric(bend.width));
+    };
     int parts = 0;
     const auto look_at = [&](const ex& formula) {
         for (auto part = formula.preorder_begin(); part != formula.preorder_end() && parts < most_parts; ++part) {
@@ -52,6 +65,7 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
                 const std::string name = GiNaC::ex_to<GiNaC::function>(*part).get_name();
                 if (const auto kind = kinds.find(name); kind != kinds.end()) add(kind->second, part->op(0));
                 if (is_angle(*part)) add(Kind::pole, GiNaC::pow(part->op(0), 2) + GiNaC::pow(part->op(1), 2));
+                if (is_table_value(*part)) add_table(*part);
                 if (name == "tan") add(Kind::pole, GiNaC::cos(part->op(0)));
                 if (name == "asin" || name == "acos") add(Kind::pole, 1 - GiNaC::pow(part->op(0), 2));
             } else if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::nonnegint)) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Terms of the Lagrangian and of forces that may be narrower than a step along the motion: exp(u), tanh(u), powers of
-// u, where u is smooth and holds the time, positions or velocities. Steps may jump over them and see nothing.
+// u, tables, where u is smooth and holds the time, positions or velocities. Steps may jump over them and see nothing.
 #pragma once
 
 #include <optional>

@@ -10,6 +10,8 @@
 #include <set>
 #include <string>
 
+#include "analysis/accuracy/formulas/bends.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -17,10 +19,10 @@ namespace {
 using GiNaC::ex;
 
 constexpr std::size_t most_pulses = 1000;
-constexpr int rounds = 200;        // of the simultaneous iteration for roots
-constexpr int samples = 8192;      // of what is no polynomial in time
-constexpr double real = 1e-9;      // |Im| of a real root, relative
-constexpr double multiple = 1e-3;  // the same of a multiple one, as rounding splits it
+constexpr int rounds = 200;            // of the simultaneous iteration for roots
+constexpr std::size_t samples = 8192;  // of what is no polynomial in time
+constexpr double real = 1e-9;          // |Im| of a real root, relative
+constexpr double multiple = 1e-3;      // the same of a multiple one, as rounding splits it
 constexpr double tiny = 0x1p-40;
 
 // All roots of c_0 + c_1 x + ... by the iteration of Durand and Kerner.
@@ -61,17 +63,38 @@ public:
         for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
             const bool is_function = GiNaC::is_a<GiNaC::function>(*part);
             if (!is_function && !GiNaC::is_a<GiNaC::power>(*part)) continue;
-            const ex& inner = part->op(0);
+            const bool is_table = is_function && is_table_value(*part);
+            const ex& inner = is_table ? part->op(2) : part->op(0);
             if (!inner.has(t_) || holds_motion(*part) || !known_.insert(*part).second) continue;
             const std::string name = is_function ? GiNaC::ex_to<GiNaC::function>(*part).get_name() : "";
             const bool is_pole = !is_function && GiNaC::is_a<GiNaC::numeric>(part->op(1)) &&
                                  GiNaC::ex_to<GiNaC::numeric>(part->op(1)).is_negative();
             const ex u = inner.subs(values_);
-            if (u.is_polynomial(t_))
+            if (is_table)
+                of_table(spline_of(GiNaC::ex_to<GiNaC::numeric>(part->op(0)).to_int()), u);
+            else if (u.is_polynomial(t_))
                 of_polynomial(u.expand(), name, is_pole);
             else
                 of_samples(u, name, is_pole);
         }
+    }
+
+    // Of a formula that changes sides where u(t) passes zero: two passages that are near each other.
+    void look_at_side(const ex& value) {
+        if (!value.has(t_) || holds_motion(value)) return;
+        const ex u = value.subs(values_);
+        std::vector<double> passages;
+        if (u.is_polynomial(t_)) {
+            for (const auto& root : roots_of(coefficients_of(u.expand())))
+                if (std::fabs(root.imag()) <= real * std::abs(root)) passages.push_back(root.real());
+        } else {
+            const std::vector<double> values = samples_of(u);
+            for (std::size_t i = 1; i < values.size(); ++i)
+                if ((values[i - 1] < 0) != (values[i] < 0)) passages.push_back(time_of_sample(i));
+        }
+        std::sort(passages.begin(), passages.end());
+        for (std::size_t i = 1; i < passages.size() && pulses_.size() < most_pulses; ++i)
+            add((passages[i - 1] + passages[i]) / 2, passages[i] - passages[i - 1]);
     }
 
     std::vector<Pulse> pulses() {
@@ -94,13 +117,20 @@ private:
             pulses_.push_back({time, width});
     }
 
-    void of_polynomial(const ex& u, const std::string& name, bool is_pole) {
+    // Of powers of t; empty: they are no numbers.
+    std::vector<double> coefficients_of(const ex& u) const {
         std::vector<double> c;
         for (int i = 0; i <= u.degree(t_); ++i) {
             const ex value = u.coeff(t_, i).evalf();
-            if (!GiNaC::is_a<GiNaC::numeric>(value)) return;
+            if (!GiNaC::is_a<GiNaC::numeric>(value)) return {};
             c.push_back(GiNaC::ex_to<GiNaC::numeric>(value).to_double());
         }
+        return c;
+    }
+
+    void of_polynomial(const ex& u, const std::string& name, bool is_pole) {
+        const std::vector<double> c = coefficients_of(u);
+        if (c.empty()) return;
         const auto slope = [](const std::vector<double>& of) {
             std::vector<double> result;
             for (std::size_t i = 1; i < of.size(); ++i) result.push_back(static_cast<double>(i) * of[i]);
@@ -131,23 +161,35 @@ private:
                 if (root.imag() > 0) add(root.real(), root.imag());
     }
 
+    void of_table(const Spline& spline, const ex& u) {
+        if (!u.is_polynomial(t_) || u.degree(t_) != 1) return;
+        const ex slope = u.coeff(t_, 1).evalf(), offset = u.coeff(t_, 0).evalf();
+        if (!GiNaC::is_a<GiNaC::numeric>(slope) || !GiNaC::is_a<GiNaC::numeric>(offset)) return;
+        const double a = GiNaC::ex_to<GiNaC::numeric>(slope).to_double(),
+                     b = GiNaC::ex_to<GiNaC::numeric>(offset).to_double();
+        for (const Bend& bend : bends_of(spline))
+            if (pulses_.size() < most_pulses) add((bend.place - b) / a, bend.width / std::fabs(a));
+    }
+
+    double time_of_sample(std::size_t i) const { return begin_ + static_cast<double>(i) * ((end_ - begin_) / samples); }
+    std::vector<double> samples_of(const ex& u) const {
+        std::vector<double> values;
+        for (std::size_t i = 0; i <= samples; ++i) {
+            const ex value = u.subs(t_ == GiNaC::numeric(time_of_sample(i))).evalf();
+            const bool is_number = GiNaC::is_a<GiNaC::numeric>(value) && GiNaC::ex_to<GiNaC::numeric>(value).is_real();
+            values.push_back(is_number ? GiNaC::ex_to<GiNaC::numeric>(value).to_double() : std::nan(""));
+        }
+        return values;
+    }
+
     // Of any u(t): from its values at many times.
     void of_samples(const ex& u, const std::string& name, bool is_pole) {
-        const auto value = [&](double time) {
-            const ex result = u.subs(t_ == GiNaC::numeric(time)).evalf();
-            const bool is_number =
-                GiNaC::is_a<GiNaC::numeric>(result) && GiNaC::ex_to<GiNaC::numeric>(result).is_real();
-            return is_number ? GiNaC::ex_to<GiNaC::numeric>(result).to_double() : std::nan("");
-        };
         const double distance = (end_ - begin_) / samples, sign = name == "exp" ? -1 : 1;
         if (name != "exp" && !is_pole && !is_switch(name)) return;
-        std::vector<double> values;
-        for (int i = 0; i <= samples; ++i) {
-            const double x = value(begin_ + i * distance);
-            values.push_back(is_pole ? std::fabs(x) : x);
-        }
+        std::vector<double> values = samples_of(u);
+        for (double& value : values) value = is_pole ? std::fabs(value) : value;
         for (std::size_t i = 1; i + 1 < values.size() && pulses_.size() < most_pulses; ++i) {
-            const double time = begin_ + static_cast<double>(i) * distance;
+            const double time = time_of_sample(i);
             if (is_switch(name)) {
                 if ((values[i - 1] < 0) != (values[i] < 0)) add(time, distance / std::fabs(values[i] - values[i - 1]));
                 continue;
@@ -168,12 +210,14 @@ private:
 
 }  // namespace
 
-std::vector<Pulse> find_pulses(const SystemOutline& system, const std::vector<double>& parameters, double begin,
-                               double end, double widest) {
-    if (system.autonomous) return {};
+std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
+                               double widest) {
+    const SystemOutline& system = outline.system;
+    if (system.autonomous && outline.scene.switches.empty()) return {};
     PulseFinder finder(system, parameters, begin, end, widest);
     finder.look_at(system.lagrangian);
     for (const ex& force : system.outer_force) finder.look_at(force);
+    for (const Switch& one : outline.scene.switches) finder.look_at_side(one.value);
     return finder.pulses();
 }
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "generator/mechanics/system/system.hpp"
+#include "generator/mechanics/outline.hpp"
 
 namespace lobatto {
 
@@ -16,8 +16,9 @@ struct Pulse {
 
 // Those between two times that are narrower than `widest`, with the parameters at these values (scene order): of
 // exp(u) where u(t) is largest, of u^-k near complex roots of u, of tanh, atan, sinh, cosh and exp of a linear u where
-// u passes zero; u holds the time and parameters alone. In the order of time, at most 1000.
-std::vector<Pulse> find_pulses(const SystemOutline& system, const std::vector<double>& parameters, double begin,
-                               double end, double widest);
+// u passes zero, of a table of a linear u where it bends most, of if and its kin where u passes zero twice; u holds the
+// time and parameters alone. In the order of time, at most 1000.
+std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
+                               double widest);
 
 }  // namespace lobatto

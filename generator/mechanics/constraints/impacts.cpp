@@ -6,10 +6,7 @@
 namespace lobatto {
 
 void check_impacts(const Scene& scene, const System& system) {
-    GiNaC::exmap start;
-    for (std::size_t k = 0; k < system.q.size(); ++k) start[system.q[k]] = scene.initial_position[k];
-    start[system.t] = 0;
-    for (const Impact& impact : scene.impacts) {
+    for (const Impact& impact : scene.impacts)
         for (const auto& [place, mass] : system.momentum_v.entries())
             for (const GiNaC::symbol& v : system.v)
                 if (impact.reset_position.empty() && mass.has(v))
@@ -18,6 +15,15 @@ void check_impacts(const Scene& scene, const System& system) {
                                                   "quadratic in them, and this one is not; give a reset, such as "
                                                   "reset = {{ \"{1}'\" = \"-{1}'\" }}",
                                                   impact.written, scene.coordinates.front().written));
+    require_start_before_walls(scene);
+}
+
+void require_start_before_walls(const Scene& scene) {
+    GiNaC::exmap start;
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k)
+        start[scene.coordinates[k].position] = scene.initial_position[k];
+    start[scene.time] = 0;
+    for (const Impact& impact : scene.impacts) {
         const double value = scene.evaluate(impact.when.value.subs(start), "the wall " + impact.written).to_double();
         if (value * impact.when.direction > 0)
             scene.source.fail(impact.when.at,

@@ -9,6 +9,7 @@ namespace lobatto {
 // InputError unless momenta are affine in velocities, so that an impulse changes velocities by M^-1 of it (D52), and
 // the scene starts on the right side of its walls.
 void check_impacts(const Scene& scene, const System& system);
+void require_start_before_walls(const Scene& scene);
 
 // InputError where a scene with impacts, or with formulas that are not smooth, is given to what knows none: "lobatto
 // stability".

@@ -65,6 +65,7 @@ ex SystemReader::Bodies::formula(const Entry& entry, const std::string& owner, b
     const ex expression = reader_.read_formula(entry, {&reader_.names_, what, false, {}}, &value);
     if (positive && !value.is_positive())
         fail(entry.value.at, fmt::format("{} is {:.6g}; it must be positive", what, value.to_double()));
+    if (positive) reader_.require(expression, false, what + " is not positive", entry.value.at);
     return expression;
 }
 
@@ -152,32 +153,37 @@ Matrix SystemReader::Bodies::read_inertia(const Entry& entry, const std::string&
 }
 
 // I is positive definite, and so is tr(I)/2 - I, the moments of the mass itself, but for flat bodies.
-void SystemReader::Bodies::refuse_inertia(const Entry& entry, const std::string& name, const Matrix& inertia) const {
-    double I[3][3], E[3][3], scale = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            I[i][j] = number(inertia[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)]);
-            scale = std::max(scale, std::fabs(I[i][j]));
+void SystemReader::Bodies::refuse_inertia(const Entry& entry, const std::string& name, const Matrix& I) {
+    const ex trace = I[0][0] + I[1][1] + I[2][2];
+    Matrix E;
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j) E[i][j] = (i == j ? trace / 2 : ex(0)) - I[i][j];
+    // Of all orders, in units of the trace: those of a flat body are 0, but for rounding of what is written.
+    const auto minors_of = [&](const Matrix& m) {
+        std::vector<ex> minors = {m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                                  m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                                  m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])};
+        minors[0] = minors[0] / pow(trace, 3);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const std::size_t j = (i + 1) % 3;
+            minors.push_back(m[i][i] / trace);
+            minors.push_back((m[i][i] * m[j][j] - m[i][j] * m[i][j]) / pow(trace, 2));
         }
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) E[i][j] = (i == j ? (I[0][0] + I[1][1] + I[2][2]) / 2 : 0) - I[i][j];
-    const auto least_minor = [&](const double(&m)[3][3]) {  // of all orders, in units of the largest entry
-        double least = m[0][0] / scale;
-        for (int i = 0; i < 3; ++i) {
-            const int j = (i + 1) % 3;
-            least = std::min({least, m[i][i] / scale, (m[i][i] * m[j][j] - m[i][j] * m[i][j]) / scale / scale});
-        }
-        const double determinant = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-                                   m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-                                   m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-        return std::min(least, determinant / scale / scale / scale);
+        return minors;
     };
-    if (scale == 0 || !(least_minor(I) > 0))
-        fail(entry.value.at, fmt::format("the inertia of {} is not positive: every moment of inertia is", name));
-    if (least_minor(E) < -1e-12)
-        fail(entry.value.at, fmt::format("no body has the inertia of {}: each principal moment is at most the sum of "
-                                         "the other two",
-                                         name));
+    const auto require = [&](const ex& value, bool may_vanish, const std::string& complaint) {
+        const double here = number(value);
+        if (!(may_vanish ? here >= 0 : here > 0)) fail(entry.value.at, complaint);
+        reader_.require(value, may_vanish, complaint, entry.value.at);
+    };
+    const std::string positive = fmt::format("the inertia of {} is not positive: every moment of inertia is", name),
+                      possible = fmt::format(
+                          "no body has the inertia of {}: each principal moment is at most the sum "
+                          "of the other two",
+                          name);
+    require(trace, false, positive);
+    for (const ex& minor : minors_of(I)) require(minor, false, positive);
+    for (const ex& minor : minors_of(E)) require(minor + GiNaC::numeric(1, 1000000000000), true, possible);
 }
 
 void SystemReader::Bodies::read_joint(JointLine& line) {

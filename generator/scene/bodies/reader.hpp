@@ -71,7 +71,7 @@ private:
     void read_place(Line& line);
     void read_orientation(Line& line);
     Matrix read_inertia(const Entry& entry, const std::string& name);
-    void refuse_inertia(const Entry& entry, const std::string& name, const Matrix& inertia) const;
+    void refuse_inertia(const Entry& entry, const std::string& name, const Matrix& inertia);
     void read_joint(JointLine& line);
     void read_axis(Joint& joint, const Table& table);
     void read_start(JointLine& line);

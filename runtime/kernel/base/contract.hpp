@@ -18,7 +18,7 @@
 //   rows reach, immediate, that it can go Immediate, and unit_masses), and `absorbed` says that quadratic_part(k, S0)
 //   gives a constant part of S to iterate with; `clean` that steps are those of steppers/clean.hpp. Gauss's nodes stand
 //   between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal, D, and
-//   taken into the stage map; `has_remainder`: remainder(k, q, R) gives W - D q.
+//   taken into the stage map.
 // Form::general: see steppers/general.hpp. `clocked` says that its Lagrangian is one in the time tau of a clock,
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
@@ -69,7 +69,6 @@ template <class K>
 struct Formulas {
     LOBATTO_WITH_TIME(node)
     LOBATTO_WITH_TIME(minus_acceleration)
-    LOBATTO_WITH_TIME(remainder)
     LOBATTO_WITH_TIME(slope)
     LOBATTO_WITH_TIME(slopes)
     LOBATTO_WITH_TIME(stage)
@@ -199,38 +198,23 @@ using ScalarFallback = Stepper<FallbackKernel<K>>;
 template <class K, bool neighbours>
 struct FixedPointOf;
 
-// How the lanes of each form move by one step: start(single, p, lane) takes the state of a Stepper over, step(k, time,
+// How the lanes of each form move by one step: start(single, lane) takes the state of a Stepper over, step(k, time,
 // active) moves the active lanes, and answers which have moved; position(c) and momentum(single, lane, p) read. What
 // all lanes of one step size share is read by shared(), and take(shared) sets it (steppers/device_lanes.hpp).
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct LaneStepper;
 
-// A system with constant mass, whose velocity is kept beside its position.
+// A system with constant mass.
 template <class K>
 struct ConstantMass : Motion<K> {
     using typename Motion<K>::real;
     using Motion<K>::n, Motion<K>::coefficients;
-    real u[n]{};  // M^-1 p
 
-    // Begins at (q, p); W: M^-1 grad V there.
-    Status begin(real time, const real* position, const real* momentum, real* W) {
-        this->start_time = time;
-        this->steps = 0;
-        for (int k = 0; k < n; ++k) this->q[k] = position[k];
-        K::velocity(coefficients, momentum, u);
-        Formulas<K>::minus_acceleration(coefficients, time, static_cast<const real*>(this->q), W);
-        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, this->q, u, this->event_values);
-        const real sum = time + not_finite_part(position, n) + not_finite_part(momentum, n) + not_finite_part(W, n);
-        return is_finite(sum) ? Status::ok : Status::not_finite;
-    }
-
-    void momentum(real* p) const { K::momentum(coefficients, u, p); }
     Status energy(real time, const real* position, const real* momentum, real* value) const {
         if constexpr (K::has_energy) {
             *value = Formulas<K>::energy(coefficients, time, position, momentum);
             return Status::ok;
         } else {
-            (void)time, (void)position, (void)momentum, (void)value;
             return Status::unsupported;
         }
     }
@@ -244,11 +228,33 @@ struct ConstantMass : Motion<K> {
     // dL/dv = M v and dL/dq + F = -M W.
     void slopes(real time, const real* position, const real* velocity, real* Lv, real* Lq) const {
         real W[n];
-        Formulas<K>::minus_acceleration(coefficients, time, position, +W);
+        Formulas<K>::minus_acceleration(coefficients, time, position, W);
         for (int k = 0; k < n; ++k) W[k] = -W[k];
         K::momentum(coefficients, velocity, Lv);
-        K::momentum(coefficients, static_cast<const real*>(W), Lq);
+        K::momentum(coefficients, W, Lq);
     }
+};
+
+// The same, with its velocity kept beside its position.
+template <class K>
+struct VelocityKept : ConstantMass<K> {
+    using typename ConstantMass<K>::real;
+    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::momentum;
+    real u[n]{};  // M^-1 p
+
+    // Begins at (q, p); W: M^-1 grad V there.
+    Status begin(real time, const real* position, const real* momentum, real* W) {
+        this->start_time = time;
+        this->steps = 0;
+        for (int k = 0; k < n; ++k) this->q[k] = position[k];
+        K::velocity(coefficients, momentum, u);
+        Formulas<K>::minus_acceleration(coefficients, time, this->q, W);
+        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, this->q, u, this->event_values);
+        const real sum = time + not_finite_part(position, n) + not_finite_part(momentum, n) + not_finite_part(W, n);
+        return is_finite(sum) ? Status::ok : Status::not_finite;
+    }
+
+    void momentum(real* p) const { K::momentum(coefficients, u, p); }
 };
 
 // When to try iterations: at once; after they failed, 1, 2, 4, ... 64 steps later, which Newton's iteration takes.

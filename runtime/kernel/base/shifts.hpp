@@ -10,44 +10,12 @@
 
 namespace lobatto {
 
-#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__) && !defined(__clang__)
-namespace registers {
-
-// g++ takes a general permutation, with its indices in a register, for what is a shift of two registers.
-#define LOBATTO_SHIFTS 1
-template <int places>
-LOBATTO_INLINE Double8 moved_on(Double8 before, Double8 values) {
-    return (Double8)__builtin_ia32_alignq512_mask((Long8)values, (Long8)before, 8 - places, (Long8)values,
-                                                  static_cast<unsigned char>(-1));
-}
-template <int places>
-LOBATTO_INLINE Float16 moved_on(Float16 before, Float16 values) {
-    typedef int Int16 __attribute__((vector_size(64)));
-    return (Float16)__builtin_ia32_alignd512_mask((Int16)values, (Int16)before, 16 - places, (Int16)values,
-                                                  static_cast<unsigned short>(-1));
-}
-
-}  // namespace registers
-#endif
-
 // The last `places` lanes of `before` and then the first of `values`: a step of `places` to the right. One register.
 template <int places, class real, int width, int... lanes>
 LOBATTO_INLINE Pack<real, width> moved_on(const Pack<real, width>& before, const Pack<real, width>& values,
                                           std::integer_sequence<int, lanes...>) {
     Pack<real, width> result;
-#ifdef LOBATTO_SHIFTS
-    if constexpr (width * sizeof(real) == 64) {
-        result.part[0] = registers::moved_on<places>(before.part[0], values.part[0]);
-        return result;
-    }
-#endif
-#if __has_builtin(__builtin_shufflevector)
     result.part[0] = __builtin_shufflevector(before.part[0], values.part[0], (width - places + lanes)...);
-#else
-    ((result.part[0][lanes] = lanes < places ? before.part[0][(width - places + lanes) % width]
-                                             : values.part[0][(lanes - places + width) % width]),
-     ...);
-#endif
     return result;
 }
 template <int places, class real, int width>

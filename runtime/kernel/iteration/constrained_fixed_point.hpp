@@ -88,7 +88,7 @@ struct ConstrainedFixedPoint {
             set_lane(node_time[i / width], i % width, h * K::c[row + 1]);
             set_lane(weight[i / width], i % width, i < m ? h * K::b[i + 1] : real(0));
         }
-        Formulas<K>::legendre(k, real(0), static_cast<const real*>(zero), static_cast<const real*>(zero), +p, +M);
+        Formulas<K>::legendre(k, real(0), zero, zero, p, M);
         real mass[n * n];
         for (int i = 0; i < n * n; ++i) {
             mass[i] = real(0);
@@ -134,7 +134,7 @@ private:
             real row[n] = {}, divided[n];
             for (int e = 0; e < slopes; ++e)
                 if (K::constraint_row[e] == c) row[K::constraint_column[e]] += G[e];
-            divide_by_mass(static_cast<const real*>(row), +divided);
+            divide_by_mass(row, divided);
             for (int d = 0; d < constraints; ++d) B[d * constraints + c] = real(0);
             for (int e = 0; e < slopes; ++e)
                 B[K::constraint_row[e] * constraints + c] += G[e] * divided[K::constraint_column[e]];
@@ -148,7 +148,7 @@ private:
         for (int part = 0; part < parts; ++part) {
             const V* const Q = a.Q + part * n;
             const V at = V(time) + node_time[part];
-            Formulas<K>::slopes(k, at, Q, static_cast<const V*>(rest), +Lv, a.f + part * n);
+            Formulas<K>::slopes(k, at, Q, rest, Lv, a.f + part * n);
             Formulas<K>::constraint(k, at, Q, a.phi + part * constraints, a.phi_t + part * constraints,
                                     a.G + part * slopes);
         }
@@ -167,15 +167,14 @@ private:
         real pull[constraints], y[n];
         for (int c = 0; c < constraints; ++c) pull[c] = multipliers[c * s];
         for (int c = 0; c < n; ++c) y[c] = a.start_f[c];
-        add_pull(static_cast<const real*>(a.start_G), static_cast<const real*>(pull), +y);
-        divide_by_mass(static_cast<const real*>(y), a.start_W);
+        add_pull(a.start_G, pull, y);
+        divide_by_mass(y, a.start_W);
         spread(multipliers, a);
         for (int part = 0; part < parts; ++part) {
             V force[n];
             for (int c = 0; c < n; ++c) force[c] = a.f[part * n + c];
-            add_pull(static_cast<const V*>(a.G + part * slopes), static_cast<const V*>(a.pull + part * constraints),
-                     +force);
-            divide_by_mass(static_cast<const V*>(force), a.W + part * n);
+            add_pull(a.G + part * slopes, a.pull + part * constraints, +force);
+            divide_by_mass(force, a.W + part * n);
         }
         V worst = V(real(0));
         for (int c = 0; c < n; ++c) {
@@ -210,7 +209,7 @@ private:
 
     bool solve_step(const Coefficients& k, real time, real* q, real* p, Arrays& a) {
         real v[n], multipliers[constraints * s];
-        divide_by_mass(static_cast<const real*>(p), +v);
+        divide_by_mass(p, v);
         begin_step(k, time, q, v, multipliers, a);
         set_measures(q, v, a);
         const real small = maximum(tolerance, Limits<real>::epsilon);
@@ -244,7 +243,7 @@ private:
     void begin_step(const Coefficients& k, real time, const real* q, const real* v, real* multipliers,
                     Arrays& a) const {
         real rest[n] = {}, Lv[n];
-        Formulas<K>::slopes(k, time, q, static_cast<const real*>(rest), +Lv, a.start_f);
+        Formulas<K>::slopes(k, time, q, rest, Lv, a.start_f);
         Formulas<K>::constraint(k, time, q, a.start_phi, a.start_phi_t, a.start_G);
         const auto continued = [](const real* last, int j) {
             real sum = real(0);
@@ -313,11 +312,10 @@ private:
         for (int c = 0; c < constraints; ++c) pull[c] = multipliers[c * s];
         real y[n];
         for (int c = 0; c < n; ++c) y[c] = a.start_f[c];
-        add_pull(static_cast<const real*>(a.start_G), static_cast<const real*>(pull), +y);
+        add_pull(a.start_G, pull, y);
         spread(multipliers, a);
         for (int part = 0; part < parts; ++part)
-            add_pull(static_cast<const V*>(a.G + part * slopes), static_cast<const V*>(a.pull + part * constraints),
-                     a.f + part * n);
+            add_pull(a.G + part * slopes, a.pull + part * constraints, a.f + part * n);
         constexpr int last = m - 1;
         for (int c = 0; c < n; ++c) {
             V total = weight[0] * a.f[c];
@@ -331,7 +329,7 @@ private:
         for (int c = 0; c < constraints; ++c) multipliers[c * s + m] = real(0);
         for (int look = 0; look < 2; ++look) {  // the second takes the rounding of the first away
             real v1[n];
-            divide_by_mass(static_cast<const real*>(p1), +v1);
+            divide_by_mass(p1, v1);
             for (int c = 0; c < constraints; ++c) mu[c] = a.phi_t[(last / width) * constraints + c][last % width];
             for (int e = 0; e < slopes; ++e) mu[K::constraint_row[e]] += G1[e] * v1[K::constraint_column[e]];
             solve_dense(a.B, a.pivots, mu, std::integral_constant<int, constraints>{});
@@ -339,7 +337,7 @@ private:
                 multipliers[c * s + m] -= mu[c] / (h * K::b[m]);
                 mu[c] = -mu[c];
             }
-            add_pull(static_cast<const real*>(G1), static_cast<const real*>(mu), +p1);
+            add_pull(G1, mu, p1);
         }
         remember(q, p, q1, p1, G1, multipliers, y, a);
         return true;
@@ -350,12 +348,12 @@ private:
         constexpr int last = m - 1;
         real force[n], pull[constraints];
         for (int c = 0; c < constraints; ++c) pull[c] = multipliers[c * s + m];
-        for (int part = 0; part < parts; ++part) divide_by_mass(static_cast<const V*>(a.f + part * n), a.W + part * n);
+        for (int part = 0; part < parts; ++part) divide_by_mass(a.f + part * n, a.W + part * n);
         real W0[n], W1[n];
-        divide_by_mass(start_force, +W0);
+        divide_by_mass(start_force, W0);
         for (int c = 0; c < n; ++c) force[c] = a.f[(last / width) * n + c][last % width];
-        add_pull(G1, static_cast<const real*>(pull), +force);
-        divide_by_mass(static_cast<const real*>(force), +W1);
+        add_pull(G1, pull, force);
+        divide_by_mass(force, W1);
         for (int c = 0; c < n; ++c) {
             w[c * s] = W0[c];
             w[c * s + m] = W1[c];

@@ -16,18 +16,17 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "convergence.hpp"
-#include "stage_map.hpp"
+#include "ensemble_tables.hpp"
 
 namespace lobatto {
 
 template <class K, class T>
-struct EnsembleFixedPoint : StageMap<K, T> {
+struct EnsembleFixedPoint : EnsembleTables<K, T> {
     using real = typename K::real;
-    using Tables = StageMap<K, T>;
+    using Tables = EnsembleTables<K, T>;
     using Tables::h, Tables::usable, Tables::has_history, Tables::w, Tables::rest, Tables::diagonal, Tables::node_time,
-        Tables::weight, Tables::arrival, Tables::map_of;
-    using Tables::n, Tables::s, Tables::m, Tables::inner_room, Tables::absorbs, Tables::entries, Tables::maps,
-        Tables::parts;
+        Tables::weight, Tables::arrival, Tables::map_of, Tables::reach, Tables::settled, Tables::near;
+    using Tables::n, Tables::s, Tables::m, Tables::inner_room, Tables::absorbs, Tables::entries, Tables::parts;
     using typename Tables::ActiveMask;
     static constexpr int values = inner_room * n;  // node by node
     static constexpr int evaluation_limit = 16;
@@ -40,43 +39,10 @@ struct EnsembleFixedPoint : StageMap<K, T> {
         T rate[n], inverse_scale[n], inverse_next[n], inverse_linear[n];
     };
 
-    // Of increments: the square that is small enough, and what they are measured against at least, a part of the
-    // position's size and a number.
-    struct Measure {
-        real enough, part, least;
-    };
-
-    // The same for all trajectories of one step size. Where a trajectory's numbers are taken into the map, it is so of
-    // those with the same parameters.
-    struct Shared {
-        typename Tables::Map map[maps];
-        std::conditional_t<absorbs, T[n], Unit> diagonal;
-        T reach;
-        T node_time[parts], weight[parts], arrival[parts];
-        real h;
-        Measure settled, near;
-    };
-
-    Measure settled, near;
     T evaluations;  // of the last step
     T drifting[n];  // the velocity before the last kick, so that the next step need not wait for it
-    T reach;        // root of the sum of squares of a row of M, the largest
     Workspace<Arrays> workspace;
 
-    void prepare(const typename K::Coefficients& k, real step, int lane) {
-        Tables::prepare(k, step, lane);
-        real largest = real(0);
-        for (int c = 0; c < maps; ++c)
-            for (int i = 0; i < m; ++i) {
-                real squares = real(0);
-                for (int j = 0; j < m; ++j) {
-                    const real entry = lane_of(this->map[c].inner[j][i], lane);
-                    squares += entry * entry;
-                }
-                largest = maximum(largest, squares);
-            }
-        set_lane(reach, lane, sqrt(largest));
-    }
     void begin(const real* q, const real* u, const real* W0, int lane) {
         Tables::begin(q, W0, lane);
         for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * W0[c]);
@@ -85,51 +51,6 @@ struct EnsembleFixedPoint : StageMap<K, T> {
     void recall(const real* u, const Acceleration& minus_acceleration, const Position& position, int lane) {
         Tables::recall(minus_acceleration, position, lane);
         for (int c = 0; c < n; ++c) set_lane(drifting[c], lane, u[c] + h * K::b[s - 1] * minus_acceleration(s - 1, c));
-    }
-
-    // Increments of positions are measured against what a coordinate moves by in a step. They count as nothing when
-    // they are `tolerance` (0: rounding), and S as constant when they are its root.
-    void set_tolerance(real tolerance) {
-        const real small = maximum(tolerance, Limits<real>::epsilon);
-        const real linear = maximum(Limits<real>::root_epsilon, sqrt(tolerance));
-        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
-        settled = {small * small, maximum(floor, Limits<real>::epsilon / small), Limits<real>::smallest / small};
-        near = {linear * linear, maximum(floor, real(8) * Limits<real>::epsilon / linear),
-                real(8) * Limits<real>::smallest / linear};
-    }
-
-    Shared shared() const {
-        Shared all{};
-        for (int c = 0; c < maps; ++c) all.map[c] = this->map[c];
-        if constexpr (absorbs)
-            for (int c = 0; c < n; ++c) all.diagonal[c] = diagonal[c];
-        all.reach = reach;
-        for (int i = 0; i < parts; ++i) {
-            all.node_time[i] = node_time[i];
-            all.weight[i] = weight[i];
-            all.arrival[i] = arrival[i];
-        }
-        all.h = h;
-        all.settled = settled;
-        all.near = near;
-        return all;
-    }
-    template <bool alike>
-    LOBATTO_INLINE void take(const Shared& all) {
-        if constexpr (alike || !absorbs) {
-            for (int c = 0; c < maps; ++c) this->map[c] = all.map[c];
-            reach = all.reach;
-        }
-        if constexpr (alike && absorbs)
-            for (int c = 0; c < n; ++c) diagonal[c] = all.diagonal[c];
-        for (int i = 0; i < parts; ++i) {
-            node_time[i] = all.node_time[i];
-            weight[i] = all.weight[i];
-            arrival[i] = all.arrival[i];
-        }
-        h = all.h;
-        settled = all.settled;
-        near = all.near;
     }
 
     // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
@@ -196,10 +117,10 @@ private:
         for (int c = 0; c < n; ++c)
             for (int j = 0; j < m; ++j) to[j * n + c] = sum_of<m>(to[j * n + c], map_of(c).inner, j, r + c, n);
     }
-    // M (W - D X) - P; where K has a remainder, W holds W - D X while it is solved for X.
+    // M (W - D X) - P.
     LOBATTO_INLINE void residual(const Arrays& a, T* r) const {
         for (int i = 0; i < values; ++i) r[i] = -a.P[i];
-        if constexpr (absorbs && !K::has_remainder) {
+        if constexpr (absorbs) {
             T rest_of[values];
             for (int i = 0; i < values; ++i) rest_of[i] = fused(-diagonal[i % n], a.X[i], a.W[i]);
             add_mapped(rest_of, r);
@@ -256,19 +177,15 @@ private:
 #pragma GCC unroll 4
         for (int j = 0; j < m; ++j)
             if constexpr (K::uses_hessian)
-                Formulas<K>::node(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n,
-                                  a.S + j * entries);
-            else if constexpr (K::has_remainder)
-                Formulas<K>::remainder(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+                Formulas<K>::node(k, T(time) + node_time[j], a.X + j * n, a.W + j * n, a.S + j * entries);
             else
-                Formulas<K>::minus_acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n),
-                                                a.W + j * n);
+                Formulas<K>::minus_acceleration(k, T(time) + node_time[j], a.X + j * n, a.W + j * n);
     }
     // W at the nodes X.
     template <class Given, class Time>
     LOBATTO_INLINE void settle(const Given& k, const Time& time, Arrays& a) const {
         for (int j = 0; j < m; ++j)
-            Formulas<K>::minus_acceleration(k, T(time) + node_time[j], static_cast<const T*>(a.X + j * n), a.W + j * n);
+            Formulas<K>::minus_acceleration(k, T(time) + node_time[j], a.X + j * n, a.W + j * n);
     }
 
     // X and P of these lanes move on by delta.
@@ -392,7 +309,7 @@ private:
             q1[c] = q[c] + sum_over_nodes(T(h) * a.rate[c], arrival, W);
             change[c] = sum_over_nodes(T(-h * end_weight.first) * w[c * s + s - 1], weight, W);
         }
-        Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q1), +W1);
+        Formulas<K>::minus_acceleration(k, T(time + h), q1, W1);
         T not_finite = T(real(0));
         for (int c = 0; c < n; ++c) {
             u1[c] = u[c] + fused(T(-h * end_weight.last), W1[c], change[c]);
@@ -441,7 +358,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
     using real = typename K::real;
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
-    using Shared = typename EnsembleFixedPoint<K, T>::Shared;
+    using Shared = typename EnsembleTables<K, T>::Shared;
     T q[n], u[n], evaluations = T(real(0));
     EnsembleFixedPoint<K, T> fixed_point;
 
@@ -457,14 +374,14 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
         fixed_point.prepare(single.coefficients, single.step_size, lane);
     }
     void set_tolerance(real tolerance) { fixed_point.set_tolerance(tolerance); }
-    void start(const ScalarFallback<K>& single, const real*, int lane) {
+    void start(const ScalarFallback<K>& single, int lane) {
         follow_state(single, lane);
         fixed_point.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
     }
     void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
         real velocity[n];
         for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
-        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+        K::momentum(single.coefficients, velocity, momentum);
     }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {

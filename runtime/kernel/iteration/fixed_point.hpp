@@ -88,8 +88,8 @@ private:
         return terms > 1 ? even + odd : even;
     }
 
-    // One iteration: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place, unless W
-    // is K's remainder. The size of what Y moved by; `displaced`: the same, in the measure for carrying.
+    // One iteration: Y = base - h^2 P A r with r = W, or `carried` W + S (Y - X), minus D at the same place.
+    // The size of what Y moved by; `displaced`: the same, in the measure for carrying.
     template <bool is_carried>
     LOBATTO_INLINE real iterate(Arrays& a, real& displaced) const {
         for (int p = 0; p < parts; ++p) {
@@ -99,8 +99,7 @@ private:
             else
                 for (int c = 0; c < n; ++c) r[c] = a.W[p * n + c];
             for (int c = 0; c < n; ++c) {
-                if constexpr (absorbs && !K::has_remainder)
-                    r[c] = fused(-V(diagonal[c]), (is_carried ? a.Y : a.X)[p * n + c], r[c]);
+                if constexpr (absorbs) r[c] = fused(-V(diagonal[c]), (is_carried ? a.Y : a.X)[p * n + c], r[c]);
                 lay_flat<1>(&r[c], 1, a.flat + (c * parts + p) * width);
             }
         }
@@ -134,13 +133,9 @@ private:
     LOBATTO_INLINE void evaluate(const typename K::Coefficients& k, real time, Arrays& a) const {
         for (int p = 0; p < parts; ++p)
             if constexpr (K::uses_hessian)
-                Formulas<K>::node(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n,
-                                  a.S + p * entries);
-            else if constexpr (K::has_remainder)
-                Formulas<K>::remainder(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n), a.W + p * n);
+                Formulas<K>::node(k, V(time) + node_time[p], a.X + p * n, a.W + p * n, a.S + p * entries);
             else
-                Formulas<K>::minus_acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n),
-                                                a.W + p * n);
+                Formulas<K>::minus_acceleration(k, V(time) + node_time[p], a.X + p * n, a.W + p * n);
     }
 
     // A twentieth of h^2 |A| |S - D|, largest row sums. Fixed-point iterations contract by more than the norm says, but
@@ -220,8 +215,7 @@ private:
     // W at the nodes Y.
     LOBATTO_INLINE void settle(const typename K::Coefficients& k, real time, Arrays& a) const {
         for (int p = 0; p < parts; ++p)
-            Formulas<K>::minus_acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.Y + p * n),
-                                            a.carried + p * n);
+            Formulas<K>::minus_acceleration(k, V(time) + node_time[p], a.Y + p * n, a.carried + p * n);
     }
 
     // Fixed-point iterations with W + S (Y - X) in place of W(Y), until what is left of an increment, e times its ratio
@@ -258,7 +252,7 @@ private:
         if constexpr (with_end) {
             for (int c = 0; c < n; ++c) W1[c] = a.flat[c * parts * width + m];
         } else {
-            Formulas<K>::minus_acceleration(k, time + h, static_cast<const real*>(q1), +W1);
+            Formulas<K>::minus_acceleration(k, time + h, q1, W1);
         }
         real not_finite = real(0);
         for (int c = 0; c < n; ++c) {

@@ -20,48 +20,26 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "convergence.hpp"
+#include "galerkin_tables.hpp"
 #include "hamilton.hpp"
 #include "node_mass.hpp"
-#include "stage_map.hpp"
 
 namespace lobatto {
 
-// A' of a kernel's nodes.
-template <class K>
-struct MomentumIntegration {
-    static constexpr int r = K::nodes;
-    typename K::real entry[r][r]{};
-
-    constexpr MomentumIntegration() {
-        for (int i = 0; i < r; ++i)
-            for (int j = 0; j < r; ++j)
-                entry[i][j] = K::b[j] * (typename K::real(1) - K::integration[j * r + i] / K::b[i]);
-    }
-};
-template <class K, bool computed_at_start = is_many_digits<typename K::real>>
-constexpr MomentumIntegration<K> momentum_integration{};
-template <class K>
-inline const MomentumIntegration<K> momentum_integration<K, true>{};  // MPFR is no part of the compiler
-
 template <class K, class T>
-struct GalerkinFixedPoint {
+struct GalerkinFixedPoint : GalerkinTables<K, T> {
     using Kernel = K;
     using Number = T;
-    using real = typename K::real;
-    static constexpr int n = K::coordinates, r = K::nodes;
-    using Layout = NodeLayout<real, T, r - 1, node_lanes<real>>;  // r nodes
-    using V = typename Layout::V;
-    static constexpr bool in_lanes = Layout::in_lanes;
+    using Tables = GalerkinTables<K, T>;
+    using Tables::h, Tables::tolerance, Tables::position_map, Tables::momentum_map, Tables::weight, Tables::legendre,
+        Tables::on_legendre, Tables::ahead, Tables::node_time;
+    using Tables::r, Tables::in_lanes, Tables::width, Tables::parts, Tables::has_kappa;
+    using typename Tables::real, typename Tables::V;
+    static constexpr int n = K::coordinates;
     using Mass = NodeMass<K, T, V>;
-    static constexpr int width = Layout::width, parts = Layout::parts_of(r), mass_room = Mass::room;
+    static constexpr int mass_room = Mass::room;
     static constexpr int evaluation_limit = is_many_digits<real> ? 60 : 30;
     using ActiveMask = decltype(T() < T());
-
-    static constexpr bool has_kappa() {
-        for (int i = 0; i < r; ++i)
-            if (K::legendre_polynomial[i] != real(0)) return true;
-        return false;
-    }
 
     struct Arrays {
         V Q[parts * n], v[parts * n], Lv[parts * n], F[parts * n], M[K::hamiltonian ? 1 : parts * mass_room];
@@ -70,12 +48,6 @@ struct GalerkinFixedPoint {
         AngleTable<V, parts, K::angles> near;
     };
 
-    V position_map[r][parts], momentum_map[r][parts];  // h A and h A', a column for each node
-    V weight[parts], legendre[parts];                  // h b and pi; zero in lanes to spare
-    V on_legendre[parts];                              // b pi / sum b pi^2; likewise
-    V ahead[r][parts], node_time[parts];
-    T h{};
-    real tolerance{};             // of increments, relative; 0: to rounding
     T v[n * r];                   // velocities at the nodes of the last step
     T kappa[n];                   // of the last step
     T evaluations;                // of the last step
@@ -85,41 +57,6 @@ struct GalerkinFixedPoint {
     bool is_guess{};              // v is not of the last step but what the next one begins with
     Mass mass;
     Workspace<Arrays> workspace;
-
-    // Steps may be of a length of their own in each lane.
-    void prepare(const T& step) {
-        h = step;
-        real square = real(0);
-        for (int i = 0; i < r; ++i) square += K::b[i] * K::legendre_polynomial[i] * K::legendre_polynomial[i];
-        for (int i = 0; i < parts * width; ++i) {
-            const bool is_node = i < r;
-            const int node = is_node ? i : r - 1;
-            for (int j = 0; j < r; ++j) {
-                put(position_map[j], i, h * T(K::integration[node * r + j]));
-                put(momentum_map[j], i, h * T(momentum_integration<K>.entry[node][j]));
-                put(ahead[j], i, T(K::ahead[node * r + j]));
-            }
-            put(node_time, i, h * T(K::c[node]));
-            put(weight, i, is_node ? h * T(K::b[node]) : T(real(0)));
-            put(legendre, i, T(K::legendre_polynomial[node]));
-            put(on_legendre, i,
-                T(is_node && has_kappa() ? K::b[node] * K::legendre_polynomial[node] / square : real(0)));
-        }
-    }
-
-    // The same for all trajectories of one step size.
-    struct Shared {
-        V position_map[r][parts], momentum_map[r][parts], ahead[r][parts], weight[parts], legendre[parts],
-            on_legendre[parts], node_time[parts];
-        T h;
-        real tolerance;
-    };
-    Shared shared() const {
-        Shared all{};
-        exchange(all, *this);
-        return all;
-    }
-    LOBATTO_INLINE void take(const Shared& all) { exchange(*this, all); }
 
     // Begins at a state.
     void begin(const typename K::Coefficients& k, real time, const real* q, const real* velocity, int lane = 0) {
@@ -154,29 +91,6 @@ struct GalerkinFixedPoint {
 
 private:
     friend HamiltonIteration<GalerkinFixedPoint>;
-    static void put(V* values, int i, const T& x) {
-        if constexpr (in_lanes)
-            set_lane(values[i / width], i % width, x);
-        else
-            values[i] = x;
-    }
-    template <class To, class From>
-    LOBATTO_INLINE static void exchange(To& to, const From& from) {
-        for (int i = 0; i < parts; ++i) {
-            for (int j = 0; j < r; ++j) {
-                to.position_map[j][i] = from.position_map[j][i];
-                to.momentum_map[j][i] = from.momentum_map[j][i];
-                to.ahead[j][i] = from.ahead[j][i];
-            }
-            to.weight[i] = from.weight[i];
-            to.legendre[i] = from.legendre[i];
-            to.on_legendre[i] = from.on_legendre[i];
-            to.node_time[i] = from.node_time[i];
-        }
-        to.h = from.h;
-        to.tolerance = from.tolerance;
-    }
-
     // The values of one part.
     LOBATTO_INLINE static V at_nodes(const T* x, int part) {
         if constexpr (in_lanes) {
@@ -270,8 +184,7 @@ private:
             position[c] = Start(q[c]);
             velocity[c] = Start(v[c * r + r - 1]);
         }
-        Formulas<K>::stage(k, Start(time), static_cast<const Start*>(position), static_cast<const Start*>(velocity),
-                           +Lv, +F, +M, AnglesKept<Start>{angles});
+        Formulas<K>::stage(k, Start(time), position, velocity, +Lv, F, M, AnglesKept<Start>{angles});
         const auto spread = [](const Start& x) LOBATTO_FORMULA {
             if constexpr (in_lanes)
                 return V(x[0]);
@@ -304,10 +217,10 @@ private:
             const V* const Q = a.Q + part * n;
             const V* const velocity = a.v + part * n;
             if constexpr (K::angles > 0)
-                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed,
+                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, packed,
                                    AnglesNear<V>{a.near.of(part)});
             else
-                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, +packed);
+                Formulas<K>::stage(k, V(time) + node_time[part], Q, velocity, a.Lv + part * n, a.F + part * n, packed);
             Mass::take(packed, a.M + part * mass_room);
         }
         // P - L_v
@@ -430,8 +343,7 @@ private:
         }
         if constexpr (K::clocked) {
             V rate[parts];
-            for (int part = 0; part < parts; ++part)
-                rate[part] = Formulas<K>::clock(k, V(time), static_cast<const V*>(a.Q + part * n));
+            for (int part = 0; part < parts; ++part) rate[part] = Formulas<K>::clock(k, V(time), a.Q + part * n);
             const T passed = over_nodes(weight, rate, 1);
             not_finite += passed - passed;
             elapsed = select(done, passed, elapsed);
@@ -460,21 +372,21 @@ struct LaneStepper<K, T, Form::general, stepping> {
     using Chain = Stepper<FallbackKernel<K>, Form::general, Stepping::solved>;
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates;
-    using Shared = typename GalerkinFixedPoint<K, T>::Shared;
+    using Shared = GalerkinTables<K, T>;
     T q[n], p[n], evaluations = T(real(0));
     GalerkinFixedPoint<K, T> fixed_point;
 
-    Shared shared() const { return fixed_point.shared(); }
+    Shared shared() const { return fixed_point; }
     template <bool>
     LOBATTO_INLINE void take(const Shared& all) {
-        fixed_point.take(all);
+        static_cast<Shared&>(fixed_point) = all;
     }
 
     LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
     LOBATTO_DEVICE const T* rates() const { return p; }
     void prepare(const ScalarFallback<K>& single, int) { fixed_point.prepare(single.step_size); }
     void set_tolerance(real tolerance) { fixed_point.tolerance = tolerance; }
-    void start(const ScalarFallback<K>& single, const real*, int lane) {
+    void start(const ScalarFallback<K>& single, int lane) {
         follow_state(single, lane);
         real velocity[n] = {};
         const Chain& chain = single;  // with a clock: dq/dtau

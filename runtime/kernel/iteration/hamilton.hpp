@@ -25,8 +25,7 @@ struct HamiltonIteration {
     LOBATTO_INLINE static void begin(const Fixed& f, const Given& k, const Time& time, const T* q, Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part)
-            Formulas<K>::momentum(k, V(time) + f.node_time[part], static_cast<const V*>(a.Q + part * n),
-                                  static_cast<const V*>(a.v + part * n), a.P + part * n);
+            Formulas<K>::momentum(k, V(time) + f.node_time[part], a.Q + part * n, a.v + part * n, a.P + part * n);
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c)
             a.middle[c] = fused(T(real_of<T>(0.5)), Fixed::over_nodes(f.weight, a.v + c, n), q[c]);
@@ -38,8 +37,7 @@ struct HamiltonIteration {
                                        Arrays& a) {
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part)
-            Formulas<K>::force(k, V(time) + f.node_time[part], static_cast<const V*>(a.Q + part * n),
-                               static_cast<const V*>(a.v + part * n), static_cast<const V*>(a.P + part * n),
+            Formulas<K>::force(k, V(time) + f.node_time[part], a.Q + part * n, a.v + part * n, a.P + part * n,
                                a.F + part * n);
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
@@ -54,8 +52,7 @@ struct HamiltonIteration {
         }
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part)
-            Formulas<K>::velocity(k, V(time) + f.node_time[part], static_cast<const V*>(a.Q + part * n),
-                                  static_cast<const V*>(a.P + part * n), a.Lv + part * n);
+            Formulas<K>::velocity(k, V(time) + f.node_time[part], a.Q + part * n, a.P + part * n, a.Lv + part * n);
         if constexpr (Fixed::has_kappa())
             return correct(f, k, time, kappa, a);
         else
@@ -71,7 +68,7 @@ private:
             lost[c] = -Fixed::over_nodes(f.on_legendre, a.Lv + c, n);
             worst = maximum(worst, fabs(lost[c]) * a.inverse_scale[c]);
         }
-        Formulas<K>::momentum(k, time, static_cast<const T*>(a.middle), static_cast<const T*>(lost), +d);
+        Formulas<K>::momentum(k, time, a.middle, lost, d);
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             kappa[c] += d[c];

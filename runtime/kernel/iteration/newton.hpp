@@ -44,7 +44,7 @@ struct NewtonIteration {
             frozen_.is_factored = false;
             if constexpr (K::linear) {
                 real q[n] = {}, W[n];
-                Formulas<K>::node(k, real(0), static_cast<const real*>(q), +W, +frozen_.S);
+                Formulas<K>::node(k, real(0), q, W, frozen_.S);
                 factor(frozen_, h);
                 return frozen_.usable ? Status::ok : Status::singular_jacobian;
             }
@@ -138,8 +138,7 @@ private:
         real previous = Limits<real>::largest;
         for (int iteration = 1; iteration <= Rule::iteration_limit; ++iteration) {
             for (int i = 0; i < m; ++i)
-                Formulas<K>::node(k, node_time(time, h, i), static_cast<const real*>(a.Q + i * n), a.W + i * n,
-                                  a.S + i * K::entries);
+                Formulas<K>::node(k, node_time(time, h, i), a.Q + i * n, a.W + i * n, a.S + i * K::entries);
             ++outcome.iterations;
             if (!stages.factor(a.S, K::entries, a.matrix)) {
                 outcome.status = why_singular(h, a.S);
@@ -173,9 +172,7 @@ private:
 
     // One increment with the frozen Jacobian; its size.
     real frozen_increment(const Coefficients& k, real h, real time, Arrays& a, Outcome& outcome) const {
-        for (int i = 0; i < m; ++i)
-            Formulas<K>::minus_acceleration(k, node_time(time, h, i), static_cast<const real*>(a.Q + i * n),
-                                            a.W + i * n);
+        for (int i = 0; i < m; ++i) Formulas<K>::minus_acceleration(k, node_time(time, h, i), a.Q + i * n, a.W + i * n);
         ++outcome.iterations;
         Stages(h).solve(a.base, a.Q, a.W, frozen_.matrix, a.delta, a.sorted);
         return apply_increments(a);

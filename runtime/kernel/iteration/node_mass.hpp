@@ -82,7 +82,7 @@ struct NodeMass {
     void begin(const Given& k, real time, const real* q, const real* velocity, int lane) {
         if constexpr (is_scaled) {
             real p[n], M[K::mass_entries], whole[n * n] = {}, column[n];
-            Formulas<K>::legendre(k, time, q, velocity, +p, +M);
+            Formulas<K>::legendre(k, time, q, velocity, p, M);
             for (int e = 0; e < K::mass_entries; ++e) whole[K::mass_row[e] * n + K::mass_column[e]] = M[e] / M[0];
             if constexpr (is_diagonal) {
                 for (int c = 0; c < n; ++c) {
@@ -91,15 +91,13 @@ struct NodeMass {
                 }
             } else {
                 for (int i = 0; i < n * n; ++i) set_lane(shape[i], lane, whole[i]);
-                factor_symmetric<n>(+whole);
+                factor_symmetric<n>(whole);
                 for (int c = 0; c < n; ++c) {
                     for (int i = 0; i < n; ++i) column[i] = i == c ? real(1) : real(0);
-                    solve_symmetric<n>(static_cast<const real*>(whole), +column);
+                    solve_symmetric<n>(whole, column);
                     for (int i = 0; i < n; ++i) set_lane(inverse_shape[i * n + c], lane, column[i]);
                 }
             }
-        } else {
-            (void)k, (void)time, (void)q, (void)velocity, (void)lane;
         }
     }
 

@@ -106,8 +106,8 @@ struct Refinement {
         fine.evaluations = DoubleDouble(rough.evaluations) + 1.0;
         fine.increment = rough.increment;
         for (int p = 0; p < parts; ++p)
-            Formulas<Rough>::node(coefficients, V(time.high) + rough.node_time[p], static_cast<const V*>(X + p * n),
-                                  ignored + p * n, S + p * entries);
+            Formulas<Rough>::node(coefficients, V(time.high) + rough.node_time[p], X + p * n, ignored + p * n,
+                                  S + p * entries);
         using Wide = typename Fine::V;
         for (int c = 0; c < n; ++c) {
             a.rate[c] = fused(-fine.h * K::b[0], fine.w[c * s + s - 1], u[c]);
@@ -132,7 +132,7 @@ struct Refinement {
             if (!(size < 1)) return false;
             for (int i = 0; i < parts * n; ++i) a.Y[i] = a.X[i] + of_parts(d[i], V(0.0));
             if (size <= small) {
-                settle(fine, S, d, a);
+                settle(S, d, a);
                 return true;
             }
             for (int i = 0; i < parts * n; ++i) a.X[i] = a.Y[i];
@@ -150,19 +150,16 @@ private:
         }
     }
 
-    // a.W = W(X), or K's remainder, and a.flat = W - D X, node by node.
+    // a.W = W(X), and a.flat = W - D X, node by node.
     LOBATTO_INLINE void evaluate(const typename K::Coefficients& k, const Fine& fine, DoubleDouble time,
                                  typename Fine::Arrays& a) const {
         using Wide = typename Fine::V;
         for (int p = 0; p < parts; ++p) {
             const Wide* const X = a.X + p * n;
-            if constexpr (K::has_remainder)
-                Formulas<K>::remainder(k, Wide(time) + fine.node_time[p], X, a.W + p * n);
-            else
-                Formulas<K>::minus_acceleration(k, Wide(time) + fine.node_time[p], X, a.W + p * n);
+            Formulas<K>::minus_acceleration(k, Wide(time) + fine.node_time[p], X, a.W + p * n);
             for (int c = 0; c < n; ++c) {
                 Wide r = a.W[p * n + c];
-                if constexpr (absorbs && !K::has_remainder) r = fused(-Wide(fine.diagonal[c]), X[c], r);
+                if constexpr (absorbs) r = fused(-Wide(fine.diagonal[c]), X[c], r);
                 lay_flat<1>(&r, 1, a.flat + (c * parts + p) * width);
             }
         }
@@ -211,16 +208,11 @@ private:
     }
 
     // a.carried = W(X) + S d.
-    LOBATTO_INLINE void settle(const Fine& fine, const V* S, const V* d, typename Fine::Arrays& a) const {
-        using Wide = typename Fine::V;
+    LOBATTO_INLINE void settle(const V* S, const V* d, typename Fine::Arrays& a) const {
         for (int p = 0; p < parts; ++p) {
             V product[n];
             times_hessian(S, d, p, false, product);
-            for (int c = 0; c < n; ++c) {
-                Wide W = a.W[p * n + c];
-                if constexpr (K::has_remainder) W = fused(Wide(fine.diagonal[c]), a.X[p * n + c], W);
-                a.carried[p * n + c] = W + of_parts(product[c], V(0.0));
-            }
+            for (int c = 0; c < n; ++c) a.carried[p * n + c] = a.W[p * n + c] + of_parts(product[c], V(0.0));
         }
     }
 };

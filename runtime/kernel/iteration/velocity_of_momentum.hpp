@@ -30,7 +30,7 @@ public:
             const State at{k, time, q, p};
             if constexpr (constraints > 0) {
                 real phi[constraints];
-                Formulas<K>::constraint(k, time, q, +phi, +a.phi_t, +a.G);
+                Formulas<K>::constraint(k, time, q, phi, a.phi_t, a.G);
             }
             rest(a);
             Status status = solve(at, a);
@@ -53,9 +53,9 @@ public:
         if constexpr (constraints > 0) {
             return workspace_.with([&](Arrays& a) {
                 real phi[constraints];
-                Formulas<K>::constraint(k, time, q, +phi, +a.phi_t, +a.G);
+                Formulas<K>::constraint(k, time, q, phi, a.phi_t, a.G);
                 Formulas<K>::legendre(k, time, q, v, a.p, a.mass);
-                Formulas<K>::multiplier_terms(k, time, q, v, +a.residual, a.residual + n);
+                Formulas<K>::multiplier_terms(k, time, q, v, a.residual, a.residual + n);
                 set_matrix(a);
                 if (!a.matrix.factor()) return Status::singular_mass;
                 solve_for(a, a.x);
@@ -63,7 +63,6 @@ public:
                 return is_finite(not_finite_part(a.x, unknowns)) ? Status::ok : Status::not_finite;
             });
         } else {
-            (void)k, (void)time, (void)q, (void)v, (void)lambda;
             return Status::unsupported;
         }
     }

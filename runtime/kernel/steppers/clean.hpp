@@ -213,8 +213,7 @@ struct CleanFixedPoint {
         int noisy = 0;  // iterations that changed no more than rounding may
         while (evaluations < evaluation_limit) {
             for (int p = 0; p < parts; ++p)
-                Formulas<K>::minus_acceleration(k, V(time) + node_time[p], static_cast<const V*>(a.X + p * n),
-                                                a.W + p * n);
+                Formulas<K>::minus_acceleration(k, V(time) + node_time[p], a.X + p * n, a.W + p * n);
             ++evaluations;
             const Change<real> change = iterate(q, q_rest, a);
             increment = change.size;
@@ -289,7 +288,7 @@ struct CleanFixedPoint {
             moved.value.store(a.q1 + c);
             moved.rest.store(a.q1_rest + c);
         });
-        Formulas<K>::minus_acceleration(k, end_time, static_cast<const real*>(a.q1), next + (s - 1) * n);
+        Formulas<K>::minus_acceleration(k, end_time, a.q1, next + (s - 1) * n);
         over_coordinates([&](auto lanes, int c) LOBATTO_FORMULA {
             using L = decltype(lanes);
             TwoFold<L> change{L(real(0)), L(real(0))};
@@ -385,8 +384,7 @@ private:
             real last = Limits<real>::largest;
             for (int correction = 0; correction < FixedPoint::correction_limit; ++correction) {
                 for (int i = 0; i < m; ++i)
-                    Formulas<K>::minus_acceleration(coefficients, this->node_time(i),
-                                                    static_cast<const real*>(plain.Q + i * n), plain.W + i * n);
+                    Formulas<K>::minus_acceleration(coefficients, this->node_time(i), plain.Q + i * n, plain.W + i * n);
                 for (int lane = 0; lane < FixedPoint::parts * width; ++lane)
                     for (int c = 0; c < n; ++c) {
                         const int place = (lane / width) * n + c, i = lane < m ? lane : m - 1;

@@ -15,6 +15,32 @@
 
 namespace lobatto {
 
+// The motion in tau comes near a place where the clock is 0, but not beyond it. Errors of its energy grow there like
+// one over the clock, and may throw it back. So where the clock has become small, the energy is looked at: it may be
+// off by a part of the larger of p.v here and where the clock became small. (At walls p.v vanishes, at poles it grows.)
+template <class real>
+struct SmallClock {
+    static constexpr real small = real(0.01), part = real(0.01);
+    real largest{};  // rate of the clock until now, of a step
+    real moving{};   // p.v where it became small; 0: it is not
+
+    // After a step of this rate from the start with this energy to (q, p).
+    template <class Stepper>
+    bool keeps_energy(const Stepper& stepper, real rate, real energy_of_start, const real* q, const real* p) {
+        largest = maximum(largest, rate);
+        if (!(rate < small * largest)) {
+            moving = real(0);
+            return true;
+        }
+        real energy, v[Stepper::n], product = real(0);
+        if (stepper.energy(real(0), q, p, &energy) != Status::ok) return false;
+        if (stepper.velocity(real(0), q, p, v) != Status::ok) return false;
+        for (int k = 0; k < Stepper::n; ++k) product += p[k] * v[k];
+        if (moving == real(0)) moving = fabs(product);
+        return fabs(energy - energy_of_start) <= part * maximum(moving, fabs(product));
+    }
+};
+
 template <class K>
 struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, Stepping::solved> {
     using Chain = Stepper<K, Form::general, Stepping::solved>;
@@ -28,6 +54,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     real origin{};                                        // the time at the start
     std::int64_t arrivals{};                              // since the start
     bool is_recorded{};                                   // the state of the chain
+    SmallClock<real> small_clock{};
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         values = parameters;
@@ -47,6 +74,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         Status status = Chain::prepare(values, step_size);
         if (status == Status::ok) status = Chain::start(real(0), position, momentum);
         now = before = {time, real(0)};
+        small_clock = {};
         origin = time;
         arrivals = 0;
         is_recorded = true;
@@ -60,8 +88,9 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         for (int k = 0; k < n; ++k) p_of_start[k] = p[k];
         const Status status = Chain::step();
         if (status != Status::ok) return status;
-        // The clock is 0 somewhere on the way, or below: the motion in tau comes near such a place, but not beyond it.
         if (!is_ahead(elapsed) || now.time + elapsed == now.time) return Status::time_stands_still;
+        if (!small_clock.keeps_energy(*this, elapsed / step_size, energy_of_start(), q, p))
+            return Status::time_stands_still;
         for (int k = 0; k < n; ++k) p_before[k] = p_of_start[k];
         before = now;
         now.add(elapsed);

@@ -30,7 +30,8 @@ struct ClockedEnsemble : Ensemble<K, width> {
     LongTime<T> passed;  // the start of the step that passed the last arrival of those that nobody asked for
     T q_passed[n], p_passed[n];
     T target;  // the time of the next arrival
-    real origin[width]{}, tolerance{}, interval{}, end{};
+    real origin[width]{}, energy_of_start[width]{}, tolerance{}, interval{}, end{};
+    SmallClock<real> small_clock[width];
     std::int64_t arrived[width]{}, recorded[width]{};  // arrivals since the start; the last of them that has a row
     ShortenedStep<K, T, true> shortened;
     bool is_filled{};
@@ -47,9 +48,9 @@ struct ClockedEnsemble : Ensemble<K, width> {
         Status status = single.prepare(given, step_size);
         if (status == Status::ok) status = single.start(time, q, p);
         if (status != Status::ok) return status;
-        place(lane, time, p);
+        place(lane, time);
         for (int other = 0; other < width && !is_filled; ++other)  // so that all have numbers to compute with
-            if (other != lane) place(other, time, p);
+            if (other != lane) place(other, time);
         is_filled = true;
         return status;
     }
@@ -130,12 +131,12 @@ private:
     }
     void aim(int lane) { set_lane(target, lane, time_of(lane, arrived[lane] + 1)); }
 
-    void place(int lane, real time, const real* p) {
+    void place(int lane, real time) {
         parameters[lane] = single.values;
         coefficients_of[lane] = single.coefficients;
         set_coefficients<K>(coefficients, lane, single.coefficients);
         motion.prepare(single, lane);
-        motion.start(single, p, lane);
+        motion.start(single, lane);
         for (LongTime<T>* moment : {&now, &before, &passed}) {
             set_lane(moment->time, lane, time);
             set_lane(moment->rest, lane, real(0));
@@ -146,6 +147,8 @@ private:
         }
         for (int i = 0; i < K::nodes; ++i) set_lane(motion.fixed_point.rates[i], lane, real(1));
         origin[lane] = time;
+        energy_of_start[lane] = single.energy_of_start();
+        small_clock[lane] = {};
         arrived[lane] = recorded[lane] = 0;
     }
 
@@ -159,12 +162,25 @@ private:
         if (any(moving & !moved)) this->retry(moving & !moved, now.time, evaluations, leave);
         const T& elapsed = motion.fixed_point.elapsed;
         const ActiveMask stands_still = moving & active & !(is_ahead(elapsed) & (now.time + elapsed != now.time));
-        for (int lane = 0; any(stands_still) && lane < width; ++lane)
-            if (stands_still[lane]) leave(lane, Status::time_stands_still);
+        for (int lane = 0; lane < width; ++lane)
+            if (moving[lane] && active[lane] && (stands_still[lane] || !keeps_energy(lane)))
+                leave(lane, Status::time_stands_still);
         LongTime<T> next = now;
         next.add(elapsed);
         set_where(moving & active, before, now);
         set_where(moving & active, now, next);
+    }
+
+    bool keeps_energy(int lane) {
+        SmallClock<real>& watch = small_clock[lane];
+        const real rate = lane_of(motion.fixed_point.elapsed, lane) / step_size;
+        if (!(rate < watch.small * watch.largest)) {  // as it says itself, without a state
+            watch = {maximum(watch.largest, rate), real(0)};
+            return true;
+        }
+        real q[n], p[n];
+        this->state_of(lane, q, p);
+        return watch.keeps_energy(single, rate, energy_of_start[lane], q, p);
     }
 
     // Leaves those of the lanes that arrive where somebody asks for their states; whether there were others.

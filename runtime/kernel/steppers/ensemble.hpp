@@ -165,7 +165,7 @@ protected:
         if (status != Status::ok) return status;
         set_coefficients<K>(coefficients, lane, coefficients_of[as]);
         motion.prepare(single, lane);
-        motion.start(single, p + as * n, lane);
+        motion.start(single, lane);
         return status;
     }
 
@@ -207,7 +207,7 @@ protected:
     void start_anew(int lane, real time) {
         real q[n], p[n];
         state_of(lane, q, p);
-        if (go_on_alone(lane, time, q, p) == Status::ok) motion.start(single, p, lane);
+        if (go_on_alone(lane, time, q, p) == Status::ok) motion.start(single, lane);
     }
 
     Status step_alone(int lane, real time) {

@@ -11,19 +11,20 @@
 #include "../base/numbers.hpp"
 #include "../iteration/constrained_fixed_point.hpp"
 #include "../iteration/galerkin.hpp"
-#include "../iteration/galerkin_newton.hpp"
+#include "../iteration/galerkin_constraints.hpp"
 #include "../iteration/velocity_of_momentum.hpp"
 
 namespace lobatto {
 
 template <class K>
-struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
-    using Newton = GalerkinNewton<K>;
+struct Stepper<K, Form::general, Stepping::solved> : GalerkinConstraints<K> {
+    using Newton = GalerkinConstraints<K>;
+    using Newton::multiplier_room;
     using Newton::n, Newton::active, Newton::constraints, Newton::cyclic, Newton::Z, Newton::r, Newton::m,
         Newton::kappas, Newton::N, Newton::room, Newton::entry_room, Newton::cyclic_room, Newton::coefficients,
         Newton::step_size, Newton::q, Newton::p, Newton::iterations, Newton::increment, Newton::workspace;
     using typename Newton::real, typename Newton::Arrays, typename Newton::Layout, typename Newton::Nothing;
-    static constexpr int nodes = K::nodes, multiplier_room = constraints > 0 ? constraints : 1;
+    static constexpr int nodes = K::nodes;
 
     // Fixed-point iterations need the mass matrix of a node alone, which is full for them unless it is light.
     static constexpr bool iterates_on_constraints = constraints > 0 && K::constant_mass;
@@ -147,7 +148,6 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
             if (status == Status::ok) *value = Formulas<K>::energy(coefficients, time, position, v);
             return status;
         } else {
-            (void)time, (void)position, (void)momentum, (void)value;
             return Status::unsupported;
         }
     }
@@ -190,7 +190,6 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
                 return Status::ok;
             });
         } else {
-            (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;
             return Status::unsupported;
         }
     }
@@ -211,7 +210,7 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinNewton<K> {
 
 private:
     using Newton::evaluate_nodes, Newton::assemble, Newton::impulse, Newton::tangent_column, Newton::freeze,
-        Newton::solve_stages, Newton::frozen;
+        Newton::solve_stages, Newton::frozen, Newton::check_constraints, Newton::keeps_constraints;
 
     // Y, kappa and the cyclic rates of a step that iterations have taken.
     void refresh() const {
@@ -256,7 +255,7 @@ private:
             p1[k] = p[k];
         }
         any.iteration.tolerance = this->tolerance;
-        if (any.iteration.step(coefficients, this->time(), +q1, +p1, true)) {
+        if (any.iteration.step(coefficients, this->time(), q1, p1, true)) {
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];
                 q[k] = q1[k];
@@ -295,73 +294,17 @@ private:
         return velocity_of_momentum.find(coefficients, time, position, momentum, of_last_step, v, mu);
     }
 
-    // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers.
-    Status check_constraints(const real* v, const real* mu) const {
-        if constexpr (constraints > 0) {
-            real phi[constraints], phi_t[constraints], G[K::constraint_entries], size[constraints], force[n];
-            Formulas<K>::constraint(coefficients, this->time(), static_cast<const real*>(q), +phi, +phi_t, +G);
-            for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
-            for (int k = 0; k < n; ++k) force[k] = real(0);
-            for (int e = 0; e < K::constraint_entries; ++e) {
-                const int c = K::constraint_row[e], k = K::constraint_column[e];
-                size[c] += fabs(G[e]) * (fabs(q[k]) + fabs(step_size * v[k]));
-                force[k] += G[e] * mu[c];
-            }
-            for (int c = 0; c < constraints; ++c)
-                if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return Status::off_constraints;
-            real largest = real(0), apart = real(0);
-            for (int k = 0; k < n; ++k) {
-                largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
-                apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
-            }
-            if (!(apart <= Limits<real>::root_epsilon * largest)) return Status::off_constraints;
-        } else {
-            (void)v, (void)mu;
-        }
-        return Status::ok;
-    }
-
-    // Whether positions at the end of the stages just solved keep the constraints, to half of the digits of the
-    // positions, of the way, and of how far the forces of the step move them; of one that a constraint holds fixed, of
-    // the way of the others, in the metric of the mass.
-    bool keeps_constraints(const real* q1, const real* v, const real* phi, const real* phi_t, const real* G,
-                           const Arrays& a) const {
-        real size[multiplier_room], reach[n], momentum_there[n], M[K::mass_entries > 0 ? K::mass_entries : 1];
-        for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
-        for (int k = 0; k < n; ++k) reach[k] = fabs(q[k]) + fabs(q1[k]) + fabs(step_size * v[k]);
-        Formulas<K>::legendre(coefficients, this->next_time(), q1, v, +momentum_there, +M);
-        real moved = real(0);  // sum M_kk (h v_k)^2
-        const auto each_mass = [&](const auto& use) {
-            for (int e = 0; e < K::mass_entries; ++e)
-                if (K::mass_row[e] == K::mass_column[e] && M[e] != real(0)) use(K::mass_row[e], fabs(M[e]));
-        };
-        each_mass([&](int k, real mass) { moved += mass * (step_size * v[k]) * (step_size * v[k]); });
-        each_mass([&](int k, real mass) {
-            reach[k] += sqrt(moved / mass);
-            for (int b = 0; b < active; ++b)
-                for (int i = 0; i < r && K::active_index[b] == k; ++i)
-                    reach[k] += fabs(step_size * (step_size * K::b[i] * a.g[i * Z + active + b]) / mass);
-        });
-        for (int e = 0; e < K::constraint_entries; ++e)
-            size[K::constraint_row[e]] += fabs(G[e]) * reach[K::constraint_column[e]];
-        for (int c = 0; c < constraints; ++c)
-            if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return false;
-        return true;
-    }
-
     // (D46) The multipliers of the end, which keep dphi/dt = 0 there, and their part of the momentum p1.
     Status end_on_constraints(const real* q1, real* p1, const Arrays& a) {
         if constexpr (constraints > 0) {
             real v[n], mu[constraints], phi[constraints], phi_t[constraints], G[K::constraint_entries];
             const Status status = velocity(this->next_time(), q1, p1, v, mu);
             if (status != Status::ok) return status;
-            Formulas<K>::constraint(coefficients, this->next_time(), q1, +phi, +phi_t, +G);
+            Formulas<K>::constraint(coefficients, this->next_time(), q1, phi, phi_t, G);
             if (!keeps_constraints(q1, v, phi, phi_t, G, a)) return Status::singular_jacobian;
             for (int e = 0; e < K::constraint_entries; ++e)
                 p1[K::constraint_column[e]] -= G[e] * mu[K::constraint_row[e]];
             for (int c = 0; c < constraints; ++c) last_multiplier[c] = -mu[c] / (step_size * K::b[r - 1]);
-        } else {
-            (void)q1, (void)p1, (void)a;
         }
         return Status::ok;
     }
@@ -375,11 +318,9 @@ private:
             for (int i = 0; i < r; ++i) {
                 this->node_variables(q, p, a.Y, i, a.z);
                 for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
-                rates[i] = Formulas<K>::clock(coefficients, this->time(), static_cast<const real*>(Q));
+                rates[i] = Formulas<K>::clock(coefficients, this->time(), Q);
                 passed += K::b[i] * rates[i];
             }
-        } else {
-            (void)a;
         }
         return step_size * passed;
     }

@@ -41,7 +41,7 @@ struct Walls {
         const Status status = stepper.velocity(time, q, p, velocity);
         if (status != Status::ok) return status;
         const auto& k = stepper.coefficients;
-        Formulas<K>::event(k, time, static_cast<const real*>(q), static_cast<const real*>(velocity), +value);
+        Formulas<K>::event(k, time, q, velocity, value);
         if constexpr (impacts > 0) look_at_impacts(stepper);
         for (int w = 0; w < count; ++w) {
             real& scale = stepper.wall_scale[w];
@@ -85,10 +85,9 @@ struct Walls {
     Status reset(S& stepper, int r) {
         if constexpr (K::resets > 0) {
             real positions[K::resets * n], velocities[K::resets * n];
-            Formulas<K>::reset(stepper.coefficients, time, static_cast<const real*>(q),
-                               static_cast<const real*>(velocity), +positions, +velocities);
+            Formulas<K>::reset(stepper.coefficients, time, q, velocity, positions, velocities);
             stepper.momentum(time, positions + r * n, velocities + r * n, p);
-            return look(stepper, time, positions + r * n, static_cast<const real*>(p));
+            return look(stepper, time, positions + r * n, p);
         }
         (void)stepper, (void)r;
         return Status::unsupported;
@@ -96,7 +95,7 @@ struct Walls {
 
 private:
     void look_at_impacts(S& stepper) {
-        Formulas<K>::impact(stepper.coefficients, time, static_cast<const real*>(q), +gradient, +rate, +restitution);
+        Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution);
         for (int w = 0; w < impacts; ++w) {
             real along = rate[w], speed = fabs(rate[w]), moved = fabs(rate[w] * stepper.step_size);
             for (int c = 0; c < n; ++c) {
@@ -122,7 +121,7 @@ struct Sides {
     static void take_at(S& stepper, real time, const real* q, const real* velocity) {
         if constexpr (switches_of<K>() > 0) {
             real values[K::events];
-            Formulas<K>::event(stepper.coefficients, time, q, velocity, +values);
+            Formulas<K>::event(stepper.coefficients, time, q, velocity, values);
             for (int i = 0; i < switches_of<K>(); ++i)
                 stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
             stepper.prepare(stepper.parameters, stepper.step_size);

@@ -20,7 +20,7 @@ Status forget_forces(S& stepper) {
         W = stepper.W;
     else
         W = stepper.W + (K::points - 1) * n;
-    Formulas<K>::minus_acceleration(stepper.coefficients, stepper.time(), static_cast<const real*>(stepper.q), W);
+    Formulas<K>::minus_acceleration(stepper.coefficients, stepper.time(), stepper.q, W);
     if constexpr (stepping_of<K>() == Stepping::composition) {
         stepper.ends.of = -1;
         if constexpr (K::neighbours) stepper.neighbours.begin(stepper.q, stepper.u, W);
@@ -43,9 +43,7 @@ Status event_functions(const Stepper<K>& stepper, typename K::real* values) {
     stepper.momentum(momentum);
     const real time = stepper.time();
     const Status status = stepper.velocity(time, stepper.q, momentum, velocity);
-    if (status == Status::ok)
-        Formulas<K>::event(stepper.coefficients, time, static_cast<const real*>(stepper.q),
-                           static_cast<const real*>(velocity), values);
+    if (status == Status::ok) Formulas<K>::event(stepper.coefficients, time, stepper.q, velocity, values);
     return status;
 }
 

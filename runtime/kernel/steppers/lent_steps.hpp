@@ -2,7 +2,7 @@
 // What refilled lanes ask of the lane stepper of each form: that a trajectory begins in a lane while others go on, the
 // polynomial of its last step, and the loan of that step to a Stepper.
 //
-// refill(motion, single, p, lane) begins at the start of `single`. displacements(...) gives what the positions of the
+// refill(motion, single, lane) begins at the start of `single`. displacements(...) gives what the positions of the
 // step are made of: with the basis of the form's Stepper, q(theta) = q_before + sum_j value_j(theta) moved_j. momenta
 // are those of rates; velocities those at its end: velocities answers in which lanes they are known. lend_state gives
 // one lane's state, lend_step one lane's step from the state that was lent.
@@ -70,8 +70,8 @@ struct LentStep<K, T, Form::separable, Stepping::solved> : LentVelocity<K, T> {
 
     // A trajectory that begins in the midst of others has a memory as they do: of a constant acceleration.
     template <class Single>
-    static void refill(Motion& motion, const Single& single, const real* momentum, int lane) {
-        motion.start(single, momentum, lane);
+    static void refill(Motion& motion, const Single& single, int lane) {
+        motion.start(single, lane);
         const real* const W0 = single.W + (s - 1) * n;
         motion.fixed_point.recall(
             single.u, [&](int, int c) { return W0[c]; }, [&](int, int c) { return single.q[c]; }, lane);
@@ -111,8 +111,8 @@ struct LentStep<K, T, Form::separable, Stepping::composition> : LentVelocity<K, 
     static constexpr int basis = ScalarFallback<K>::basis;
 
     template <class Single>
-    static void refill(Motion& motion, const Single& single, const real* momentum, int lane) {
-        motion.start(single, momentum, lane);
+    static void refill(Motion& motion, const Single& single, int lane) {
+        motion.start(single, lane);
     }
     template <class Given>
     LOBATTO_LANE static void displacements(const Motion& motion, const Given& k, const T& time, const T* q_before,
@@ -120,8 +120,8 @@ struct LentStep<K, T, Form::separable, Stepping::composition> : LentVelocity<K, 
         const T h = T(motion.h);
         T q[n], start[n], end[n];
         for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-        Formulas<K>::minus_acceleration(k, time, q_before, +start);
-        Formulas<K>::minus_acceleration(k, time + h, static_cast<const T*>(q), +end);
+        Formulas<K>::minus_acceleration(k, time, q_before, start);
+        Formulas<K>::minus_acceleration(k, time + h, q, end);
         for (int c = 0; c < n; ++c) {
             moved[0][c] = q[c] - q_before[c];
             moved[1][c] = h * u_before[c];
@@ -145,8 +145,8 @@ struct LentMomentum {
     static constexpr int n = K::coordinates;
 
     template <class Single>
-    static void refill(Motion& motion, const Single& single, const real* momentum, int lane) {
-        motion.start(single, momentum, lane);
+    static void refill(Motion& motion, const Single& single, int lane) {
+        motion.start(single, lane);
     }
     template <class Given>
     LOBATTO_LANE static void momenta(const T* rates, const Given&, T* momentum) {
@@ -204,8 +204,7 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
         for (int iteration = 0; iteration < 3; ++iteration) {
             T q[n], residual[n], packed[K::mass_entries], M[n * n];
             for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-            Formulas<K>::legendre(k, time, static_cast<const T*>(q), static_cast<const T*>(velocity), +residual,
-                                  +packed);
+            Formulas<K>::legendre(k, time, q, velocity, residual, +packed);
             for (int i = 0; i < n * n; ++i) M[i] = T(real(0));
             for (int e = 0; e < K::mass_entries; ++e) M[table.row[e] * n + table.column[e]] = packed[e];
             factor_symmetric<n>(M);

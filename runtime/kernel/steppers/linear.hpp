@@ -109,9 +109,9 @@ LOBATTO_DEVICE inline number discrete_energy(const given* E, const number* q, co
 
 // The stepper of an affine map: the whole step is K::propagate.
 template <class K>
-struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
-    using typename Motion<K>::real;
-    using Motion<K>::n, Motion<K>::coefficients, Motion<K>::q;
+struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
+    using typename ConstantMass<K>::real;
+    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::q, ConstantMass<K>::momentum;
     static constexpr int N = 0;
     static constexpr int nodes = K::points;
     // Of a few coordinates and more, the rows of Phi - I lie in lanes, column after column.
@@ -146,7 +146,7 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
         if constexpr (in_lanes)
             propagate(columns, q1, p1);
         else
-            K::propagate(coefficients, +q, +p, +q1, +p1);
+            K::propagate(coefficients, q, p, q1, p1);
         real sum = real(0);
         for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (p1[k] - p1[k]);
         if (!(sum == real(0))) return Status::not_finite;
@@ -162,29 +162,6 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : Motion<K> {
         for (int k = 0; k < n; ++k) momentum[k] = p[k];
     }
 
-    Status energy(real, const real* position, const real* momentum, real* value) const {
-        if constexpr (K::has_energy) {
-            *value = K::energy(coefficients, position, momentum);
-            return Status::ok;
-        } else {
-            return Status::unsupported;
-        }
-    }
-    void momentum(real, const real*, const real* velocity, real* momentum) const {
-        K::momentum(coefficients, velocity, momentum);
-    }
-    Status velocity(real, const real*, const real* momentum, real* velocity) const {
-        K::velocity(coefficients, momentum, velocity);
-        return Status::ok;
-    }
-    // dL/dv = M v and dL/dq = -M W.
-    void slopes(real, const real* position, const real* velocity, real* Lv, real* Lq) const {
-        real W[n];
-        K::minus_acceleration(coefficients, position, W);
-        for (int k = 0; k < n; ++k) W[k] = -W[k];
-        K::momentum(coefficients, velocity, Lv);
-        K::momentum(coefficients, W, Lq);
-    }
     Status residual(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
     Status jacobian(real, const real*, const real*, const real*, real*) const { return Status::unsupported; }
 
@@ -235,19 +212,14 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
 
     void prepare(const ScalarFallback<K>&, int) {}
     void set_tolerance(real) {}
-    void start(const ScalarFallback<K>& single, const real* momentum, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, momentum[c]);
-        }
-    }
+    void start(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
     void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
         for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
     }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time&, ActiveMask active) {
         T q1[n], p1[n], not_finite = T(real(0));
-        K::propagate(k, +q, +p, +q1, +p1);
+        K::propagate(k, q, p, q1, p1);
         for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
         active = active & (not_finite == T(real(0)));
         for (int c = 0; c < n; ++c) {

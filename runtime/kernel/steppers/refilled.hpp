@@ -66,14 +66,13 @@ struct LaneSamples {
                 q[c] = q_before[c] + position;
                 velocity[c] = rate / T(h);
             }
-            Formulas<K>::event(k, begun + (gone + T(at.grid[i])) * T(h), static_cast<const T*>(q),
-                               static_cast<const T*>(velocity), +y[i]);
+            Formulas<K>::event(k, begun + (gone + T(at.grid[i])) * T(h), q, velocity, y[i]);
         }
         T q[n], velocity[n], end[K::events];
         const T next = begun + (gone + T(real(1))) * T(h);
         for (int c = 0; c < n; ++c) q[c] = motion.position(c);
         ActiveMask quiet = Step::velocities(motion, k, next, velocity);
-        Formulas<K>::event(k, next, static_cast<const T*>(q), static_cast<const T*>(velocity), +end);
+        Formulas<K>::event(k, next, q, velocity, end);
         for (int e = 0; e < K::events; ++e) quiet = quiet & is_quiet(e, y, end[e]);
         return !quiet;
     }
@@ -180,9 +179,9 @@ struct RefilledEnsemble : Ensemble<K, width> {
         for (int i = 0; i < K::parameter_count; ++i) K::parameter(parameters[lane], i) = values[i];
         const Status status = this->begin_alone(lane, time, q, p);
         if (status != Status::ok) return status;
-        place(lane, time, p);
+        place(lane, time);
         for (int other = 0; other < width && !is_filled; ++other)  // so that all have numbers to compute with
-            if (other != lane) place(other, time, p);
+            if (other != lane) place(other, time);
         is_filled = true;
         return status;
     }
@@ -249,11 +248,11 @@ struct RefilledEnsemble : Ensemble<K, width> {
     }
 
 protected:
-    void place(int lane, real time, const real* p) {
+    void place(int lane, real time) {
         coefficients_of[lane] = single.coefficients;
         set_coefficients<K>(coefficients, lane, single.coefficients);
         motion.prepare(single, lane);
-        Step::refill(motion, single, p, lane);
+        Step::refill(motion, single, lane);
         looks.start(single, lane);
         begun.set(lane, time);
         gone.set(lane, real(0));

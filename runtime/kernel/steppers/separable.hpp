@@ -32,10 +32,10 @@ constexpr bool along_coordinates() {
 }
 
 template <class K>
-struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
-    using typename ConstantMass<K>::real;
-    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
-        ConstantMass<K>::u, ConstantMass<K>::iterations, ConstantMass<K>::increment;
+struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
+    using typename VelocityKept<K>::real;
+    using VelocityKept<K>::n, VelocityKept<K>::coefficients, VelocityKept<K>::step_size, VelocityKept<K>::q,
+        VelocityKept<K>::u, VelocityKept<K>::iterations, VelocityKept<K>::increment;
     static constexpr int s = K::points, m = s - 2;
     static constexpr int N = K::unknowns;
     static constexpr int nodes = s;
@@ -180,8 +180,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
             real full[2 * n * columns], second[s * n * n], at[n], ignored[n], entries[entry_room], none[n] = {};
             for (int i = 0; i < s; ++i) {
                 for (int k = 0; k < n; ++k) at[k] = local.node_position(i, k);
-                Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +ignored,
-                                  +entries);
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, at, ignored, +entries);
                 expand_entries<K>(entries, second + i * n * n);
             }
             if (!increment_of_step<K>(step_size, second, none, full)) return Status::singular_jacobian;
@@ -189,7 +188,6 @@ struct Stepper<K, Form::separable, Stepping::solved> : ConstantMass<K> {
             add_identity<K>(full, T);
             return Status::ok;
         } else {
-            (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;
             return Status::unsupported;
         }
     }

@@ -57,7 +57,7 @@ struct ShortenedStep {
             high = select(is_short, high, theta);
             // The change before was so small that its square is rounding.
             const ActiveMask is_there = fabs(change) <= T(Limits<real>::root_epsilon);
-            change = missing / (h * Formulas<K>::clock(step.coefficients, T(real(0)), static_cast<const T*>(q)));
+            change = missing / (h * Formulas<K>::clock(step.coefficients, T(real(0)), q));
             const ActiveMask done = active & (is_there | (fabs(change) <= T(real(2) * Limits<real>::epsilon)) |
                                               (high - low <= T(Limits<real>::epsilon)));
             for (int k = 0; k < n; ++k) {
@@ -115,11 +115,10 @@ private:
                 }
             }
             any_iteration.is_guess = true;
-            active = any_iteration.step(step.coefficients, T(real(0)), +q, +p, active);
+            active = any_iteration.step(step.coefficients, T(real(0)), q, p, active);
             elapsed = any_iteration.elapsed;
             return active;
         } else {
-            (void)any_iteration, (void)step, (void)theta, (void)is_first;
             return active & !active;
         }
     }

@@ -50,12 +50,12 @@ LOBATTO_INLINE void kick_and_drift(const Composition<K>& composition, const Give
     if constexpr (Composition<K>::kicks_ends) kick(0);
     drift(0);
     for (int i = 1; i < s - 1; ++i) {
-        Formulas<K>::minus_acceleration(k, T(time + composition.node_time[i]), static_cast<const T*>(q), W);
+        Formulas<K>::minus_acceleration(k, T(time + composition.node_time[i]), q, W);
         kick(i);
         drift(i);
     }
     if constexpr (Composition<K>::kicks_ends) {
-        Formulas<K>::minus_acceleration(k, T(time + h), static_cast<const T*>(q), W);
+        Formulas<K>::minus_acceleration(k, T(time + h), q, W);
         kick(s - 1);
     }
 }
@@ -138,7 +138,7 @@ struct NeighbourComposition {
             return step_in(composition, k, time, h, Registers<V, parts>{position}, Registers<V, parts>{velocity},
                            Registers<V, parts>{slope});
         } else {
-            return step_in(composition, k, time, h, +q[1 - now], +u[1 - now], +W[1 - now]);
+            return step_in(composition, k, time, h, q[1 - now], u[1 - now], W[1 - now]);
         }
     }
 
@@ -201,10 +201,10 @@ struct NeighbourCompositionOf<K, false> {
 };
 
 template <class K>
-struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
-    using typename ConstantMass<K>::real;
-    using ConstantMass<K>::n, ConstantMass<K>::coefficients, ConstantMass<K>::step_size, ConstantMass<K>::q,
-        ConstantMass<K>::u;
+struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
+    using typename VelocityKept<K>::real;
+    using VelocityKept<K>::n, VelocityKept<K>::coefficients, VelocityKept<K>::step_size, VelocityKept<K>::q,
+        VelocityKept<K>::u;
     static constexpr int s = K::points;
     static constexpr int nodes = s - (Composition<K>::kicks_ends ? 1 : 2);  // gradients of a step
     static constexpr int N = 0;
@@ -309,8 +309,7 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
             for (int k = 0; k < n; ++k) at[k] = position[k];
             K::velocity(coefficients, momentum, rate);
             for (int i = 0; i < s; ++i) {
-                Formulas<K>::node(coefficients, time + K::c[i] * step_size, static_cast<const real*>(at), +slope,
-                                  +entries);
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, at, slope, +entries);
                 for (int k = 0; k < n; ++k) rate[k] = fused(composition.kick[i], slope[k], rate[k]);
                 kick_increment<K>(composition.kick[i], entries, static_cast<const real*>(nullptr), full);
                 if (i == s - 1) break;
@@ -321,7 +320,6 @@ struct Stepper<K, Form::separable, Stepping::composition> : ConstantMass<K> {
             add_identity<K>(full, T);
             return Status::ok;
         } else {
-            (void)time, (void)position, (void)momentum, (void)q1, (void)p1, (void)T;
             return Status::unsupported;
         }
     }
@@ -371,9 +369,9 @@ private:
         ends.of = this->steps;
         real begin[n];
         for (int k = 0; k < n; ++k) begin[k] = position_before(k);
-        Formulas<K>::minus_acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size,
-                                        static_cast<const real*>(begin), +ends.W[0]);
-        Formulas<K>::minus_acceleration(coefficients, this->time(), static_cast<const real*>(q), +ends.W[1]);
+        Formulas<K>::minus_acceleration(coefficients, this->start_time + real(this->steps - 1) * step_size, begin,
+                                        ends.W[0]);
+        Formulas<K>::minus_acceleration(coefficients, this->time(), q, ends.W[1]);
     }
 };
 
@@ -404,18 +402,18 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         h = single.step_size;
     }
     void set_tolerance(real) {}
-    void start(const ScalarFallback<K>& single, const real*, int lane) { follow(single, lane); }
+    void start(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
     void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
         real velocity[n];
         for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
-        K::momentum(single.coefficients, static_cast<const real*>(velocity), momentum);
+        K::momentum(single.coefficients, velocity, momentum);
     }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const int next = 1 - now;
         T not_finite = T(real(0));
         if constexpr (moves_immediately<K>()) {
-            immediate_step<K>(composition, k, time, +q[now], +u[now], +W[now], +q[next], +u[next], +W[next]);
+            immediate_step<K>(composition, k, time, q[now], u[now], W[now], q[next], u[next], W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {
             T q1[n], u1[n], W1[n];

@@ -168,29 +168,15 @@ TEST_CASE("a stage is given sine and cosine of what moves, in packs of double, a
     }
 }
 
-TEST_CASE("what the stage map leaves of the forces is a function of its own, without what cancels") {
-    const SceneText star{"star", "(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - x^2*y + y^3/3", {"x", "y"}, {}};
-    const std::string header = kernel(star, 6).header;
-    CHECK(header.find("bool has_remainder = true;") != std::string::npos);
-    // R = (2 x y, x^2 - y^2): no term is linear.
-    const std::string remainder = body(header, "remainder");
-    INFO(remainder);
-    CHECK(count_of(remainder, "x * x") == 1);
-    CHECK(count_of(remainder, "y * y") == 1);
-    CHECK(count_of(remainder, " - ") == 1);
-    CHECK(count_of(remainder, " + ") == 0);
-    // An offset: the terms that cancel do so after expansion.
-    CHECK(count_of(body(kernel({"offset", "x'^2/2 - (x - 1)^2/2 - x^3/30", {"x"}, {}}, 6).header, "remainder"),
-                   " * ") <= 2);
-    // Towers of powers are not written out: no memory has room for their terms.
-    const std::string tower =
-        kernel({"tower", "q'^2/2 + p'^2/2 - (q^2 + p^2)/2 - ((p + q^64)^64 + q)^64", {"q", "p"}, {}}, 6).header;
-    CHECK(tower.size() < 20000);
-    // Nothing is left out of these: no quadratic part; forces for which fixed-point iterations take second derivatives.
-    for (const std::string& none : {kernel({"cubic", "(x'^2 + y'^2)/2 - x^2*y", {"x", "y"}, {}}, 6).header,
-                                    kernel({"stiff", "q'^2/2 - 50*q^2 - sin(q)", {"q"}, {}}, 6).header}) {
-        CHECK(none.find("bool has_remainder = false;") != std::string::npos);
-        CHECK(none.find("void remainder(") == std::string::npos);
+TEST_CASE("a broken power of a negative product keeps all its factors") {
+    // (-x)^(3/2) is (-x) sqrt(-x). Defect once: a pass lost x, which its own check found, and no kernel was written.
+    for (const char* power : {"(-x)^(3/2)", "(-2*x)^(5/2)", "(-x*x^2)^2.5"}) {
+        CAPTURE(power);
+        const Scene scene = read_scene(Source(
+            "minus.toml", fmt::format("lagrangian = \"x'^2/2 - {}\"\n[coordinates]\nx = {{ position = -0.5, velocity = "
+                                      "0 }}\n[run]\nstep = 0.01\nuntil = 1\n",
+                                      power)));
+        CHECK_NOTHROW(emit(derive(scene)));
     }
 }
 
@@ -294,11 +280,6 @@ TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suit
                     {"angles", "Angles", "angle"},
                     {"m", "near"}},
                    {3});
-    check_compiles({"rest",
-                    "m*(R'^2 + remainder'^2)/2 - (R^2 + remainder^2)/2 - R^2*remainder*has_remainder",
-                    {"R", "remainder"},
-                    {"m", "has_remainder"}},
-                   {5});
     // Costly as derived, not so after the passes.
     check_compiles({"eighth", "x'^2/2 - x^2/2 - x^3/3 - x^4/4 - x^5/5 - x^6/6 - x^7/7 - x^8/8", {"x"}, {}}, {5});
 }

@@ -147,6 +147,11 @@ TEST_CASE("a level of optimisation that CXX names takes the place of ours") {
     // A kernel tells by x - x whether x is finite, which this one would simplify away. The last level counts.
     const EnvironmentVariable fast("CXX", compiler + " -Ofast");
     CHECK(compile(answer).command.starts_with(compiler + " -Ofast -O2 -fpeel-loops -march=native "));
+    const EnvironmentVariable inexact("CXX", compiler + " -ffast-math");
+    CHECK_THROWS_WITH_AS(compile(answer),
+                         "the environment variable CXX asks for -ffast-math, which changes the results of kernels; "
+                         "leave it out",
+                         MachineError);
 }
 
 TEST_CASE("a product is rounded before it is added to, on every processor") {

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// Whether a start keeps the constraints, and the end of a step that Newton's iteration has taken.
+#ifndef LOBATTO_KERNEL_GALERKIN_CONSTRAINTS_HPP
+#define LOBATTO_KERNEL_GALERKIN_CONSTRAINTS_HPP
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "galerkin_newton.hpp"
+
+namespace lobatto {
+
+template <class K>
+struct GalerkinConstraints : GalerkinNewton<K> {
+    using Newton = GalerkinNewton<K>;
+    using Newton::n, Newton::active, Newton::constraints, Newton::Z, Newton::r, Newton::coefficients, Newton::step_size,
+        Newton::q, Newton::p;
+    using typename Newton::real, typename Newton::Arrays;
+    static constexpr int multiplier_room = constraints > 0 ? constraints : 1;
+
+protected:
+    // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers.
+    Status check_constraints(const real* v, const real* mu) const {
+        if constexpr (constraints > 0) {
+            real phi[constraints], phi_t[constraints], G[K::constraint_entries], size[constraints], force[n];
+            Formulas<K>::constraint(coefficients, this->time(), q, phi, phi_t, G);
+            for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
+            for (int k = 0; k < n; ++k) force[k] = real(0);
+            for (int e = 0; e < K::constraint_entries; ++e) {
+                const int c = K::constraint_row[e], k = K::constraint_column[e];
+                size[c] += fabs(G[e]) * (fabs(q[k]) + fabs(step_size * v[k]));
+                force[k] += G[e] * mu[c];
+            }
+            for (int c = 0; c < constraints; ++c)
+                if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return Status::off_constraints;
+            real largest = real(0), apart = real(0);
+            for (int k = 0; k < n; ++k) {
+                largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
+                apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
+            }
+            if (!(apart <= Limits<real>::root_epsilon * largest)) return Status::off_constraints;
+        }
+        return Status::ok;
+    }
+
+    // Whether positions at the end of the stages just solved keep the constraints, to half of the digits of the
+    // positions, of the way, and of how far the forces of the step move them; of one that a constraint holds fixed, of
+    // the way of the others, in the metric of the mass.
+    bool keeps_constraints(const real* q1, const real* v, const real* phi, const real* phi_t, const real* G,
+                           const Arrays& a) const {
+        real size[multiplier_room], reach[n], momentum_there[n], M[K::mass_entries > 0 ? K::mass_entries : 1];
+        for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
+        for (int k = 0; k < n; ++k) reach[k] = fabs(q[k]) + fabs(q1[k]) + fabs(step_size * v[k]);
+        Formulas<K>::legendre(coefficients, this->next_time(), q1, v, momentum_there, M);
+        real moved = real(0);  // sum M_kk (h v_k)^2
+        const auto each_mass = [&](const auto& use) {
+            for (int e = 0; e < K::mass_entries; ++e)
+                if (K::mass_row[e] == K::mass_column[e] && M[e] != real(0)) use(K::mass_row[e], fabs(M[e]));
+        };
+        each_mass([&](int k, real mass) { moved += mass * (step_size * v[k]) * (step_size * v[k]); });
+        each_mass([&](int k, real mass) {
+            reach[k] += sqrt(moved / mass);
+            for (int b = 0; b < active; ++b)
+                for (int i = 0; i < r && K::active_index[b] == k; ++i)
+                    reach[k] += fabs(step_size * (step_size * K::b[i] * a.g[i * Z + active + b]) / mass);
+        });
+        for (int e = 0; e < K::constraint_entries; ++e)
+            size[K::constraint_row[e]] += fabs(G[e]) * reach[K::constraint_column[e]];
+        for (int c = 0; c < constraints; ++c)
+            if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return false;
+        return true;
+    }
+};
+
+}  // namespace lobatto
+
+#endif
