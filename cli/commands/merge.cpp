@@ -79,22 +79,29 @@ public:
             const Shard shard{number, head_.shard->of, head_.shard->trajectories, ""};
             TableReader part = reader(path);
             std::vector<TableCell> cells;
-            std::int64_t next = shard.first();  // that may come
+            std::int64_t next = shard.first(), taken = 0;  // that may come; rows
             for (std::size_t rows; (rows = part.read(cells, rows_at_once)) > 0;) {
                 for (std::size_t row = 0; row < rows; ++row) {
                     const std::int64_t index = whole_in(cells[row * width]);
                     if (index == next)
                         ++next;
                     else if (index != next - 1 || next == shard.first())
-                        throw MachineError(
+                        throw InputError(
                             fmt::format("{} is damaged: trajectory {} stands where {} should", path, index, next));
                 }
+                taken += static_cast<std::int64_t>(rows);
                 take(cells, rows);
             }
             if (next != shard.last())
                 throw InputError(fmt::format("{} is not complete: it has {} of {}. Continue it with --resume", path,
                                              next - shard.first(),
                                              counted(shard.last() - shard.first(), "trajectory", "trajectories")));
+            if (!part.rows_told())
+                throw InputError(
+                    fmt::format("{} is damaged: its last line, which says how many rows it has, is missing", path));
+            if (*part.rows_told() != taken)
+                throw InputError(fmt::format("{} is damaged: it has {}, and says that it has {}", path,
+                                             counted(taken, "row", "rows"), *part.rows_told()));
         }
     }
 

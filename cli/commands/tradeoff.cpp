@@ -72,8 +72,9 @@ void tradeoff(const TradeoffOptions& options) {
         const std::vector<std::string> pictures = draw_pictures(experiment, folder);
         write(folder + "/report.html", report_page(experiment, folder, pictures, json));
         if (!options.json)
-            fmt::print("{0}/report.html shows it all; beside it tradeoff.csv, tradeoff.json and {1}.svg\n", folder,
-                       fmt::join(pictures, ".svg, "));
+            fmt::print("{}/report.html shows it all; beside it tradeoff.csv, tradeoff.json{}{}\n", folder,
+                       pictures.empty() ? "" : " and " + fmt::format("{}", fmt::join(pictures, ".svg, ")),
+                       pictures.empty() ? "" : ".svg");
     } else {
         tell("lobatto: interrupted; the measurements are kept, and the same command goes on from them.\n");
         throw ExitCode{interrupted_exit};

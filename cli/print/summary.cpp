@@ -7,7 +7,7 @@
 namespace lobatto {
 
 void print_row(const std::string& label, const std::string& value) {
-    fmt::print("  {:<24}{}\n", label, value);
+    fmt::print("  {:<23} {}\n", label, value);
 }
 
 std::string duration(double seconds) {

@@ -108,6 +108,7 @@ void TableFile::discard() {
 }
 
 void TableFile::finish() {
+    if (format_ == TableFormat::csv && head_.shard) block_ += fmt::format("{}{}\n", rows_of_shard, rows_);
     flush();
     if (format_ == TableFormat::h5) {
         write_hdf5(path_, head_, rows_, [&](std::int64_t row, std::size_t count) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,8 @@ struct TableHead {
 
 // The lines before the first row of a CSV, and back; nothing where a text begins in another way. `length`: of them.
 std::string csv_head(const TableHead& head);
+// Begins the last line of a .csv of a shard: how many rows stand above, so that merge knows when some are missing.
+inline constexpr std::string_view rows_of_shard = "# rows: ";
 std::optional<TableHead> read_csv_head(const std::string& text, std::size_t& length);
 
 // A document of JSON, and back.

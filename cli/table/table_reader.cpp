@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
 #include <iterator>
 
@@ -22,6 +23,7 @@ TableReader::TableReader(const std::string& path, TableFormat format, const std:
     if (format == TableFormat::h5) {
         hdf5_ = std::make_unique<Hdf5Reader>(path);
         head_ = hdf5_->head();
+        rows_told_ = hdf5_->rows();
         return;
     }
     file_.open(path, std::ios::binary);
@@ -47,6 +49,7 @@ TableReader::TableReader(const std::string& path, TableFormat format, const std:
         const std::size_t same = ours.find("'shape': (");
         if (!file_ || begin.compare(0, same, ours, 0, same) != 0)
             fail(fmt::format("it has other columns than {} says", json));
+        rows_told_ = std::atoll(begin.c_str() + same + std::strlen("'shape': ("));
     }
     if (head->columns.empty()) fail("it has no columns");
     head_ = *head;
@@ -81,6 +84,10 @@ std::size_t TableReader::read(std::vector<TableCell>& cells, std::size_t most) {
 bool TableReader::read_line(std::vector<TableCell>& cells) {
     std::string line;
     if (!std::getline(file_, line) || file_.eof()) return false;  // torn: without its end
+    if (line.starts_with(rows_of_shard)) {
+        rows_told_ = std::atoll(line.c_str() + rows_of_shard.size());
+        return false;
+    }
     const char *at = line.data(), *const end = at + line.size();
     for (std::size_t c = 0; c < head_.columns.size(); ++c) {
         const auto put = [&](auto number) {

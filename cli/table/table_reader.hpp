@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,8 @@ public:
     // How many bytes there are up to the end of row `row` of those read last; of CSV and .npy.
     std::int64_t bytes_to(std::size_t row) const { return ends_[row]; }
     std::int64_t head_bytes() const { return head_bytes_; }
+    // How many rows the file says that it has: at its begin, a .csv of a shard at its end, where it was read to there.
+    std::optional<std::int64_t> rows_told() const { return rows_told_; }
 
 private:
     [[noreturn]] void fail(const std::string& why) const;
@@ -39,6 +42,7 @@ private:
     std::unique_ptr<Hdf5Reader> hdf5_;
     std::int64_t head_bytes_ = 0, at_ = 0, row_ = 0;
     std::vector<std::int64_t> ends_;
+    std::optional<std::int64_t> rows_told_;
 };
 
 }  // namespace lobatto

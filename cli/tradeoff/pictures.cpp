@@ -50,7 +50,7 @@ std::string floors_of(const Experiment& experiment) {
     return text;
 }
 
-void draw_work_precision(const Experiment& experiment, const std::string& folder) {
+bool draw_work_precision(const Experiment& experiment, const std::string& folder) {
     std::map<Member, std::vector<const Measurement*>> members;
     for (const auto& [key, m] : experiment.store().all())
         if (m.complete && m.candidate.tolerance == 0 && experiment.figure(m) < 0.3 && experiment.figure(m) > 0)
@@ -84,7 +84,7 @@ void draw_work_precision(const Experiment& experiment, const std::string& folder
     std::vector<const Measurement*> best;
     for (const Measurement& m : front)
         if (experiment.figure(m) < 0.3 && experiment.figure(m) > 0) best.push_back(&m);
-    if (best.empty()) return;
+    if (best.empty()) return false;
     std::sort(best.begin(), best.end(), [](const auto* a, const auto* b) { return a->seconds < b->seconds; });
     int number = 0;
     for (const Member* member : shown) {
@@ -107,6 +107,7 @@ void draw_work_precision(const Experiment& experiment, const std::string& folder
                      data, gnuplot_text(experiment.scene().title), figure_name(experiment), floors_of(experiment),
                      curves),
          960, 560);
+    return true;
 }
 
 // For some decades the cheapest way.
@@ -123,12 +124,14 @@ std::vector<Measurement> representatives(const Experiment& experiment) {
     return chosen;
 }
 
-void draw_course(const std::string& folder, const std::string& name, const std::string& label,
+// False: there is no error to draw.
+bool draw_course(const std::string& folder, const std::string& name, const std::string& label,
                  const std::vector<std::string>& titles, const std::vector<std::vector<double>>& times,
                  const std::vector<std::vector<double>>& values) {
     std::string data, curves;
     for (std::size_t i = 0; i < titles.size(); ++i) {
-        if (values[i].empty()) continue;
+        if (std::all_of(values[i].begin(), values[i].end(), [](double value) { return !(std::fabs(value) > 0); }))
+            continue;
         data += fmt::format("$c{} << END\n", i);
         for (std::size_t j = 0; j < values[i].size(); ++j)
             if (std::fabs(values[i][j]) > 0)
@@ -137,20 +140,21 @@ void draw_course(const std::string& folder, const std::string& name, const std::
         curves += fmt::format("{}$c{} using 1:2 with lines lc rgb \"{}\" lw 1.5 title \"{}\"",
                               curves.empty() ? "plot " : ", \\\n     ", i, colours[i % 6], titles[i]);
     }
-    if (curves.empty()) return;
+    if (curves.empty()) return false;
     draw(folder, name,
          fmt::format("{}set logscale y\nset format y \"10^{{%T}}\"\n"
                      "set key outside right center vertical maxrows 20 Left reverse samplen 2 noenhanced\n"
                      "set xlabel \"time\"\nset ylabel \"{}\"\n{}\n",
                      data, label, curves),
          960, 400);
+    return true;
 }
 
 }  // namespace
 
 std::vector<std::string> draw_pictures(Experiment& experiment, const std::string& folder) {
-    draw_work_precision(experiment, folder);
-    std::vector<std::string> names = {"work_precision"}, titles;
+    std::vector<std::string> names, titles;
+    if (draw_work_precision(experiment, folder)) names.emplace_back("work_precision");
     std::vector<std::vector<double>> times, errors, energies;
     for (const Measurement& m : representatives(experiment)) {
         const Measurer::Course course =
@@ -161,12 +165,10 @@ std::vector<std::string> draw_pictures(Experiment& experiment, const std::string
         energies.push_back(course.energy);
     }
     if (titles.empty()) return names;
-    draw_course(folder, "error", "error", titles, times, errors);
-    names.push_back("error");
-    if (experiment.conserves() && !energies.front().empty()) {
-        draw_course(folder, "energy", "energy error", titles, times, energies);
-        names.push_back("energy");
-    }
+    if (draw_course(folder, "error", "error", titles, times, errors)) names.emplace_back("error");
+    if (experiment.conserves() && !energies.front().empty() &&
+        draw_course(folder, "energy", "energy error", titles, times, energies))
+        names.emplace_back("energy");
     return names;
 }
 

@@ -416,7 +416,7 @@ struct Export {
     static void read_constraint(const void* stepper, const void* time, const void* q, void* phi, void* phi_t, void* G) {
         if constexpr (constraint_count > 0) {
             real entries[K::constraint_entries];
-            Formulas<K>::constraint(of(stepper).coefficients, *in(time), in(q), out(phi), out(phi_t), +entries);
+            Formulas<K>::constraint(of(stepper).coefficients, *in(time), in(q), out(phi), out(phi_t), entries);
             for (int i = 0; i < constraint_count * n; ++i) out(G)[i] = real(0);
             for (int e = 0; e < K::constraint_entries; ++e)
                 out(G)[K::constraint_row[e] * n + K::constraint_column[e]] = entries[e];

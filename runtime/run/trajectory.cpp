@@ -201,6 +201,23 @@ std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& requ
            rows_of_step;
 }
 
+// With a clock a motion that fails went on from the state of its chain that was recorded last, not from the last
+// arrival.
+class LastOfChain {
+public:
+    void look(TrajectoryResult& result, const NumberStepper::Parts& records, std::int64_t count) {
+        const std::ptrdiff_t n = std::ssize(result.q), columns = 1 + 2 * n;
+        if (count > 0) row_.assign(records.begin() + (count - 1) * columns, records.begin() + count * columns);
+        if (result.status == LOBATTO_OK || row_.empty()) return;
+        result.time = row_[0];
+        result.q.assign(row_.begin() + 1, row_.begin() + 1 + n);
+        result.p.assign(row_.begin() + 1 + n, row_.end());
+    }
+
+private:
+    std::vector<double> row_;  // t, q, p
+};
+
 }  // namespace
 
 std::string list_text(const std::vector<double>& values) {
@@ -246,6 +263,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     NumberStepper::Parts records, events, time;
     const std::int64_t event_rows =
         request.events && kernel->events > 0 ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
+    LastOfChain last_of_chain;
     Pace pace;
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
@@ -261,12 +279,12 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         result.status = stepper.advance(call, records, events);
         result.seconds += processor_seconds() - processor_start;
         const double seconds = seconds_since(start);
-
         add(result, call);
         stepper.state(time, q, p);
         result.time = time[0];
         result.q = rounded(q, parts);
         result.p = rounded(p, parts);
+        if (kernel->clocked != 0) last_of_chain.look(result, records, call.records_written);
         result.events += call.events_written;
         if (call.events_written > 0) {
             const std::vector<double> found = rounded(events, parts);
@@ -279,7 +297,6 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             keeper.keep(stop_at(events, parts, columns, result), 1, 0, true);
             return result;
         }
-
         pace.took(seconds, call.steps_done);
         if (request.progress && seconds_since(last_progress) > progress_seconds) {
             last_progress = Clock::now();

@@ -337,6 +337,21 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
     CHECK(swept.err.find("2 of 4 trajectories failed: 2 t + h equals t or the clock is 0.") != std::string::npos);
 }
 
+TEST_CASE("a motion with a clock that fails tells the last state of its file") {
+    const test::TemporaryFolder folder;
+    for (const double step : {0.05, 0.1}) {
+        test::write_text(folder / "scene.toml",
+                         kepler(0.9, "points = 8\nclock = \"auto\"", fmt::format("step = {}\nuntil = 62.83", step)));
+        const test::Finished done = test::run(
+            {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet", "--unmeasured"});
+        CHECK(done.exit_code == 3);
+        const std::vector<double> last = read_trajectory(folder / "run.csv").rows.back();
+        INFO(done.err);
+        CHECK(done.err.find(fmt::format("after t = {:.6g}, from q = ({:.6g}, {:.6g})", last[0], last[1], last[2])) !=
+              std::string::npos);
+    }
+}
+
 TEST_CASE("an automatic clock follows the poles of the Lagrangian") {
     const auto clock_of = [](const std::string& lagrangian) {
         const Scene scene =

@@ -412,6 +412,19 @@ TEST_CASE("steps are cut where a formula is not smooth: whole numbers of abs, ma
         known.lagrangian.subs(known.coordinates[0].position == 1).subs(known.coordinates[0].velocity == 0).is_equal(4));
 }
 
+TEST_CASE("a motion may begin just before a switch that is small all the way") {
+    // Defect once: zero was measured by the switch itself, 1e-8, not by the rounding of x = 3.3.
+    for (const double step : {6e-5, 6.01e-5, 1e-4, 1.7e-4}) {
+        CAPTURE(step);
+        const Ended ended = run(
+            "lagrangian = \"x'^2/2\"\n[coordinates]\nx = { position = 3.3008413461538466, velocity = 1 }\n[forces]\n"
+            "x = \"if((x - 3.301)^2 < 1e-8, 100, 0)\"\n" +
+            method("points = 4", step, 20 * step));
+        CHECK(ended.result.status == LOBATTO_OK);
+        CHECK(ended.result.p[0] == doctest::Approx(std::sqrt(1 + 2 * 100 * 2e-4)).epsilon(1e-12));
+    }
+}
+
 TEST_CASE("a contact of one side keeps the order of the method") {
     // A mass that meets a spring at x = 0: nonlinear on both sides.
     const auto end = [&](const std::string& how, double step) {

@@ -93,6 +93,7 @@ TEST_SUITE("slow") {
         answer_of("stability_members", {"stability"});
         answer_of("stability", {"stability", scene("harmonic_oscillator")});
         answer_of("stability", {"stability", scene("henon_heiles")});
+        answer_of("stability", {"stability", scene("gyroscopic_pendulum")});  // without modes
         const auto proof = answer_of("verify", {"verify", scene("pendulum")});
         CHECK(proof["holds"] == true);
         CHECK(proof["claims"].size() > 10);

@@ -173,7 +173,7 @@ private:
         for (int part = 0; part < parts; ++part) {
             V force[n];
             for (int c = 0; c < n; ++c) force[c] = a.f[part * n + c];
-            add_pull(a.G + part * slopes, a.pull + part * constraints, +force);
+            add_pull(a.G + part * slopes, a.pull + part * constraints, force);
             divide_by_mass(force, a.W + part * n);
         }
         V worst = V(real(0));
@@ -223,7 +223,7 @@ private:
             correct(multipliers, a);
             const real e = iterate(q, v, multipliers, a);
             if (!is_finite(e) || (evaluation > rule.judged_after && !rule.contracts(e, e_before))) return false;
-            if (evaluation > 1 && (rule.is_small(e) || rule.stagnates(e, e_before))) {
+            if (evaluation > 1 && rule.is_done(e, e_before)) {
                 increment = e;
                 return finish(k, time, q, p, multipliers, a);
             }

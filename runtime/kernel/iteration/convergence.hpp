@@ -30,7 +30,10 @@ struct Convergence {
 
     // The rest is small, or increments no longer shrink because they are rounding.
     LOBATTO_INLINE Truth reached(const T& e, const T& e_before) const {
-        return either(either(e * e <= enough * e_before, is_small(e)), stagnates(e, e_before));
+        return either(e * e <= enough * e_before, is_done(e, e_before));
+    }
+    LOBATTO_INLINE Truth is_done(const T& e, const T& e_before) const {
+        return either(is_small(e), stagnates(e, e_before));
     }
     LOBATTO_INLINE Truth is_small(const T& e) const { return e <= enough; }
     LOBATTO_INLINE Truth stagnates(const T& e, const T& e_before) const {

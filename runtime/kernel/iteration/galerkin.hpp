@@ -161,7 +161,7 @@ private:
             evaluations = select(active, evaluations + T(real(1)), evaluations);
             const T e = iterate(k, time, q, p, kappa_now, a);
             if (evaluation > rule.judged_after) active = active & rule.contracts(e, e_before);
-            const ActiveMask done = active & (rule.is_small(e) | rule.stagnates(e, e_before));
+            const ActiveMask done = active & rule.is_done(e, e_before);
             if (any(done)) {
                 increment = select(done, e, increment);
                 solved = solved | finish(k, time, q, p, kappa_now, done, a);

@@ -20,24 +20,26 @@ namespace lobatto {
 // off by a part of the larger of p.v here and where the clock became small. (At walls p.v vanishes, at poles it grows.)
 template <class real>
 struct SmallClock {
-    static constexpr real small = real(0.01), part = real(0.01);
+    real energy_of_start{};
     real largest{};  // rate of the clock until now, of a step
     real moving{};   // p.v where it became small; 0: it is not
 
-    // After a step of this rate from the start with this energy to (q, p).
-    template <class Stepper>
-    bool keeps_energy(const Stepper& stepper, real rate, real energy_of_start, const real* q, const real* p) {
+    // After a step of this rate.
+    bool is_small(real rate) {
         largest = maximum(largest, rate);
-        if (!(rate < small * largest)) {
-            moving = real(0);
-            return true;
-        }
+        const bool small = rate < real(0.01) * largest;
+        if (!small) moving = real(0);
+        return small;
+    }
+    // After a step to (q, p), where it is.
+    template <class Stepper>
+    bool keeps_energy(const Stepper& stepper, const real* q, const real* p) {
         real energy, v[Stepper::n], product = real(0);
         if (stepper.energy(real(0), q, p, &energy) != Status::ok) return false;
         if (stepper.velocity(real(0), q, p, v) != Status::ok) return false;
         for (int k = 0; k < Stepper::n; ++k) product += p[k] * v[k];
         if (moving == real(0)) moving = fabs(product);
-        return fabs(energy - energy_of_start) <= part * maximum(moving, fabs(product));
+        return fabs(energy - energy_of_start) <= real(0.01) * maximum(moving, fabs(product));
     }
 };
 
@@ -74,7 +76,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         Status status = Chain::prepare(values, step_size);
         if (status == Status::ok) status = Chain::start(real(0), position, momentum);
         now = before = {time, real(0)};
-        small_clock = {};
+        small_clock = {energy_of_start};
         origin = time;
         arrivals = 0;
         is_recorded = true;
@@ -89,7 +91,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         const Status status = Chain::step();
         if (status != Status::ok) return status;
         if (!is_ahead(elapsed) || now.time + elapsed == now.time) return Status::time_stands_still;
-        if (!small_clock.keeps_energy(*this, elapsed / step_size, energy_of_start(), q, p))
+        if (small_clock.is_small(elapsed / step_size) && !small_clock.keeps_energy(*this, q, p))
             return Status::time_stands_still;
         for (int k = 0; k < n; ++k) p_before[k] = p_of_start[k];
         before = now;

@@ -30,7 +30,7 @@ struct ClockedEnsemble : Ensemble<K, width> {
     LongTime<T> passed;  // the start of the step that passed the last arrival of those that nobody asked for
     T q_passed[n], p_passed[n];
     T target;  // the time of the next arrival
-    real origin[width]{}, energy_of_start[width]{}, tolerance{}, interval{}, end{};
+    real origin[width]{}, tolerance{}, interval{}, end{};
     SmallClock<real> small_clock[width];
     std::int64_t arrived[width]{}, recorded[width]{};  // arrivals since the start; the last of them that has a row
     ShortenedStep<K, T, true> shortened;
@@ -147,8 +147,7 @@ private:
         }
         for (int i = 0; i < K::nodes; ++i) set_lane(motion.fixed_point.rates[i], lane, real(1));
         origin[lane] = time;
-        energy_of_start[lane] = single.energy_of_start();
-        small_clock[lane] = {};
+        small_clock[lane] = {single.energy_of_start()};
         arrived[lane] = recorded[lane] = 0;
     }
 
@@ -173,14 +172,10 @@ private:
 
     bool keeps_energy(int lane) {
         SmallClock<real>& watch = small_clock[lane];
-        const real rate = lane_of(motion.fixed_point.elapsed, lane) / step_size;
-        if (!(rate < watch.small * watch.largest)) {  // as it says itself, without a state
-            watch = {maximum(watch.largest, rate), real(0)};
-            return true;
-        }
+        if (!watch.is_small(lane_of(motion.fixed_point.elapsed, lane) / step_size)) return true;
         real q[n], p[n];
         this->state_of(lane, q, p);
-        return watch.keeps_energy(single, rate, energy_of_start[lane], q, p);
+        return watch.keeps_energy(single, q, p);
     }
 
     // Leaves those of the lanes that arrive where somebody asks for their states; whether there were others.

@@ -138,10 +138,29 @@ struct Sides {
     static Status of_walls(S& stepper, real time, const real* q, const real* p) {
         Walls<K> wall;
         for (real& scale : stepper.wall_scale) scale = real(0);
+        if constexpr (switches_of<K>() > 0) scale_switches(stepper, time, q, p);
         const Status status = wall.look(stepper, time, q, p);
         for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
             if (wall.is_behind(w)) return Status::off_constraints;
         return status;
+    }
+    // sum |du/dx x| over the time, positions and velocities: what a rounding of these does to a switch u, over epsilon.
+    static void scale_switches(S& stepper, real time, const real* q, const real* p) {
+        real x[1 + 2 * n] = {time}, here[K::events], there[K::events];
+        for (int k = 0; k < n; ++k) x[1 + k] = q[k];
+        if (stepper.velocity(time, q, p, x + 1 + n) != Status::ok) return;
+        Formulas<K>::event(stepper.coefficients, x[0], x + 1, x + 1 + n, here);
+        for (real& moved : x) {
+            const real kept = moved;
+            moved += Limits<real>::root_epsilon * moved;
+            Formulas<K>::event(stepper.coefficients, x[0], x + 1, x + 1 + n, there);
+            moved = kept;
+            for (int i = 0; i < switches_of<K>(); ++i) {
+                const real change =
+                    fabs(there[K::events - switches_of<K>() + i] - here[K::events - switches_of<K>() + i]);
+                if (is_finite(change)) stepper.wall_scale[impacts_of<K>() + i] += change / Limits<real>::root_epsilon;
+            }
+        }
     }
     static Status start(S& stepper, real time, const real* q, const real* p) {
         take(stepper, time, q, p);

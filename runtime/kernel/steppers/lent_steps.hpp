@@ -204,7 +204,7 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
         for (int iteration = 0; iteration < 3; ++iteration) {
             T q[n], residual[n], packed[K::mass_entries], M[n * n];
             for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-            Formulas<K>::legendre(k, time, q, velocity, residual, +packed);
+            Formulas<K>::legendre(k, time, q, velocity, residual, packed);
             for (int i = 0; i < n * n; ++i) M[i] = T(real(0));
             for (int e = 0; e < K::mass_entries; ++e) M[table.row[e] * n + table.column[e]] = packed[e];
             factor_symmetric<n>(M);

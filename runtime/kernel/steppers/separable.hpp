@@ -180,7 +180,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
             real full[2 * n * columns], second[s * n * n], at[n], ignored[n], entries[entry_room], none[n] = {};
             for (int i = 0; i < s; ++i) {
                 for (int k = 0; k < n; ++k) at[k] = local.node_position(i, k);
-                Formulas<K>::node(coefficients, time + K::c[i] * step_size, at, ignored, +entries);
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, at, ignored, entries);
                 expand_entries<K>(entries, second + i * n * n);
             }
             if (!increment_of_step<K>(step_size, second, none, full)) return Status::singular_jacobian;

@@ -309,7 +309,7 @@ struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
             for (int k = 0; k < n; ++k) at[k] = position[k];
             K::velocity(coefficients, momentum, rate);
             for (int i = 0; i < s; ++i) {
-                Formulas<K>::node(coefficients, time + K::c[i] * step_size, at, slope, +entries);
+                Formulas<K>::node(coefficients, time + K::c[i] * step_size, at, slope, entries);
                 for (int k = 0; k < n; ++k) rate[k] = fused(composition.kick[i], slope[k], rate[k]);
                 kick_increment<K>(composition.kick[i], entries, static_cast<const real*>(nullptr), full);
                 if (i == s - 1) break;

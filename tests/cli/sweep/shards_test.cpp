@@ -163,7 +163,8 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
           one + ": the table would overwrite this part; give it another name\n");
     // One that was interrupted.
     const std::string text = test::read_file(two);
-    test::write_text(two, text.substr(0, text.rfind('\n', text.size() - 2) + 1));
+    const std::size_t last_row = text.rfind('\n', text.rfind("# rows: ") - 2) + 1;
+    test::write_text(two, text.substr(0, last_row));
     CHECK(refusal({one, two, three, four}, out) ==
           two + " is not complete: it has 2 of 3 trajectories. Continue it with --resume\n");
     std::filesystem::rename(two, two + ".partial");
@@ -196,6 +197,41 @@ TEST_CASE("parts that do not belong together are told apart, and missing ones ar
     for (const char* shard : {"0/4", "5/4", "3", "1/0", "a/b", "1/2/3", "-1/4", "1/10000000"})
         CHECK(place.refusal("no.csv", {"--vary", "q=1", "--shard", shard})
                   .starts_with(std::string("--shard: '") + shard + "' is no part of a sweep; 3/64 is the third of 64"));
+}
+
+TEST_CASE("a part that has lost or doubled a row is not merged") {
+    const test::SweepFolder place;
+    for (const std::string ending : {".csv", ".npy"}) {
+        CAPTURE(ending);
+        const auto merged = [&] {
+            return place.lobatto(
+                {"merge", place.file("1" + ending), place.file("2" + ending), "-o", place.file("m" + ending)});
+        };
+        for (const std::string part : {"1", "2"})
+            REQUIRE(
+                place.sweep(part + ending, {"--vary", "q=1,2", "--until", "1", "--every", "5", "--shard", part + "/2"})
+                    .exit_code == 0);
+        CHECK(merged().exit_code == 0);
+        std::filesystem::remove(place.file("m" + ending));
+        const std::string whole = test::read_file(place.file("2" + ending));
+        std::vector<std::string> damaged;
+        if (ending == ".csv") {
+            const std::size_t end = whole.rfind("# rows: "), last = whole.rfind('\n', end - 2) + 1,
+                              before = whole.rfind('\n', last - 2) + 1;
+            damaged = {whole.substr(0, end), whole.substr(0, last) + whole.substr(end),
+                       whole.substr(0, before) + whole.substr(last), whole.substr(0, end) + whole.substr(last)};
+        } else {
+            damaged = {whole.substr(0, whole.size() - 8), whole + whole.substr(whole.size() - 72)};
+        }
+        for (const std::string& text : damaged) {
+            test::write_text(place.file("2" + ending), text);
+            const test::Finished done = merged();
+            INFO(done.err);
+            CHECK(done.exit_code == 2);
+            CHECK(done.err.find("2" + ending + " is damaged: it") != std::string::npos);
+            CHECK(!std::filesystem::exists(place.file("m" + ending)));
+        }
+    }
 }
 
 TEST_CASE("a sweep that is killed again and again and resumed has the bytes of one that was never stopped") {
