@@ -140,8 +140,7 @@ struct HandwrittenKernel {
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr const char* method = "by hand";
     static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false,
-                          clean = false, is_explicit = false, uses_hessian = true,
-                          scaled_mass = false;
+                          clean = false, is_explicit = false, uses_hessian = true, scaled_mass = false;
     static constexpr int events = 0, angles = 0;
 };
 
