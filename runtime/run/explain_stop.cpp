@@ -98,7 +98,7 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
                 why =
                     "the clock comes to 0 along the step, or so near to it that time stands still or the energy is "
                     "lost";
-                advice = "a clock that is positive wherever the motion goes";
+                advice = "a clock that is positive wherever the motion goes, or " + smaller;
                 break;
             }
             why = fmt::format("t + h equals t in the numbers of the run: h = {:.6g} is below the rounding of t",

@@ -45,6 +45,13 @@ def test_a_lagrangian_written_in_python_is_the_scene_of_the_same_text(pendulum):
         lobatto.Lagrangian("q'^2/2 - k*q", q=1)
 
 
+def test_a_companion_in_finer_numbers_measures_rounding(pendulum):
+    run = lobatto.run(pendulum, until=5, points=10, companion="double-double")
+    assert 0 < run.error < 1e-13
+    with pytest.raises(lobatto.InputError, match="a companion needs finer numbers"):
+        lobatto.run(pendulum, until=5, companion="float")
+
+
 def test_dense_output_is_the_polynomial_of_the_step(pendulum):
     run = lobatto.run(pendulum, until=5, points=6)
     fine = lobatto.run(pendulum, until=5, points=6, step=0.0125)
