@@ -163,8 +163,7 @@ void SweepStarts::find_dependents() {
         if (std::any_of(columns_.begin(), columns_.end(), [&](const Column& column) {
                 return column.of.role == Role::parameter && requirement.value.has(symbols[column.of.index]);
             }))
-            if (std::optional<Tape> value = Tape::of(requirement.value, symbols))
-                required_.push_back({std::move(*value), requirement.may_vanish});
+            required_.push_back({Tape::of(requirement.value, symbols).value(), requirement.may_vanish});
     const auto put = [&](Role role, std::size_t k, const GiNaC::ex& value, const std::string& what,
                          std::vector<double>& numbers, std::vector<GiNaC::numeric>& exact_numbers) {
         bool depends = false;

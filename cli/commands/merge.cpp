@@ -79,7 +79,8 @@ public:
             const Shard shard{number, head_.shard->of, head_.shard->trajectories, ""};
             TableReader part = reader(path);
             std::vector<TableCell> cells;
-            std::int64_t next = shard.first(), taken = 0;  // that may come; rows
+            std::int64_t next = shard.first();  // that may come
+            std::int64_t taken = 0;             // rows
             for (std::size_t rows; (rows = part.read(cells, rows_at_once)) > 0;) {
                 for (std::size_t row = 0; row < rows; ++row) {
                     const std::int64_t index = whole_in(cells[row * width]);

@@ -197,19 +197,26 @@ private:
         Numbers gradient;
         for (const cln::cl_R& force : force_) gradient.push_back(-force);
         compare(claim, gradient, times(mass_, machine_.get("W", n_)), force_size_);
+        compare_columns(claim, "S", derivatives(system_.gradient, system_.q));
+        machine_.run("minus_acceleration");
+        compare(claim, gradient, times(mass_, machine_.get("W", n_)), force_size_);
+        if (machine_.has("quadratic_part")) {
+            machine_.run("quadratic_part");
+            compare_columns(claim, "S0", derivation_.structure.separable().constant_hessian.dense());
+        }
+    }
+    // `second` = M S, column by column; of S a program gives the entries that may differ from zero.
+    void compare_columns(const std::string& claim, const std::string& name, const GiNaC::matrix& second) {
         const auto& places = derivation_.structure.constant_mass().entries;
-        const Numbers stored = machine_.get("S", places.size());
-        const Numbers second = formulas_(entries(derivatives(system_.gradient, system_.q)));
+        const Numbers stored = machine_.get(name, places.size()), wanted = formulas_(entries(second));
         for (std::size_t l = 0; l < n_; ++l) {
             Numbers expected, column(n_, cln::cl_R(0));
             for (std::size_t e = 0; e < places.size(); ++e)
                 if (static_cast<std::size_t>(places[e].second) == l)
                     column[static_cast<std::size_t>(places[e].first)] = stored[e];
-            for (std::size_t k = 0; k < n_; ++k) expected.push_back(second[k * n_ + l]);
+            for (std::size_t k = 0; k < n_; ++k) expected.push_back(wanted[k * n_ + l]);
             compare(claim, expected, times(mass_, column));
         }
-        machine_.run("minus_acceleration");
-        compare(claim, gradient, times(mass_, machine_.get("W", n_)), force_size_);
     }
     GiNaC::matrix derivatives(const std::vector<ex>& vector, const std::vector<GiNaC::symbol>& symbols) const {
         return derivative_of(vector, symbols).dense();

@@ -115,10 +115,13 @@ std::vector<std::string> compile_arguments(const Compiler& compiler, const std::
     // -ffp-contract=off: products and sums are fused where the text says so (`fused`), nowhere else; so g++ and clang++
     // give the same bits on one kind of processor, and the error-free sums of a kernel keep their proof (adr/0002).
     // -ffast-math is never among the flags, and refused in CXX: it would let the compiler simplify x - x, and so the
-    // checks for finite numbers, away. -fpeel-loops: loops over the nodes and coordinates of small systems are written
-    // out, as with -O3, which takes half as long again. clang++ does so anyway. The general form (steppers/general.hpp)
-    // compiles in a sixth less time, to the same speed, where only loops of up to 60 instructions are, not 200. A level
-    // of optimisation among the words of CXX takes the place of these; not -Ofast, which is -ffast-math.
+    // checks for finite numbers, away.
+    //
+    // -fpeel-loops: loops over the nodes and coordinates of small systems are written out, as with -O3, which takes
+    // half as long again. clang++ does so anyway. The general form (steppers/general.hpp) compiles in a sixth less
+    // time, to the same speed, where only loops of up to 60 instructions are, not 200.
+    //
+    // A level of optimisation among the words of CXX takes the place of these; not -Ofast, which is -ffast-math.
     const bool has_level = std::any_of(arguments.begin(), arguments.end(), [](const std::string& word) {
         return word.starts_with("-O") && word != "-Ofast";
     });

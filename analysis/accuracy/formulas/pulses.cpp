@@ -162,13 +162,11 @@ private:
     }
 
     void of_table(const Spline& spline, const ex& u) {
-        if (!u.is_polynomial(t_) || u.degree(t_) != 1) return;
-        const ex slope = u.coeff(t_, 1).evalf(), offset = u.coeff(t_, 0).evalf();
-        if (!GiNaC::is_a<GiNaC::numeric>(slope) || !GiNaC::is_a<GiNaC::numeric>(offset)) return;
-        const double a = GiNaC::ex_to<GiNaC::numeric>(slope).to_double(),
-                     b = GiNaC::ex_to<GiNaC::numeric>(offset).to_double();
+        if (!u.is_polynomial(t_)) return;
+        const std::vector<double> c = coefficients_of(u.expand());
+        if (c.size() != 2) return;
         for (const Bend& bend : bends_of(spline))
-            if (pulses_.size() < most_pulses) add((bend.place - b) / a, bend.width / std::fabs(a));
+            if (pulses_.size() < most_pulses) add((bend.place - c[0]) / c[1], bend.width / std::fabs(c[1]));
     }
 
     double time_of_sample(std::size_t i) const { return begin_ + static_cast<double>(i) * ((end_ - begin_) / samples); }

@@ -176,14 +176,12 @@ void SystemReader::Bodies::refuse_inertia(const Entry& entry, const std::string&
         if (!(may_vanish ? here >= 0 : here > 0)) fail(entry.value.at, complaint);
         reader_.require(value, may_vanish, complaint, entry.value.at);
     };
-    const std::string positive = fmt::format("the inertia of {} is not positive: every moment of inertia is", name),
-                      possible = fmt::format(
-                          "no body has the inertia of {}: each principal moment is at most the sum "
-                          "of the other two",
-                          name);
-    require(trace, false, positive);
-    for (const ex& minor : minors_of(I)) require(minor, false, positive);
-    for (const ex& minor : minors_of(E)) require(minor + GiNaC::numeric(1, 1000000000000), true, possible);
+    const std::string not_positive = fmt::format("the inertia of {} is not positive: every moment of inertia is", name);
+    const std::string impossible =
+        fmt::format("no body has the inertia of {}: each principal moment is at most the sum of the other two", name);
+    require(trace, false, not_positive);
+    for (const ex& minor : minors_of(I)) require(minor, false, not_positive);
+    for (const ex& minor : minors_of(E)) require(minor + GiNaC::numeric(1, 1000000000000), true, impossible);
 }
 
 void SystemReader::Bodies::read_joint(JointLine& line) {
