@@ -62,7 +62,7 @@ bool kill_after(const test::SweepFolder& place, const std::string& name, std::ve
     int status = 0;
     for (int tries = 0; tries < 60000; ++tries) {
         if (::waitpid(pid, &status, WNOHANG) == pid) {
-            CHECK(WIFEXITED(status));
+            CHECK((WIFEXITED(status) && WEXITSTATUS(status) == 0));
             return true;
         }
         if (std::filesystem::exists(partial, none) && std::filesystem::file_size(partial, none) >= bytes) break;
@@ -260,6 +260,18 @@ TEST_CASE("a sweep that is killed again and again and resumed has the bytes of o
             CHECK_FALSE(std::filesystem::exists(place.file("torn" + ending + ".partial.json")));
         }
     }
+}
+
+TEST_CASE("a sweep that is killed between its last two renamings goes on") {
+    const test::SweepFolder place;
+    const std::vector<std::string> words{"--vary", "q=1,2", "--until", "1"};
+    const std::string whole = place.bytes("whole.npy", words);
+    std::filesystem::rename(place.file("whole.npy"), place.file("whole.npy.partial"));
+    const std::string said = test::read_file(place.file("whole.npy.json"));
+    CHECK(place.bytes("whole.npy", {"--vary", "q=1,2", "--until", "1", "--resume"}) == whole);
+    CHECK(test::read_file(place.file("whole.npy.json")) == said);
+    CHECK_FALSE(std::filesystem::exists(place.file("whole.npy.partial")));
+    CHECK_FALSE(std::filesystem::exists(place.file("whole.npy.partial.json")));
 }
 
 // Its trajectories end at times of their own, so that those that stand side by side are others in each of these ways.
