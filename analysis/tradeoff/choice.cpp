@@ -7,7 +7,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "analysis/stability/limit.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {
@@ -60,6 +59,11 @@ Found find_in(Experiment& experiment, const ChoiceRequest& request, Precision nu
     return found;
 }
 
+bool is_at_rest(const Reference& reference) {
+    const auto width = static_cast<std::ptrdiff_t>(2 * reference.n);  // of a row; each is the one before it
+    return std::equal(reference.high.begin() + width, reference.high.end(), reference.high.begin());
+}
+
 }  // namespace
 
 Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& request) {
@@ -86,6 +90,10 @@ Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& req
                 (known > 0 ? fmt::format(". They agree to t = {:.4g}: try --until {:.4g}", known, known)
                            : std::string())));
     }
+    if (is_at_rest(reference))
+        throw ComputationError(fmt::format(
+            "nothing moves to t = {:.6g}: every step is exact, and there is nothing to choose. Start elsewhere",
+            reference.until));
     // Where rounding stands in the way, in numbers with more digits.
     Found best;
     double least = infinity;
@@ -123,8 +131,7 @@ Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& req
     choice.uncertainty = uncertainty;
     choice.frequency = reference.frequency;
     const StepClock clock = candidate.member.clock;
-    const bool has_limit = clock == StepClock::none && scene.constraints.empty() && !scene.is_cut();
-    choice.stability_limit = has_limit ? stability_limit(quadrature_of(candidate.member.method())) : std::nan("");
+    choice.stability_limit = experiment.stability_limit_of(candidate.member);
     if (clock != StepClock::none) choice.clock = clock == StepClock::automatic ? "auto" : scene.clock->text;
     choice.members = members;
     choice.complete = best.search.complete;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/stability/limit.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
@@ -184,6 +185,15 @@ double Experiment::figure(const Measurement& measurement) const {
 double Experiment::fewest_steps(StepClock clock) const {
     return std::max(1.0, clock == StepClock::none ? until() * reference_.frequency / longest_radians
                                                   : radians_.at(clock) / clocked_radians);
+}
+
+double Experiment::stability_limit_of(const Member& member) const {
+    const bool is_known = member.clock == StepClock::none && scene_.constraints.empty() && !scene_.is_cut();
+    return is_known ? stability_limit(quadrature_of(member.method())) : std::nan("");
+}
+
+double Experiment::fewest_stable_steps(const Member& member) const {
+    return std::fmax(1.0, until() * reference_.usual_frequency / stability_limit_of(member));
 }
 
 double Experiment::elapsed() const {

@@ -54,6 +54,10 @@ public:
     // The numbers of steps that are tried, and the least of them.
     StepLadder ladder(double ratio) const { return {reference_.samples, ratio}; }
     double fewest_steps(StepClock clock) const;
+    // Of h times the frequency; not a number where none is known: with clocks, constraints and cut steps.
+    double stability_limit_of(const Member& member) const;
+    // With fewer, equal ones the steps of this member are unstable at most places of the motion.
+    double fewest_stable_steps(const Member& member) const;
     // What the steps of a candidate divide: the end, and with a clock about the end in its time. It is a convention,
     // the same for all members: the end of a pilot run. Candidates take their steps until they are there.
     double span(StepClock clock) const { return measurer_->span(clock); }

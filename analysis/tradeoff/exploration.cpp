@@ -85,7 +85,8 @@ void work_on(Experiment& experiment, const Scan& scan, double reserve) {
     const double longest_run = experiment.request().seconds / 40;
     double least = infinity;
     int no_better = 0, dominated = 0;
-    for (std::int64_t steps = ladder.at_least(experiment.fewest_steps(scan.member.clock));
+    for (std::int64_t steps = ladder.at_least(
+             std::max(experiment.fewest_steps(scan.member.clock), experiment.fewest_stable_steps(scan.member)));
          static_cast<double>(steps) < most_steps && (experiment.left() > reserve || !std::isfinite(least));
          steps = ladder.next(steps)) {
         const Measurement m = experiment.measure({scan.member, steps, scan.tolerance}, true, longest_run);

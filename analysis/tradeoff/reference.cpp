@@ -33,7 +33,10 @@ constexpr int most_refinements = 12;
 constexpr double near = 0.1;      // of the amplitude: steps so far off are too long to converge yet
 constexpr double far_dearer = 2;  // times the seconds of an extrapolation: steps of the family take too long
 constexpr double looser = 100;    // tolerance of the second extrapolation, of the first's
-constexpr int frequency_looks = 24;
+// At how many places, after the first, the frequency is looked at.
+int frequency_looks(std::size_t n) {
+    return n <= 8 ? 120 : n <= 64 ? 24 : 2;
+}
 
 // Below what is wanted by more than the macro steps add up to; in quadruple precision down to its rounding.
 double tolerance_for(Precision precision, double wanted) {
@@ -187,13 +190,16 @@ private:
 
     void set_frequency(const States& states, int samples) {
         const std::vector<double> scale(scale_.begin(), scale_.end());
-        for (int look = 0; look <= frequency_looks; ++look) {
-            const int i = samples * look / frequency_looks;
+        std::vector<double> met;
+        const int looks = frequency_looks(n_);
+        for (int look = 0; look <= looks; ++look) {
+            const int i = samples * look / looks;
             const real* const row = states.data() + static_cast<std::size_t>(i) * 2 * n_;
             const std::vector<real> q(row, row + n_), p(row + n_, row + 2 * n_);
             const auto time = static_cast<real>(request_.until * i / samples);
             const double frequency = largest_frequency(stepper_, time, q, p, scale);
             if (frequency > reference_.frequency) reference_.frequency = frequency;
+            met.push_back(frequency >= 0 ? frequency : 0);  // else none is known
             if (look == 0 && frequency > 0) reference_.frequency_at_start = frequency;
             std::vector<real> v;
             if (stepper_.velocity(time, q, p, v) != LOBATTO_OK) continue;
@@ -203,8 +209,10 @@ private:
             real product = 0;
             for (std::size_t k = 0; k < n_; ++k) product += p[k] * v[k];
             reference_.energy_scale = std::max(reference_.energy_scale, std::fabs(static_cast<double>(product)) / 2);
-            if (n_ > 64 && look >= 2) break;
         }
+        const auto middle = met.begin() + static_cast<std::ptrdiff_t>(met.size() / 2);
+        std::nth_element(met.begin(), middle, met.end());
+        reference_.usual_frequency = *middle;
     }
 
     void keep(const States& states) {

@@ -31,6 +31,7 @@ struct Reference {
     double energy_scale = 0;           // the largest |p v|/2
     double frequency = 0;              // the largest met (largest_frequency)
     double frequency_at_start = 0;     // likewise
+    double usual_frequency = 0;        // at half of the places, the largest there is this or more
     double seconds = 0;                // that it took
     bool is_late = false;              // more time would have made it better
 

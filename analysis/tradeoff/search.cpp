@@ -49,6 +49,7 @@ bool is_rounding(const Measurement& m, const std::optional<Measurement>& before,
 Attempt cross(Experiment& experiment, const Member& member, double goal, double limit) {
     const StepLadder ladder = experiment.ladder(fine_ratio);
     const double order = member.order(), fewest = experiment.fewest_steps(member.clock);
+    const std::int64_t fewest_stable = ladder.at_least(experiment.fewest_stable_steps(member));
     Attempt result{{}, infinity, false, infinity};
     const auto run = [&](std::int64_t steps) {
         const Measurement m = experiment.measure({member, steps, 0}, false, limit);
@@ -56,7 +57,7 @@ Attempt cross(Experiment& experiment, const Member& member, double goal, double 
         return m;
     };
     std::optional<Measurement> good, bad;
-    std::int64_t steps = ladder.at_least(fewest * 1.5);
+    std::int64_t steps = std::max(ladder.at_least(fewest * 1.5), fewest_stable);
     int stagnating = 0;
     const double began = experiment.elapsed();
     for (int tries = 0; tries < 40; ++tries) {
@@ -95,9 +96,9 @@ Attempt cross(Experiment& experiment, const Member& member, double goal, double 
             continue;
         }
         if (good) {
-            if (good->candidate.steps <= 1) break;
+            if (good->candidate.steps <= fewest_stable) break;
             const double factor = std::clamp(std::pow(good->error / goal, 1 / order), 0.5, 0.94);
-            steps = ladder.at_most(static_cast<double>(good->candidate.steps) * factor);
+            steps = std::max(ladder.at_most(static_cast<double>(good->candidate.steps) * factor), fewest_stable);
             if (steps >= good->candidate.steps) break;
         } else {
             const double factor = m.complete ? std::clamp(1.03 * std::pow(m.error / goal, 1 / order), 1.05, 4.0) +
@@ -141,8 +142,10 @@ Measurement polish(Experiment& experiment, const Measurement& crossing, double g
     // least of all.
     std::vector<std::int64_t> starts = {crossing.candidate.steps};
     int far_beyond = 0;
+    const double fewest_stable = experiment.fewest_stable_steps(member);
     for (std::int64_t steps = starts.front(); steps > 1 && far_beyond < 2 && !is_late();) {
         steps = ladder.at_most(static_cast<double>(steps) / fine_ratio);
+        if (static_cast<double>(steps) < fewest_stable) break;
         const Measurement m = experiment.measure({member, steps, 0}, false);
         far_beyond = m.complete && m.error < 100 * goal ? 0 : far_beyond + 1;
         if (m.complete && m.error <= goal) starts.push_back(steps);

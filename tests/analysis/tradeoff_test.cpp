@@ -302,6 +302,26 @@ TEST_CASE("what cannot be promised or measured is refused with the reason") {
     refused({"tune", endless, "--error", "1e-6"}, 2, "until");
 }
 
+TEST_CASE("tune proposes no step that is unstable for an oscillation at rest, and none for a motion at rest") {
+    const Place place;
+    const std::string file = place.folder / "stiff.toml";
+    const auto tuned = [&](const std::string& start) {
+        test::write_text(file,
+                         "lagrangian = \"(x'^2 + y'^2)/2 - x^2/2 - x^4/4 - 100^2*y^2/2\"\n[coordinates]\nx = { "
+                         "velocity = 0, position = " +
+                             start + " }\ny = { position = 0, velocity = 0 }\n[run]\nstep = 0.01\nuntil = 10\n");
+        return place.run({"tune", file, "--error", "1e-6", "--budget", "4s"});
+    };
+    const test::Finished moving = tuned("1");
+    CAPTURE(moving.out);
+    REQUIRE(moving.exit_code == 0);
+    CHECK(contains(moving.out, "h omega"));
+    CHECK_FALSE(contains(moving.out, "only for moments"));
+    const test::Finished resting = tuned("0");
+    CHECK(resting.exit_code == 3);
+    CHECK(contains(resting.err, "nothing moves to t = 10: every step is exact, and there is nothing to choose"));
+}
+
 TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic solution" * doctest::test_suite("slow")) {
     const Place place;
     const std::string scene = place.folder / "pendulum.toml";
