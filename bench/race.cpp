@@ -83,7 +83,9 @@ std::vector<double> ladder_of(const Problem& problem, const Contestant& contesta
     std::vector<double> settings;
     if (contestant.ladder == Ladder::tolerance) {
         const double ratio = quick ? std::max(contestant.ratio, 10.0) : contestant.ratio;
-        for (double tolerance = contestant.coarsest; tolerance > 0.9 * contestant.finest; tolerance /= ratio)
+        // In a long race coarse ones lose so much energy that the inner orbit shrinks, and they take steps without end.
+        const double coarsest = is_long(problem) ? 1e-4 * contestant.coarsest : contestant.coarsest;
+        for (double tolerance = coarsest; tolerance > 0.9 * contestant.finest; tolerance /= ratio)
             settings.push_back(tolerance);
         return settings;
     }
