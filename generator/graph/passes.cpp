@@ -127,18 +127,6 @@ Id raised(Graph& graph, Id base, int exponent) {
     return graph.raw(Op::multiply, {raised(graph, base, exponent - 1), base});
 }
 
-// sqrt(x)^exponent with an odd exponent, as a power of x times a root: rounding of the root is not raised with it.
-// `known`: sqrt(x) is there anyway, and sqrt(1/x) = sqrt(x)/x.
-Id raised_root(Graph& graph, Id root, int exponent, bool known) {
-    Id x = graph[root].operands[0];
-    if (exponent < 0) {
-        x = graph.raw(Op::power, {x}, -1);
-        root = known ? graph.raw(Op::multiply, {x, root}) : graph.raw(Op::sqrt, {x});
-    }
-    const int whole = (std::abs(exponent) - 1) / 2;
-    return whole == 0 ? root : graph.raw(Op::multiply, {raised(graph, x, whole), root});
-}
-
 // k where the exponent is the number k/4 with an odd k, and small enough to be written out; else 0.
 int odd_quarters(const Graph& graph, Id exponent) {
     constexpr int most = 40;
@@ -149,40 +137,68 @@ int odd_quarters(const Graph& graph, Id exponent) {
     return k % 2 != 0 ? k : 0;
 }
 
-// x^(k/4) with an odd k, as a power of y = x or 1/x times its square root, fourth root or both.
-Id raised_fourth_root(Graph& graph, Id x, int k) {
-    const Id y = k > 0 ? x : graph.raw(Op::power, {x}, -1), root = graph.raw(Op::sqrt, {y}),
-             fourth = graph.raw(Op::sqrt, {root});
+// What is asked for of a base x.
+struct PowersOf {
+    std::set<int> negative;                  // k of x^(k/4)
+    bool root = false, fourth_root = false;  // for positive powers, or for themselves
+};
+
+std::map<Id, PowersOf> powers_asked_for(const Programs& programs) {
+    const Graph& graph = programs.graph;
+    std::map<Id, PowersOf> asked;
+    const auto ask = [&](Id root) {
+        if (graph[root].op == Op::sqrt) asked[graph[root].operands[0]].root = true;
+    };
+    const std::vector<Id> outputs = roots_of(programs);
+    std::for_each(outputs.begin(), outputs.end(), ask);
+    for (const Id id : graph.topological(outputs)) {
+        const Node& node = graph[id];
+        if (node.op == Op::power && node.index < 0) {
+            const Id base = node.operands[0];
+            const bool is_root = graph[base].op == Op::sqrt;
+            asked[is_root ? graph[base].operands[0] : base].negative.insert((is_root ? 2 : 4) * node.index);
+            continue;
+        }
+        std::for_each(node.operands.begin(), node.operands.end(), ask);
+        const int k = node.op == Op::raise ? odd_quarters(graph, node.operands[1]) : 0;
+        if (k < 0) asked[node.operands[0]].negative.insert(k);
+        if (k > 0) asked[node.operands[0]].root = asked[node.operands[0]].fourth_root = true;
+    }
+    return asked;
+}
+
+// x^(k/4), k not a multiple of 4, as a power of y = x or 1/x times its square root, its fourth root or both: rounding
+// of the roots is not raised with them. Where roots of x are there anyway, none are taken of 1/x: sqrt(1/x) =
+// sqrt(x)/x.
+Id raised_root(Graph& graph, Id x, int k, const PowersOf& asked) {
+    const auto root_of = [&](Id z) { return graph.raw(Op::sqrt, {z}); };
+    const auto product = [&](Id a, Id b) { return graph.raw(Op::multiply, {a, b}); };
+    const Id y = k > 0 ? x : graph.raw(Op::power, {x}, -1);
+    const Id root = k < 0 && asked.root ? product(y, root_of(x)) : root_of(y);
     std::vector<Id> factors;
     if (std::abs(k) >= 4) factors.push_back(raised(graph, y, std::abs(k) / 4));
-    if (std::abs(k) % 4 == 3) factors.push_back(root);
-    factors.push_back(fourth);
-    return factors.size() == 1 ? fourth : graph.raw(Op::multiply, std::move(factors));
+    if (std::abs(k) % 4 >= 2) factors.push_back(root);
+    if (k % 2 != 0) factors.push_back(k < 0 && asked.fourth_root ? product(root, root_of(root_of(x))) : root_of(root));
+    return factors.size() == 1 ? factors.front() : graph.raw(Op::multiply, std::move(factors));
 }
 
 }  // namespace
 
 Programs multiply_powers(const Programs& programs) {
-    // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3 ...; with a
-    // root as base, r = 1/x, then sqrt(r), r sqrt(r) ...
-    std::map<Id, std::set<int>> negative;
-    std::set<Id> known;  // operands that are asked for themselves, or raised to positive powers
-    for (const Id id : programs.graph.topological(roots_of(programs))) {
-        const Node& node = programs.graph[id];
-        if (node.op == Op::power && node.index < 0)
-            negative[node.operands[0]].insert(node.index);
-        else
-            known.insert(node.operands.begin(), node.operands.end());
-    }
+    // Where a base is divided by in several powers, one division serves them all: r = 1/x, then r^2, r^3, sqrt(r) ...
+    std::map<Id, PowersOf> asked = powers_asked_for(programs);
     return rewrite(programs, [&](Graph& graph, const Graph& before, Id id, std::vector<Id> operands) {
         const Node& node = before[id];
         if (node.op == Op::raise)
             if (const int k = odd_quarters(graph, operands[1]); k != 0)
-                return raised_fourth_root(graph, operands[0], k);
+                return raised_root(graph, operands[0], k, asked[node.operands[0]]);
         if (node.op != Op::power) return same(graph, node, std::move(operands));
-        const bool shares = node.index < 0 && negative[node.operands[0]].size() > 1;
-        if (graph[operands.front()].op == Op::sqrt && node.index % 2 != 0 && (node.index != -1 || shares))
-            return raised_root(graph, operands.front(), node.index, known.contains(node.operands.front()));
+        const Node& base = before[node.operands[0]];
+        const bool is_root = base.op == Op::sqrt;
+        const PowersOf& of_base = asked[is_root ? base.operands[0] : node.operands[0]];
+        const bool shares = node.index < 0 && of_base.negative.size() > 1;
+        if (is_root && node.index % 2 != 0 && (node.index != -1 || shares))
+            return raised_root(graph, graph[operands.front()].operands[0], 2 * node.index, of_base);
         if (shares) return raised(graph, graph.raw(Op::power, {operands.front()}, -1), -node.index);
         return raised(graph, operands.front(), node.index);
     });

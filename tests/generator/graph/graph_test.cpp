@@ -165,6 +165,29 @@ TEST_CASE("x^20 costs 5 multiplications: squares of squares") {
     CHECK(operations_after("powers by multiplication", optimise(programs)).multiplications == 5);
 }
 
+TEST_CASE("all powers of a base with quarters as exponents cost its roots and one division") {
+    // The powers of r^2 in the equations of a clock r^(3/2) (D42), and those of equal steps.
+    const auto cost = [](const std::vector<std::pair<int, int>>& exponents) {
+        Inputs g;
+        std::vector<Id> outputs;
+        for (const auto& [numerator, denominator] : exponents)
+            outputs.push_back(denominator == 1   ? g.graph.power(g.x, numerator)
+                              : denominator == 2 ? g.graph.power(g.graph.function(Op::sqrt, g.x), numerator)
+                                                 : g.graph.raise(g.x, g.graph.number(numerator, denominator)));
+        Programs programs = g.program(outputs);
+        const auto reports = optimise(programs);
+        for (const PassReport& report : reports) CHECK(report.disagreement < 1e-40);
+        const Operations operations = operations_after("powers by multiplication", reports);
+        return std::pair(operations.functions, operations.divisions);
+    };
+    CHECK(cost({{-1, 4}, {-1, 2}, {-3, 4}, {-7, 4}, {3, 4}}) == std::pair(2L, 1L));
+    CHECK(cost({{-1, 4}, {-3, 4}, {1, 2}}) == std::pair(2L, 1L));
+    CHECK(cost({{-1, 4}, {-7, 4}}) == std::pair(2L, 1L));
+    CHECK(cost({{-3, 2}, {-1, 2}}) == std::pair(1L, 1L));
+    CHECK(cost({{-1, 2}, {1, 2}, {-1, 1}}) == std::pair(1L, 1L));
+    CHECK(cost({{-1, 2}}) == std::pair(1L, 1L));
+}
+
 TEST_CASE("a product that two outputs need is computed once") {
     Inputs g;
     Programs programs =
