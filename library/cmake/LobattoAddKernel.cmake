@@ -1,7 +1,7 @@
 # lobatto_add_kernel(TARGET SCENE scene.toml [POINTS n | STAGES n | SPLITTING n] [NUMBERS name] [ARITHMETIC name] [ENSEMBLE] [PLAIN])
 #
-# Writes the integrator of the scene when TARGET is built, and again when the scene or the generator changes; TARGET
-# includes it as "NAME.hpp", NAME the stem of the scene file, and is compiled with the flags of kernels, so that it
+# Writes the integrator of the scene when TARGET is built, and again when the scene, a file of its tables or the generator
+# changes; TARGET includes it as "NAME.hpp", NAME the stem of the scene file, and is compiled with the flags of kernels, so that it
 # computes the same bits as `lobatto run`. ENSEMBLE: lobatto::Ensemble too, trajectories side by side. PLAIN: the textbook's version (`lobatto emit --plain`), for any flags.
 # LOBATTO_PROGRAM names the program that writes it.
 function(lobatto_add_kernel target)
@@ -41,6 +41,18 @@ function(lobatto_add_kernel target)
     set(folder ${CMAKE_CURRENT_BINARY_DIR}/lobatto/${target})
     set(header ${folder}/${name}.hpp)
     set(depends ${scene})
+    # The files of table("torque.csv", t), which lie in the scene's folder or below it. Which they are is looked up anew
+    # when the scene changes.
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scene})
+    cmake_path(GET scene PARENT_PATH scene_folder)
+    file(READ ${scene} text)
+    string(REGEX MATCHALL "table[ \t]*\\([ \t\r\n]*\\\\?\"[^\"\\\\]+" tables "${text}")
+    foreach(table IN LISTS tables)
+        string(REGEX REPLACE ".*\"" "" table "${table}")
+        if(EXISTS "${scene_folder}/${table}")
+            list(APPEND depends "${scene_folder}/${table}")
+        endif()
+    endforeach()
     if(TARGET lobatto)
         list(APPEND depends lobatto)
     elseif(EXISTS "${LOBATTO_PROGRAM}")

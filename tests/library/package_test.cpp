@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <sstream>
 
 #include "tests/support.hpp"
@@ -66,6 +67,38 @@ TEST_SUITE("slow") {
             std::ofstream(folder / "project/arm.toml", std::ios::app) << "# changed\n";
             CHECK(output_of({"cmake", "--build", build}).find("Deriving") != std::string::npos);
         }
+    }
+
+    TEST_CASE("lobatto_add_kernel derives again when a file of the scene's tables changes") {
+        const test::TemporaryFolder folder;
+        install(folder / "prefix");
+        const std::string scene = folder / "driven.toml", build = folder / "build";
+        test::write_text(folder / "push.csv", "0,0\n1,1\n2,0\n3,1\n4,0\n");
+        test::write_text(
+            scene,
+            "time = \"t\"\nlagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 "
+            "}\n[forces]\nx = '''table( \"push.csv\", t)'''\n[run]\nstep = 0.1\nuntil = 4\n");
+        test::write_text(folder / "main.cpp", "#include \"driven.hpp\"\nint main() {}\n");
+        test::write_text(folder / "CMakeLists.txt",
+                         "cmake_minimum_required(VERSION 3.25)\nproject(p LANGUAGES CXX)\nfind_package(Lobatto "
+                         "REQUIRED)\nadd_executable(main main.cpp)\nlobatto_add_kernel(main SCENE driven.toml)\n");
+        output_of({"cmake", "-S", folder.string(), "-B", build, "-G", "Ninja",
+                   "-DCMAKE_PREFIX_PATH=" + (folder / "prefix").string()});
+        const auto derives = [&] {
+            return output_of({"cmake", "--build", build}).find("Deriving") != std::string::npos;
+        };
+        CHECK(derives());
+        CHECK_FALSE(derives());
+        test::write_text(folder / "push.csv", "0,0\n1,2\n2,0\n3,1\n4,0\n");
+        CHECK(derives());
+        CHECK_FALSE(derives());
+        // Another table, named in a text of double quotes.
+        test::write_text(folder / "pull.csv", "0,0\n1,2\n2,0\n3,1\n4,0\n");
+        test::write_text(scene, std::regex_replace(test::read_file(scene), std::regex("'''.*'''"),
+                                                   "\"table(\\\"pull.csv\\\", t)\""));
+        CHECK(derives());
+        test::write_text(folder / "pull.csv", "0,0\n1,1\n2,0\n3,1\n4,0\n");
+        CHECK(derives());
     }
 
     TEST_CASE("below DESTDIR lies all that is installed: program, library, manual pages, completions, schemas") {
