@@ -7,15 +7,16 @@
 // Written by Lobatto from a scene file. It needs C++17 and its standard library, nothing else: copy it
 // where you need it. Formula numbers (D..) are those of Lobatto's docs/derivation.md.
 //
-//   pendulum::Parameters parameters;
-//   pendulum::State x = pendulum::start(parameters);
-//   while (x.t < 10 && pendulum::step(parameters, 0.01, x)) std::printf("%g %g\n", double(x.t), double(x.q[0]));
+//   namespace motion = lobatto::plain::pendulum;
+//   motion::Parameters parameters;
+//   motion::State x = motion::start(parameters);
+//   while (x.t < 10 && motion::step(parameters, 0.01, x)) std::printf("%g %g\n", double(x.t), double(x.q[0]));
 #pragma once
 
 #include <cmath>
 #include <limits>
 
-namespace pendulum {
+namespace lobatto::plain::pendulum {
 
 using real = double;
 
@@ -139,4 +140,4 @@ inline State start(const Parameters& parameters) {
     return x;
 }
 
-}  // namespace pendulum
+}  // namespace lobatto::plain::pendulum

@@ -231,8 +231,8 @@ public:
     std::string text() const {
         std::string all = preamble() + "#pragma once\n\n#include <cmath>\n#include <limits>\n";
         if (is_general()) all += "#include <utility>\n";
-        all += fmt::format("\nnamespace {} {{\n\nusing real = {};\n\n", name_, type_name(precision_)) + shapes() +
-               parameters() + state() + helpers;
+        all += fmt::format("\nnamespace lobatto::plain::{} {{\n\nusing real = {};\n\n", name_, type_name(precision_)) +
+               shapes() + parameters() + state() + helpers;
         if (is_general())
             all += function("dL/dv(q, v), the momentum (D2).", "void", "momentum",
                             {"real time", "const real* q", "const real* velocity", "real* p"}, "momentum") +
@@ -243,7 +243,7 @@ public:
                    function("p = M v (D2).", "void", "momentum", {"const real* velocity", "real* p"}, "momentum") +
                    function("v = M^-1 p.", "void", "velocity", {"const real* p", "real* velocity"}, "velocity") +
                    (d_.quadrature.is_explicit() ? explicit_step : solved_step);
-        return all + energy() + start() + fmt::format("\n}}  // namespace {}\n", name_);
+        return all + energy() + start() + fmt::format("\n}}  // namespace lobatto::plain::{}\n", name_);
     }
 
 private:
@@ -263,9 +263,10 @@ private:
             "// Written by Lobatto from a scene file. It needs C++17 and its standard library, nothing else: copy it\n"
             "// where you need it. Formula numbers (D..) are those of Lobatto's docs/derivation.md.\n"
             "//\n"
-            "//   {0}::Parameters parameters;\n"
-            "//   {0}::State x = {0}::start(parameters);\n"
-            "//   while (x.t < 10 && {0}::step(parameters, 0.01, x)) std::printf(\"%g %g\\n\", double(x.t), "
+            "//   namespace motion = lobatto::plain::{0};\n"
+            "//   motion::Parameters parameters;\n"
+            "//   motion::State x = motion::start(parameters);\n"
+            "//   while (x.t < 10 && motion::step(parameters, 0.01, x)) std::printf(\"%g %g\\n\", double(x.t), "
             "double(x.q[0]));\n",
             name_);
         return text;

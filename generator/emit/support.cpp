@@ -2,6 +2,8 @@
 // Which parts of runtime/kernel/kernel.hpp a kernel stands on.
 #include "generator/emit/support.hpp"
 
+#include <fmt/format.h>
+
 #include <set>
 
 #include "generator/mechanics/derivation.hpp"
@@ -65,9 +67,25 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
     return {parts.begin(), parts.end()};
 }
 
+namespace {
+
+// The headers that are included once must know of it.
+std::string with_numbers(const std::string& macro) {
+    return fmt::format(
+        "#ifndef {0}\n"
+        "#ifdef LOBATTO_KERNEL_NUMBERS_HPP\n"
+        "#error \"include this kernel before those in other numbers, or define {0} before all of them\"\n"
+        "#endif\n"
+        "#define {0}\n"
+        "#endif\n",
+        macro);
+}
+
+}  // namespace
+
 std::string before_support(Precision precision) {
-    if (precision == Precision::quadruple) return "#define LOBATTO_USE_FLOAT128\n";
-    if (has_many_digits(precision)) return "#define LOBATTO_USE_MPFR\n";
+    if (precision == Precision::quadruple) return with_numbers("LOBATTO_USE_FLOAT128");
+    if (has_many_digits(precision)) return with_numbers("LOBATTO_USE_MPFR");
     if (precision == Precision::double_double)
         return "#if defined(__GNUC__) && !defined(__clang__)\n"
                "#pragma GCC optimize(\"no-tree-slp-vectorize\")  // with which g++ 12 loses the low parts of sums\n"

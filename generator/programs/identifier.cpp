@@ -28,7 +28,7 @@ std::string identifier(const std::string& name) {
         "nullptr operator or or_eq private protected public real register reinterpret_cast requires "
         "return short signed sizeof static static_assert static_cast struct switch template this "
         "thread_local throw true try typedef typeid typename union unsigned using virtual void volatile "
-        "wchar_t while xor xor_eq lobatto linux unix Parameters Status math_errhandling errno signgam "
+        "wchar_t while xor xor_eq lobatto std linux unix Parameters Status math_errhandling errno signgam "
         "Coefficients CoefficientsOf Angles number given");
     // Names in capitals may be macros of the standard headers (NAN, M_PI). What already ends in underscores gets one
     // more, so that different names stay different.

@@ -31,15 +31,16 @@ std::vector<double> plain_end(const Scene& scene, double step, int steps, const 
     const PlainSource source = emit_plain(scene, precision);
     test::write_text(folder / "plain.hpp", source.header);
     test::write_text(folder / "main.cpp",
-                     fmt::format("#include <cstdio>\n#include \"plain.hpp\"\nint main() {{\n"
-                                 "    const {0}::Parameters parameters;\n    {0}::State x = {0}::start(parameters);\n"
+                     fmt::format("#include <cstdio>\n#include <ctime>\n#include \"plain.hpp\"\nnamespace motion = "
+                                 "lobatto::plain::{0};\nint main() {{\n    const motion::Parameters parameters;\n"
+                                 "    motion::State x = motion::start(parameters);\n"
                                  "    for (int i = 0; i < {1}; ++i)\n"
-                                 "        if (!{0}::step(parameters, {2}, x)) return 1;\n"
+                                 "        if (!motion::step(parameters, {2}, x)) return 1;\n"
                                  "    std::printf(\"%.17g\", double(x.t));\n"
                                  "    for (const auto q : x.q) std::printf(\" %.17g\", double(q));\n"
                                  "    for (const auto p : x.p) std::printf(\" %.17g\", double(p));\n"
-                                 "    std::printf(\" %.17g\\n\", double({0}::energy(parameters, x)));\n}}\n",
-                                 source.name, steps, fmt::format("{}::real({:.17g})", source.name, step)));
+                                 "    std::printf(\" %.17g\\n\", double(motion::energy(parameters, x)));\n}}\n",
+                                 source.name, steps, fmt::format("motion::real({:.17g})", step)));
     const test::Finished compiled = test::run({compiler, "-std=c++17", "-O1", "-Wall", "-Wextra", "-Wpedantic",
                                                "-Wconversion", "-Werror", folder / "main.cpp", "-o", folder / "main"});
     INFO(compiled.err);
@@ -112,6 +113,15 @@ TEST_CASE("the plain text of every form takes the steps of its kernel" * doctest
     }
 }
 
+TEST_CASE("a plain text may have the name of a function of the C library" * doctest::test_suite("slow")) {
+    Scene scene = scene_file("pendulum", "");
+    const std::vector<double> end = plain_end(scene, 0.05, 3, "g++");
+    for (const char* name : {"gamma", "clock", "main", "std"}) {
+        scene.name = name;
+        CHECK(plain_end(scene, 0.05, 3, "g++") == end);
+    }
+}
+
 TEST_CASE("clang++ takes the plain text too, in float and long double" * doctest::test_suite("slow")) {
     const Scene pendulum = scene_file("pendulum", "");
     const std::vector<double> exact = plain_end(pendulum, 0.05, 40, "clang++", Precision::extended),
@@ -124,14 +134,15 @@ TEST_CASE("clang++ takes the plain text too, in float and long double" * doctest
 
 TEST_CASE("a step that cannot be solved is refused, and the state stays") {
     const test::TemporaryFolder folder;
-    test::write_text(folder / "main.cpp", "#include <cstdio>\n#include \"" + tree +
-                                              "/generated/plain/pendulum.hpp\"\nint main() {\n"
-                                              "    pendulum::Parameters parameters;\n"
-                                              "    const pendulum::State start = pendulum::start(parameters);\n"
-                                              "    pendulum::State x = start;\n"
-                                              "    const bool solved = pendulum::step(parameters, 3.0, x);\n"
-                                              "    std::printf(\"%d %d\\n\", solved, x.t == start.t && x.q[0] == "
-                                              "start.q[0] && x.p[0] == start.p[0]);\n}\n");
+    test::write_text(folder / "main.cpp",
+                     "#include <cstdio>\n#include \"" + tree +
+                         "/generated/plain/pendulum.hpp\"\nint main() {\n"
+                         "    namespace pendulum = lobatto::plain::pendulum;\n    pendulum::Parameters parameters;\n"
+                         "    const pendulum::State start = pendulum::start(parameters);\n"
+                         "    pendulum::State x = start;\n"
+                         "    const bool solved = pendulum::step(parameters, 3.0, x);\n"
+                         "    std::printf(\"%d %d\\n\", solved, x.t == start.t && x.q[0] == "
+                         "start.q[0] && x.p[0] == start.p[0]);\n}\n");
     REQUIRE(test::run({"g++", "-std=c++17", folder / "main.cpp", "-o", folder / "main"}).exit_code == 0);
     CHECK(test::run({folder / "main"}).out == "0 1\n");
 }
