@@ -9,6 +9,7 @@
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constraints.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
+#include "generator/mechanics/system/system.hpp"
 
 namespace lobatto::api {
 
@@ -63,6 +64,13 @@ lobatto::Scene for_roundoff(const Scene& scene, const Settings& settings) {
         throw lobatto::InputError(changed.path +
                                   ": `lobatto roundoff` compares plain arithmetic with clean, which splitting methods "
                                   "do not have; choose Lobatto (--points 8) or Gauss (--stages 4)");
+    const System system = build_short_system(changed);
+    if (!system.separable)
+        throw lobatto::InputError(
+            fmt::format("{}: `lobatto roundoff` compares plain arithmetic with clean, which needs a constant mass "
+                        "matrix and forces "
+                        "without velocities, but {}: there is nothing to compare",
+                        changed.path, system.not_separable));
     const Overrides overrides = overrides_of(settings);
     apply(overrides, changed);
     changed.method.arithmetic = StepArithmetic::clean;

@@ -229,6 +229,12 @@ TEST_CASE("steps that visit the same phases again and again gain no energy stead
     CHECK(std::fabs(result.clean.rows.back().energy_mean) < 1e-14);  // 1.1e-15 measured
 }
 
+TEST_CASE("roundoff has nothing to compare where masses change, and says so") {
+    const Finished refused = run({LOBATTO_PROGRAM, "roundoff", LOBATTO_SOURCE_DIR "/scenes/double_pendulum.toml"});
+    CHECK(refused.exit_code == 2);
+    CHECK(refused.err.find("depends on the position: there is nothing to compare") != std::string::npos);
+}
+
 TEST_CASE("roundoff has nothing to compare for splitting methods, and says so") {
     const TemporaryFolder folder;
     write_text(folder / "swing.toml",
