@@ -107,7 +107,7 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
         request.interrupted = &is_interrupted;
         if (progress)
             request.say = [&](const std::string& what) {
-                if (!progress(what)) is_interrupted = 1;
+                if (!ask(progress, what)) is_interrupted = 1;
             };
         try {
             const FoundChoice chosen = choice_for(scene, settings, request);

@@ -15,6 +15,8 @@ void rethrow() {
         throw;
     } catch (const Error&) {
         throw;
+    } catch (const ThrownByCaller& thrown) {
+        std::rethrow_exception(thrown.what);
     } catch (const lobatto::InputError& error) {
         throw InputError(error.what());
     } catch (const lobatto::ComputationError& error) {

@@ -11,6 +11,7 @@
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/method_choice.hpp"
 #include "analysis/motion.hpp"
+#include "analysis/tape.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "library/errors.hpp"
 
@@ -30,6 +31,12 @@ struct Kernel::Parts {
     TrajectoryRequest start;  // of the scene, in numbers
     std::vector<Variable> coordinates, parameters, inputs;
     std::vector<std::string> events;
+    struct Required {  // of parameters: above zero, or not below it
+        Tape value;
+        bool may_vanish;
+        std::string complaint;
+    };
+    std::vector<Required> required;
 };
 
 // Formulas are not made for several threads.

@@ -73,7 +73,7 @@ Trajectory run(const Scene& scene, const RunOptions& options) {
     if (options.progress)
         listeners.progress = [&](std::int64_t done) {
             const double share = static_cast<double>(done) / static_cast<double>(run.request().steps);
-            if (!options.progress(share)) is_interrupted = 1;
+            if (!ask(options.progress, share)) is_interrupted = 1;
         };
     listeners.interrupted = &is_interrupted;
     const TrajectoryResult& result = run.go(listeners);

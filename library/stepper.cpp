@@ -39,6 +39,19 @@ const std::vector<std::string>& Kernel::events() const {
     return parts_->events;
 }
 
+namespace {
+
+std::vector<Kernel::Parts::Required> required_of(const lobatto::Scene& scene) {
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    std::vector<Kernel::Parts::Required> all;
+    for (const Requirement& requirement : scene.requirements)
+        all.push_back({Tape::of(requirement.value, symbols).value(), requirement.may_vanish, requirement.complaint});
+    return all;
+}
+
+}  // namespace
+
 Kernel compile(const Scene& scene, const Settings& settings) {
     return in_algebra([&] {
         lobatto::Scene changed = with_method(scene, settings);
@@ -56,9 +69,9 @@ Kernel compile(const Scene& scene, const Settings& settings) {
         const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
         LoadedStepper<double> stepper(kernel);
         const TrajectoryRequest start = request_of(changed, steps.count, stepper);
-        return Kernel(
-            shared_in_algebra(new const Kernel::Parts{changed, kernel, source.digest, start, coordinates_of(changed),
-                                                      parameters_of(changed), inputs_of(changed), events_of(changed)}));
+        return Kernel(shared_in_algebra(new const Kernel::Parts{
+            changed, kernel, source.digest, start, coordinates_of(changed), parameters_of(changed), inputs_of(changed),
+            events_of(changed), required_of(changed)}));
     });
 }
 
@@ -68,9 +81,13 @@ struct Stepper::Parts {
     std::vector<double> parameters;
     double step, time = 0;
     std::vector<double> q, p;
-    double last_step = 0;  // of the last step taken; 0: none yet
+    double last_step = 0;    // of the last step taken; 0: none yet
+    std::int64_t taken = 0;  // steps, or with a clock arrivals, since the start
     std::vector<double> event_rows;
-    std::vector<EventHit> found;
+    std::vector<EventHit> found;  // with a clock also some beyond the time now, in the chain's last step
+    // With a clock: where the scene's times are counted from, and a stop that the chain has met beyond the time now.
+    double origin = 0;
+    std::optional<EventHit> stop_ahead;
 
     explicit Parts(const Kernel& of) : kernel(of), stepper(of.parts().kernel) {
         const TrajectoryRequest& start = kernel.parts().start;
@@ -93,7 +110,8 @@ struct Stepper::Parts {
         request.p = p;
         TrajectoryResult result;
         result.status = status;
-        result.started = last_step != 0;
+        result.started = taken > 0;
+        result.steps_done = taken;
         result.time = time;
         result.q = q;
         result.p = p;
@@ -107,19 +125,46 @@ struct Stepper::Parts {
         q.assign(position.begin(), position.end());
         p.assign(momentum.begin(), momentum.end());
         last_step = 0;
+        taken = 0;
         restart();
+    }
+    // Where no motion can begin, the stepper stays where it was.
+    void begin_at(double t, const std::vector<double>& position, const std::vector<double>& momentum) {
+        const double time_before = time;
+        const std::vector<double> q_before = q, p_before = p;
+        try {
+            go_on_from(t, position, momentum);
+        } catch (...) {
+            go_on_from(time_before, q_before, p_before);
+            throw;
+        }
     }
     void restart() {
         lobatto_status status = stepper.prepare(parameters, step);
         if (status == LOBATTO_OK) status = stepper.start(time, q, p);
         if (status != LOBATTO_OK) fail(status, {});
+        origin = time;
+        stop_ahead.reset();
+        std::erase_if(found, [&](const EventHit& hit) { return is_before(time, hit.t); });
     }
+    bool is_before(double a, double b) const { return step > 0 ? a < b : a > b; }
 
     // Parameters from `first` on; where the kernel refuses them, those of before.
     void change(std::size_t first, const std::vector<double>& values) {
         const std::vector<double> before = parameters;
         std::copy(values.begin(), values.end(), parameters.begin() + static_cast<std::ptrdiff_t>(first));
         if (parameters == before) return;
+        for (const double value : values)
+            if (!std::isfinite(value)) {
+                parameters = before;
+                throw InputError(fmt::format("{} is no value of a parameter", value));
+            }
+        for (const Kernel::Parts::Required& required : kernel.parts().required) {
+            const double value = required.value(parameters);
+            if (value > 0 || (required.may_vanish && value == 0)) continue;
+            parameters = before;
+            throw InputError(required.complaint);
+        }
         const lobatto_kernel& table = stepper.kernel().table();
         const auto begin = static_cast<std::size_t>(table.first_input),
                    end = begin + static_cast<std::size_t>(table.inputs);
@@ -138,13 +183,12 @@ struct Stepper::Parts {
         }
     }
 
-    // Of steps of equal length; with a clock, of arrivals after `interval` each, at most at `end`.
-    bool advance(std::int64_t steps, double interval, double end) {
-        const TrajectoryRequest& start = kernel.parts().start;
+    // Of steps of equal length; with a clock an arrival at a time.
+    bool advance(std::int64_t steps, double arrival = 0) {
         lobatto_advance call{};
-        call.tolerance = start.tolerance;
-        call.interval = interval;
-        call.end = end;
+        call.tolerance = kernel.parts().start.tolerance;
+        call.interval = std::copysign(std::numeric_limits<double>::infinity(), step);
+        call.end = arrival;
         lobatto_status status = LOBATTO_OK;
         for (std::int64_t done = 0; done < steps && status == LOBATTO_OK; done += call.steps_done) {
             call.steps = steps - done;
@@ -154,16 +198,21 @@ struct Stepper::Parts {
             }
             status = stepper.advance(call);
             keep_events(call.events_written);
+            taken += call.steps_done;
+            if (status == LOBATTO_STOPPED && is_clocked() && is_before(arrival, found.back().t)) {
+                stop_ahead = found.back();
+                status = LOBATTO_OK;
+            }
         }
-        if (status == LOBATTO_STOPPED) {
-            const double* const row = event_rows.data() + static_cast<std::size_t>(call.events_written - 1) * columns();
-            go_on_from(row[1], {row + 2, row + 2 + n()}, {row + 2 + n(), row + 2 + 2 * n()});
-            return false;
-        }
+        if (status == LOBATTO_STOPPED) return stop_at(EventHit(found.back()));
         stepper.state(time, q, p);
-        last_step = step;
+        if (steps > 0) last_step = step;
         if (status != LOBATTO_OK) fail(status, call);
         return true;
+    }
+    bool stop_at(const EventHit& stop) {
+        go_on_from(stop.t, stop.q, stop.p);
+        return false;
     }
 
     void keep_events(std::int64_t count) {
@@ -176,39 +225,67 @@ struct Stepper::Parts {
 
     bool is_clocked() const { return stepper.kernel()->clocked != 0; }
 
+    bool arrive_at(double t) {
+        return stop_ahead && !is_before(t, stop_ahead->t) ? stop_at(EventHit(*stop_ahead)) : advance(1, t);
+    }
+    // The next of the scene's times.
+    double next_arrival() const {
+        const double interval = kernel.parts().start.arrivals.interval;
+        double number = std::floor((time - origin) / interval) + 1;
+        while (!is_before(time, origin + number * interval)) ++number;
+        return origin + number * interval;
+    }
+    bool arrive(std::int64_t times) {
+        for (std::int64_t i = 0; i < times; ++i)
+            if (!arrive_at(next_arrival())) return false;
+        return true;
+    }
+
     bool advance_to(double t) {
         if (!std::isfinite(t)) throw InputError(fmt::format("advance_to: {} is no time", t));
-        if ((t - time) * (is_clocked() ? 1 : step) < 0)
+        if (is_before(t, time))
             throw InputError(fmt::format(
                 "advance_to: the motion is at t = {:.17g} already, beyond {:.17g}; start() goes to another place", time,
                 t));
         if (t == time) return true;
-        if (is_clocked()) return advance(1, t - time, t);
+        if (is_clocked()) return arrive_at(t);
         const double ratio = (t - time) / step, nearest = std::round(ratio);
         if (ratio > 9e15) throw InputError(fmt::format("advance_to: {:.3g} steps are too many to count", ratio));
-        const bool fits = std::fabs(ratio - nearest) <= 1e-9 * std::fmax(1, nearest);
-        const auto whole = static_cast<std::int64_t>(fits ? nearest : std::floor(ratio));
-        if (!advance(whole, 0, 0)) return false;
-        if (fits) return true;
-        // The rest, as one step of its own length.
+        // But for the roundings of both times.
+        const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::fmax(std::fabs(t), std::fabs(time));
+        const bool fits = std::fabs(time + nearest * step - t) <= rounding;
+        if (!advance(static_cast<std::int64_t>(fits ? nearest : std::floor(ratio)))) return false;
+        if (!fits && !take_rest(t)) return false;
+        time = t;
+        return true;
+    }
+
+    // To t as one step of its own length.
+    bool take_rest(double t) {
         const double usual = step;
-        step = t - time;
-        const double rest = step;
+        LoadedStepper<double> before = stepper;
         bool goes_on = false;
+        step = t - time;
         try {
-            restart();
-            goes_on = advance(1, 0, 0);
+            lobatto_status status = stepper.prepare(parameters, step);
+            if (status == LOBATTO_OK) status = stepper.go_on(before, time, q, p);
+            if (status != LOBATTO_OK) fail(status, {});
+            goes_on = advance(1);
         } catch (...) {
             step = usual;
-            restart();
+            stepper = std::move(before);
             throw;
         }
-        time = goes_on ? t : time;
+        const double rest = std::exchange(step, usual);
+        if (!goes_on) {
+            restart();
+            return false;
+        }
         inside = stepper;
-        step = usual;
-        restart();
-        last_step = goes_on ? rest : 0;
-        return goes_on;
+        last_step = rest;
+        stepper = std::move(before);
+        if (const auto status = stepper.go_on(*inside, t, q, p); status != LOBATTO_OK) fail(status, {});
+        return true;
     }
 
     std::optional<LoadedStepper<double>> inside;  // of the last step, where it was one of another length
@@ -236,20 +313,18 @@ double Stepper::step_size() const {
 
 void Stepper::start(double t, const double* q, const double* p) {
     const std::size_t n = parts_->n();
-    guarded([&] { parts_->go_on_from(t, {q, q + n}, {p, p + n}); });
+    guarded([&] { parts_->begin_at(t, {q, q + n}, {p, p + n}); });
 }
 void Stepper::start_from_velocity(double t, const double* q, const double* v) {
     const std::size_t n = parts_->n();
-    guarded([&] { parts_->go_on_from(t, {q, q + n}, parts_->stepper.momentum(t, {q, q + n}, {v, v + n})); });
+    guarded([&] { parts_->begin_at(t, {q, q + n}, parts_->stepper.momentum(t, {q, q + n}, {v, v + n})); });
 }
 
 bool Stepper::advance(std::int64_t steps) {
     return guarded([&] {
         if (steps < 0) throw InputError(fmt::format("advance: {} is no number of steps", steps));
         parts_->inside.reset();
-        if (!parts_->is_clocked()) return parts_->advance(steps, 0, 0);
-        const Arrivals& arrivals = parts_->kernel.parts().start.arrivals;
-        return parts_->advance(steps, arrivals.interval, std::numeric_limits<double>::max());
+        return parts_->is_clocked() ? parts_->arrive(steps) : parts_->advance(steps);
     });
 }
 bool Stepper::advance_to(double t) {
@@ -261,6 +336,9 @@ bool Stepper::advance_to(double t) {
 
 double Stepper::t() const {
     return parts_->time;
+}
+double Stepper::next_time() const {
+    return parts_->is_clocked() ? parts_->next_arrival() : parts_->time + parts_->step;
 }
 const double* Stepper::q() const {
     return parts_->q.data();
@@ -312,7 +390,9 @@ std::pair<std::vector<double>, std::vector<double>> Stepper::at(double t) const 
         std::pair<std::vector<double>, std::vector<double>> state;
         const LoadedStepper<double>& stepper = parts.inside ? *parts.inside : parts.stepper;
         if (stepper.dense(std::clamp(theta, 0.0, 1.0), state.first, state.second) != LOBATTO_OK)
-            throw InputError("at: this kernel has no polynomial in a step; splitting methods have none");
+            throw InputError(
+                "at: this step has no polynomial: splitting methods have none, and there is none across an impact or a "
+                "switch; use advance_to");
         return state;
     });
 }
@@ -345,7 +425,12 @@ void Stepper::set_inputs(const double* values) {
 }
 
 std::vector<EventHit> Stepper::take_events() {
-    return std::exchange(parts_->found, {});
+    Parts& parts = *parts_;
+    const auto ahead = std::stable_partition(parts.found.begin(), parts.found.end(),
+                                             [&](const EventHit& hit) { return !parts.is_before(parts.time, hit.t); });
+    std::vector<EventHit> taken(parts.found.begin(), ahead);
+    parts.found.erase(parts.found.begin(), ahead);
+    return taken;
 }
 
 }  // namespace lobatto::api

@@ -12,6 +12,7 @@
 namespace lobatto::api {
 
 StartsRequest request_of(const Starts& starts) {
+    if (starts.count == 0) throw InputError("a sweep needs a start; columns of no number have none");
     StartsRequest request;
     StartTable& table = request.table.emplace();
     table.rows = static_cast<std::int64_t>(starts.count);
@@ -139,7 +140,7 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
         const auto count = static_cast<std::int64_t>(starts.count);
         if (options.progress)
             progress = [&](std::int64_t done) {
-                if (!options.progress(static_cast<double>(done) / study->steps_of(0, count))) is_interrupted = 1;
+                if (!ask(options.progress, static_cast<double>(done) / study->steps_of(0, count))) is_interrupted = 1;
             };
         // With a clock the scene itself says which states there are between.
         const std::int64_t every =

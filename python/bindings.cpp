@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -49,6 +49,25 @@ const double* row_of(const Array& array, std::size_t count, const char* what) {
     return array.data();
 }
 
+// The value of an argument; TypeError where it is of another kind.
+template <class Number>
+Number number_of(const std::string& name, const py::handle& value) {
+    try {
+        return value.cast<Number>();
+    } catch (const py::cast_error&) {
+        throw py::type_error(name + " needs a " + (std::is_integral_v<Number> ? "whole number" : "number") + ", not " +
+                             std::string(py::repr(value)));
+    }
+}
+
+// As the scene has it: a formula, or a number with all its digits.
+std::string formula_of(const std::string& name, const py::handle& value) {
+    if (py::isinstance<py::str>(value)) return std::string(py::str(value));
+    const auto number = number_of<double>(name, value);
+    if (!std::isfinite(number)) throw lob::InputError(name + ": " + std::string(py::repr(value)) + " is no value");
+    return std::string(py::repr(py::float_(number)));
+}
+
 // Settings by the names of the command line; None is as the scene has it.
 lob::Settings settings_of(const py::kwargs& given) {
     lob::Settings settings;
@@ -57,15 +76,15 @@ lob::Settings settings_of(const py::kwargs& given) {
         const std::string name = text(key);
         if (value.is_none()) continue;
         if (name == "points")
-            settings.points = value.cast<int>();
+            settings.points = number_of<int>(name, value);
         else if (name == "stages")
-            settings.stages = value.cast<int>();
+            settings.stages = number_of<int>(name, value);
         else if (name == "splitting")
-            settings.splitting = value.cast<int>();
+            settings.splitting = number_of<int>(name, value);
         else if (name == "tolerance")
-            settings.tolerance = value.cast<double>();
+            settings.tolerance = number_of<double>(name, value);
         else if (name == "every")
-            settings.every = value.cast<std::int64_t>();
+            settings.every = number_of<std::int64_t>(name, value);
         else if (name == "arithmetic")
             settings.arithmetic = text(value);
         else if (name == "numbers")
@@ -73,16 +92,12 @@ lob::Settings settings_of(const py::kwargs& given) {
         else if (name == "clock")
             settings.clock = text(value);
         else if (name == "step")
-            settings.step =
-                py::isinstance<py::str>(value) ? text(value) : text(py::repr(py::float_(value.cast<double>())));
+            settings.step = formula_of(name, value);
         else if (name == "until")
-            settings.until =
-                py::isinstance<py::str>(value) ? text(value) : text(py::repr(py::float_(value.cast<double>())));
+            settings.until = formula_of(name, value);
         else if (name == "set")
             for (const auto& [parameter, formula] : value.cast<py::dict>())
-                settings.set.emplace_back(text(parameter), py::isinstance<py::str>(formula)
-                                                               ? text(formula)
-                                                               : text(py::repr(py::float_(formula.cast<double>()))));
+                settings.set.emplace_back(text(parameter), formula_of(text(parameter), formula));
         else
             throw py::type_error("unknown setting '" + name +
                                  "'; there are points, stages, splitting, tolerance, arithmetic, numbers, clock, step, "
@@ -135,38 +150,41 @@ auto unlocked(const Work& work) {
     return result;
 }
 
-// States at ascending times of a trajectory whose kept states are given: steps are taken from the kept state before,
-// and the last of them is looked into on its own polynomial.
-std::pair<py::array, py::array> dense(lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
-                                      const Array& times) {
+// States at ascending times of a trajectory whose kept states are given: these themselves, and between them what steps
+// from the kept state before lead to, of which the last is shortened to end there.
+std::pair<py::array, py::array> states_at(lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
+                                          const Array& times) {
     const std::size_t n = stepper.coordinates(), kept = static_cast<std::size_t>(t.size());
     const auto count = static_cast<std::size_t>(times.size());
-    const double *const at = times.data(), *const first = t.data(), *const last = first + kept;
-    if (kept < 2) throw lob::InputError("a trajectory of one state has nothing in between");
-    std::vector<double> positions(count * n), velocities(count * n);
+    const double *const at = times.data(), *const first = t.data(), *const end = first + kept;
+    const double rounding = 1e-12 * std::fmax(std::fabs(*first), std::fabs(end[-1]));
+    std::vector<double> positions, velocities;
     std::size_t begun = kept;
+    const auto begin = [&](std::size_t from) {
+        stepper.start(first[from], q.data() + from * n, p.data() + from * n);
+        begun = from;
+    };
+    const auto keep = [&](const lob::Stepper& here) {
+        positions.insert(positions.end(), here.q(), here.q() + n);
+        const std::vector<double> velocity = here.velocity();
+        velocities.insert(velocities.end(), velocity.begin(), velocity.end());
+    };
     for (std::size_t i = 0; i < count; ++i) {
-        if (!(at[i] >= *first && at[i] <= last[-1]))
+        if (!(at[i] >= *first - rounding && at[i] <= end[-1] + rounding))
             throw lob::InputError("t = " + std::to_string(at[i]) + " is outside the trajectory, which leads from " +
-                                  std::to_string(*first) + " to " + std::to_string(last[-1]));
-        const auto next = static_cast<std::size_t>(std::upper_bound(first, last, at[i]) - first);
-        const std::size_t from = std::min(next, kept - 1) - 1;
-        if (begun != from || stepper.t() - stepper.step_size() > at[i]) {
-            stepper.start(first[from], q.data() + from * n, p.data() + from * n);
-            begun = from;
-            if (at[i] > first[from]) stepper.step();
-        }
-        const double rounding = 1e-12 * std::fabs(stepper.step_size());
-        while (stepper.t() < at[i] - rounding) stepper.step();
-        std::vector<double> position, velocity;
-        if (std::fabs(stepper.t() - at[i]) <= rounding) {
-            position.assign(stepper.q(), stepper.q() + n);
-            velocity = stepper.velocity();
+                                  std::to_string(*first) + " to " + std::to_string(end[-1]));
+        const auto from = static_cast<std::size_t>(std::upper_bound(first, end, at[i] + rounding) - first) - 1;
+        const bool is_kept = at[i] - first[from] <= rounding;
+        if (begun != from || is_kept || stepper.t() > at[i]) begin(from);
+        bool goes_on = !is_kept;
+        while (goes_on && stepper.next_time() <= at[i] + rounding) goes_on = stepper.step();
+        if (!goes_on || at[i] - stepper.t() <= rounding) {
+            keep(stepper);
         } else {
-            std::tie(position, velocity) = stepper.at(at[i]);
+            lob::Stepper inside = stepper;
+            inside.advance_to(at[i]);
+            keep(inside);
         }
-        std::copy(position.begin(), position.end(), positions.begin() + static_cast<std::ptrdiff_t>(i * n));
-        std::copy(velocity.begin(), velocity.end(), velocities.begin() + static_cast<std::ptrdiff_t>(i * n));
     }
     const auto columns = static_cast<py::ssize_t>(n);
     return {owned(std::move(positions), columns), owned(std::move(velocities), columns)};
@@ -194,6 +212,8 @@ py::dict dict_of(lob::Trajectory&& run) {
     dict["steps"] = run.steps;
     dict["seconds"] = run.seconds;
     dict["stopped_by"] = run.stopped_by;
+    dict["reaches_end"] = run.reaches_end;
+    dict["interrupted"] = run.interrupted;
     dict["method"] = run.method;
     dict["digest"] = run.digest;
     dict["step"] = run.step;
@@ -262,6 +282,7 @@ py::dict sweep(const lob::Scene& scene, const py::dict& columns, const std::vect
     dict["error"] = result.error.empty() ? py::object(py::none()) : py::object(owned(std::move(result.error)));
     dict["kept"] = kept;
     dict["statuses"] = result.statuses;
+    dict["interrupted"] = result.interrupted;
     dict["warnings"] = result.warnings;
     dict["_states"] = states_of(std::move(result.states), n);
     return dict;
@@ -434,7 +455,8 @@ void add_stepper(py::module_& module) {
              [](lob::Stepper& stepper, const std::vector<std::string>& names) {
                  return events_of(stepper.take_events(), names);
              })
-        .def("_dense", &dense);
+        .def_property_readonly("_next_time", &lob::Stepper::next_time)
+        .def("_states_at", &states_at);
 }
 
 }  // namespace

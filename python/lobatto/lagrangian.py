@@ -18,9 +18,14 @@ def _value(value):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
-    if hasattr(value, "item"):  # of NumPy
-        value = value.item()
-    return repr(value)
+    if hasattr(value, "tolist"):  # of NumPy
+        return _value(value.tolist())
+    if isinstance(value, int):
+        return repr(value)
+    try:
+        return repr(float(value))  # fractions and decimals too
+    except (TypeError, ValueError):
+        raise InputError(f"{value!r} is no value: give a number, or a formula in a string") from None
 
 
 def _coordinate(name, value):

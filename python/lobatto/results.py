@@ -19,6 +19,13 @@ class State(NamedTuple):
     velocity: numpy.ndarray
 
 
+def _states_at(stepper, t, q, p, times):
+    """Positions and velocities at times of any shape, of a trajectory with these kept states: that shape x n."""
+    order = numpy.argsort(times, axis=None, kind="stable")
+    back = numpy.argsort(order, kind="stable")
+    return (rows[back].reshape(times.shape + (-1,)) for rows in stepper._states_at(t, q, p, times.ravel()[order]))
+
+
 def _table(rows):
     cells = "".join(f"<tr><th style='text-align:left'>{html.escape(str(name))}</th>"
                     f"<td style='text-align:left'>{html.escape(str(value))}</td></tr>" for name, value in rows)
@@ -65,7 +72,9 @@ class Trajectory(_Rows):
     for, eliminated coordinates and their velocities, the orientation and angular velocity of bodies.
 
     ``error``: measured at the end, relative to the amplitude of the motion; None where it was not measured.
-    ``run(t)`` gives states at any times in between, on the polynomial of the step there.
+    ``run(t)`` gives states at any times in between, by steps from the state before that end there.
+    ``reaches_end``: False where the end is no multiple of the step, and the run ended at the last one before.
+    ``interrupted``: by ``progress``. ``stopped_by``: the stop of the scene that ended it, or "".
     """
 
     def __init__(self, scene, settings, values):
@@ -85,15 +94,10 @@ class Trajectory(_Rows):
     def __call__(self, t):
         """Position and velocity at a time, or at an array of times, inside the run."""
         if self._stepper is None:
-            settings = {name: value for name, value in self._settings.items() if name not in ("every", "numbers")}
-            self._stepper = Stepper(self.scene, **settings)
-        times = numpy.atleast_1d(numpy.asarray(t, dtype=float))
-        order = numpy.argsort(times, kind="stable")
-        q, velocity = self._stepper._dense(self.t, self.q, self.p, times[order])
-        back = numpy.argsort(order, kind="stable")
-        if numpy.ndim(t) == 0:
-            return State(float(t), q[0], velocity[0])
-        return State(times, q[back], velocity[back])
+            self._stepper = Stepper(self.scene, **{**self._settings, "every": None, "numbers": "double"})
+        times = numpy.asarray(t, dtype=float)
+        q, velocity = _states_at(self._stepper, self.t, self.q, self.p, times)
+        return State(float(t) if times.ndim == 0 else times, q, velocity)
 
     def plot(self, *names, x="t", ax=None, **options):
         """Draws columns (all coordinates where none is named) over x by matplotlib; returns the axes."""
@@ -121,6 +125,10 @@ class Trajectory(_Rows):
             facts.append(("energy", f"{self.H[0]:g}, changes by {numpy.max(numpy.abs(self.H - self.H[0])):.1e} at most"))
         if self.stopped_by:
             facts.append(("stopped by", self.stopped_by))
+        if not self.reaches_end:
+            facts.append(("end", "no multiple of the step; the run ended at the last one before"))
+        if self.interrupted:
+            facts.append(("interrupted", "before its end"))
         facts += [("warning", warning) for warning in self.warnings]
         return facts
 

@@ -8,7 +8,7 @@ import numpy
 
 from . import _lobatto
 from ._lobatto import RunFailure, Scene, Stepper
-from .results import Choice, Claims, Derivation, Sweep, Trajectory
+from .results import Choice, Claims, Derivation, Sweep, Trajectory, _states_at
 
 
 def _scene(scene):
@@ -114,7 +114,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     times, q, p, velocities, status, message = [0.0], [stepper.q.copy()], [stepper.p.copy()], [stepper.velocity], 0, ""
     try:
         while stepper.t < end:
-            going = stepper.step() if stepper.t + stepper.step_size <= end * (1 + 1e-12) else stepper.advance_to(end)
+            going = stepper.step() if stepper._next_time < end * (1 - 1e-12) else stepper.advance_to(end)
             times.append(stepper.t)
             q.append(stepper.q.copy())
             p.append(stepper.p.copy())
@@ -129,11 +129,8 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
 
     def sol(at):
         at = numpy.asarray(at, dtype=float)
-        ordered = numpy.sort(numpy.atleast_1d(at))
-        place = numpy.searchsorted(ordered, numpy.atleast_1d(at))
-        states = stepper.copy()._dense(t, numpy.array(q), numpy.array(p), ordered)
-        values = numpy.vstack([states[0][place].T, states[1][place].T])
-        return values[:, 0] if at.ndim == 0 else values
+        states = _states_at(stepper.copy(), t, numpy.array(q), numpy.array(p), at)
+        return numpy.concatenate([numpy.moveaxis(rows, -1, 0) for rows in states])
 
     if t_eval is not None:
         t_eval = numpy.asarray(t_eval, dtype=float)

@@ -120,6 +120,13 @@ lobatto_status LoadedStepper<real>::start(real time, const std::vector<real>& q,
 }
 
 template <class real>
+lobatto_status LoadedStepper<real>::go_on(const LoadedStepper& other, real time, const std::vector<real>& q,
+                                          const std::vector<real>& p) {
+    assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
+    return static_cast<lobatto_status>(kernel_->go_on(stepper_, other.stepper_, &time, q.data(), p.data()));
+}
+
+template <class real>
 lobatto_status LoadedStepper<real>::advance(lobatto_advance& call) {
     return static_cast<lobatto_status>(kernel_->advance(stepper_, &call));
 }

@@ -65,6 +65,8 @@ public:
 
     lobatto_status prepare(const std::vector<real>& parameters, real step);
     lobatto_status start(real time, const std::vector<real>& q, const std::vector<real>& p);
+    // The same, but what `other`, of the same kernel, knows of events is kept.
+    lobatto_status go_on(const LoadedStepper& other, real time, const std::vector<real>& q, const std::vector<real>& p);
     lobatto_status advance(lobatto_advance& call);
     lobatto_status set_inputs(const std::vector<real>& parameters);  // of a kernel with inputs: abi.h
     void state(real& time, std::vector<real>& q, std::vector<real>& p) const;

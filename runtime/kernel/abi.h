@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 12u
+#define LOBATTO_ABI_VERSION 13u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -67,7 +67,8 @@ typedef struct lobatto_advance {
     double tolerance;       /* of increments, relative: where the iteration of a step may end; 0: rounding */
     int32_t dense;          /* rows between two steps before each record, equally spaced; needs record_every = 1 */
     /* Of kernels with a clock `steps` are arrivals at the times start + interval, start + 2 interval, ..., none beyond
-     * `end`; on the way the chain takes steps of its own. */
+     * `end`; on the way the chain takes steps of its own. Where `interval` is infinite, the only arrival is at `end`,
+     * and events of the chain's last step are told beyond it too: no later call tells them. */
     double interval, end;
     int32_t chain_records; /* 1: the states of the chain are rows too */
     /* out */
@@ -141,6 +142,8 @@ typedef struct lobatto_kernel {
                        const void* step); /* values of parameters and step size */
     int32_t (*start)(void* stepper, const void* time, const void* q,
                      const void* p); /* forgets what earlier steps left */
+    /* The same, but what another stepper of this kernel, or this one, knows of events is kept: the motion goes on. */
+    int32_t (*go_on)(void* stepper, const void* other, const void* time, const void* q, const void* p);
     int32_t (*advance)(void* stepper, lobatto_advance* call);
     void (*state)(const void* stepper, void* time, void* q, void* p);
     /* Between two steps: values of all parameters, of which those of inputs are taken; null without inputs. What it

@@ -140,7 +140,7 @@ struct Advance {
         stepper.tolerance = static_cast<real>(call.tolerance);
         const real end = static_cast<real>(call.end), interval = static_cast<real>(call.interval);
         while (call.steps_done < call.steps) {
-            real target = stepper.origin + real(stepper.arrivals + 1) * interval;
+            real target = is_finite(interval) ? stepper.origin + real(stepper.arrivals + 1) * interval : end;
             if ((target - end) * interval > real(0)) target = end;
             while (stepper.is_short_of(target)) {
                 if (call.chain_steps == most || (call.record_every > 0 && call.records_written + 2 > call.capacity))
@@ -160,7 +160,7 @@ struct Advance {
                 ++call.chain_steps;
                 count(stepper, call);
                 if constexpr (is_watched) {
-                    const Status found = look(stepper, call, *watch, end);
+                    const Status found = look(stepper, call, *watch, is_finite(interval) ? end : interval);
                     if (found != Status::ok) return found;
                 }
             }
@@ -280,6 +280,15 @@ struct Export {
             return code(Sides<K>::start(*static_cast<S*>(stepper), *in(time), in(q), in(p)));
         else
             return code(static_cast<S*>(stepper)->start(*in(time), in(q), in(p)));
+    }
+    static std::int32_t go_on(void* stepper, const void* other, const void* time, const void* q, const void* p) {
+        if constexpr (event_count > 0) {
+            const KnownEvents<S> known(of(other));
+            const std::int32_t status = start(stepper, time, q, p);
+            known.continue_in(*static_cast<S*>(stepper));
+            return status;
+        }
+        return start(stepper, time, q, p);
     }
     static std::int32_t take_inputs(void* stepper, const void* parameters) {
         if constexpr (inputs > 0) {
@@ -498,6 +507,7 @@ struct Export {
                                              alignof(S),
                                              prepare,
                                              start,
+                                             go_on,
                                              advance,
                                              state,
                                              inputs_taken,

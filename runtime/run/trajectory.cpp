@@ -175,6 +175,22 @@ NumberStepper::Parts stop_at(const NumberStepper::Parts& events, std::size_t par
     return row;
 }
 
+// With a clock: the states at the times asked for that the step of the chain has passed in which the motion stopped.
+void arrive_before_stop(NumberStepper& stepper, const TrajectoryRequest& request, std::int64_t rows, Keeper& keeper,
+                        TrajectoryResult& result) {
+    NumberStepper::Parts records, events;
+    const double interval = request.arrivals.interval;
+    const auto next = [&] { return request.time + static_cast<double>(result.steps_done + 1) * interval; };
+    while (result.steps_done < request.steps && (result.time - next()) * interval > 0) {
+        lobatto_advance call = call_for(request, rows, 0);
+        call.steps = 1;
+        result.status = stepper.advance(call, records, events);
+        if (result.status != LOBATTO_OK) return;
+        add(result, call);
+        keeper.keep(records, call.records_written, request.dense);
+    }
+}
+
 constexpr int most_halvings = 14;    // of a step that could not be taken
 constexpr double same_place = 0.01;  // of the way
 
@@ -294,7 +310,9 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         keeper.keep(records, call.records_written, request.dense);
         if (result.status == LOBATTO_STOPPED) {
             result.status = LOBATTO_OK;
-            keeper.keep(stop_at(events, parts, columns, result), 1, 0, true);
+            const NumberStepper::Parts stop = stop_at(events, parts, columns, result);
+            if (kernel->clocked != 0) arrive_before_stop(stepper, request, rows, keeper, result);
+            keeper.keep(stop, 1, 0, true);
             return result;
         }
         pace.took(seconds, call.steps_done);

@@ -181,7 +181,7 @@ TEST_CASE("an input that leads nowhere is refused, and the motion goes on with t
     lob::Stepper stepper = stepper_of(scene_of("q'^2/2 + cos(q) + u*q", "")), same = stepper;
     stepper.step();
     same.step();
-    CHECK_THROWS_AS(stepper.set("u", std::numeric_limits<double>::infinity()), lob::ComputationError);
+    CHECK_THROWS_AS(stepper.set("u", std::numeric_limits<double>::infinity()), lob::InputError);
     CHECK(stepper.parameter("u") == 0.5);
     stepper.step();
     same.step();

@@ -109,6 +109,39 @@ TEST_CASE("advance_to ends at its time exactly, also between steps, and goes on 
     CHECK(message_of<lob::InputError>([&] { stepper.advance_to(0.1); }).find("is at t = 0.38") != std::string::npos);
 }
 
+TEST_CASE("advance_to is at its time to the last bit, however many steps lead there") {
+    const lob::Scene scene = lob::Scene::from_text(
+        "lagrangian = \"x'^2/2 - 1e-3*x^4\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[run]\nstep = 0.015\nuntil = 1\n");
+    lob::Stepper stepper(lob::compile(scene));
+    stepper.advance_to(0.33);  // 22 steps, whose sum is another number
+    CHECK(stepper.t() == 0.33);
+    stepper.advance_to(3000.00009);  // not 3000: a rest of 0.6 % of a step, 3e-8 of the way
+    CHECK(stepper.t() == 3000.00009);
+    lob::Stepper near(lob::compile(scene));
+    near.advance_to(3000);
+    CHECK(stepper.q()[0] - near.q()[0] == doctest::Approx(0.00009 * near.velocity()[0]).epsilon(0.01));
+}
+
+TEST_CASE("a stop or event where advance_to ends is not lost") {
+    const std::string text =
+        "lagrangian = \"x'^2/2 - y'^2/2 + y'*x'\"\n[coordinates]\nx = { position = 0, velocity = 1 }\ny = { position = "
+        "0, velocity = 1 }\n[run]\nstep = 0.04\nuntil = 9\n";
+    lob::Stepper stopped(lob::compile(lob::Scene::from_text(text + "stop = \"x = 0.7\"\n")));
+    stopped.advance_to(0.7);
+    CHECK_FALSE(stopped.advance(10));
+    CHECK(stopped.t() == doctest::Approx(0.7).epsilon(1e-14));
+    lob::Stepper watched(
+        lob::compile(lob::Scene::from_text(text + "[output]\nevents = [\"x = 0.7\", \"y = 0.3 rising\"]\n")));
+    watched.advance_to(0.3);
+    watched.advance_to(0.5);
+    watched.advance_to(0.7);
+    watched.advance(3);
+    const auto hits = watched.take_events();
+    REQUIRE(hits.size() == 2);
+    CHECK(hits[0].t == doctest::Approx(0.3).epsilon(1e-14));
+    CHECK(hits[1].t == doctest::Approx(0.7).epsilon(1e-14));
+}
+
 TEST_CASE("a parameter set between steps acts from the next step on, as a fresh start with it would") {
     const lob::Scene scene(scenes + "pendulum.toml");
     lob::Stepper stepper(lob::compile(scene));
@@ -337,6 +370,58 @@ TEST_CASE("a clock is a setting: the same steps as with the scene's own, and equ
     CHECK(all.count == static_cast<std::size_t>(all.steps) + 1);
 }
 
+TEST_CASE("with a clock advance_to goes to any times, and steps go on to those of the scene") {
+    const lob::Scene scene = eccentric("clock = \"auto\"\n", "0.02", "[output]\nevery = 0.5\n");
+    const lob::Kernel kernel = lob::compile(scene);
+    const auto fresh = [&](double t) {
+        lob::Stepper stepper(kernel);
+        stepper.advance_to(t);
+        return std::tuple(stepper.t(), stepper.q()[0], stepper.q()[1], stepper.p()[0]);
+    };
+    lob::Stepper stepper(kernel);
+    for (const double t : {0.3, 1.0, 1.2, 1.2000001, 2.9, 2.95}) {
+        CAPTURE(t);
+        stepper.advance_to(t);
+        CHECK(std::tuple(stepper.t(), stepper.q()[0], stepper.q()[1], stepper.p()[0]) == fresh(t));
+        CHECK(stepper.t() == t);
+    }
+    stepper.step();
+    CHECK(stepper.t() == 3);
+    stepper.advance(2);
+    CHECK(std::tuple(stepper.t(), stepper.q()[0], stepper.q()[1], stepper.p()[0]) == fresh(4));
+    CHECK(message_of<lob::InputError>([&] { stepper.advance_to(3); }).find("is at t = 4 already") != std::string::npos);
+}
+
+TEST_CASE("with a clock no stop and no event is lost between the times that are asked for, and none comes early") {
+    const double pi = std::acos(-1.0);
+    const std::string words = "clock = \"auto\"\n";
+    const lob::Kernel kernel = lob::compile(eccentric(words, "0.02", "[output]\nevery = 0.5\nevents = [\"y = 0\"]\n")),
+                      stopping = lob::compile(eccentric(words, "0.02\nstop = \"y = 0 falling\"", ""));
+    for (const double dt : {0.01, 0.1, 0.25, 0.7, 1.0, 100.0}) {
+        CAPTURE(dt);
+        lob::Stepper stepper(kernel), ends(stopping);
+        std::size_t seen = 0;
+        for (int i = 1; i * dt <= 18; ++i) {
+            stepper.advance_to(i * dt);
+            for (const lob::EventHit& hit : stepper.take_events()) {
+                CHECK(hit.t == doctest::Approx(pi * static_cast<double>(++seen)).epsilon(1e-6));
+                CHECK(hit.t <= stepper.t());
+                CHECK(hit.t > stepper.t() - dt);
+            }
+        }
+        if (dt < 18) CHECK(seen == 5);
+        int i = 1;
+        while (i < 4000 && ends.advance_to(i * dt)) ++i;
+        CHECK(ends.t() == doctest::Approx(pi).epsilon(1e-6));
+        CHECK(std::fabs(ends.q()[1]) < 1e-9);
+    }
+    // A run has the states before its stop, also those in the step of the chain that leads past it.
+    const lob::Trajectory run = lob::run(eccentric(words, "0.02\nstop = \"y = 0 falling\"", "[output]\nevery = 0.1\n"));
+    REQUIRE(run.count == 33);
+    CHECK(run.t[31] == doctest::Approx(3.1));
+    CHECK(run.t[32] == doctest::Approx(pi).epsilon(1e-6));
+}
+
 TEST_CASE("tune of the library chooses a clock where that is cheaper, and a run keeps the promise with it" *
           doctest::test_suite("slowest")) {
     const lob::Scene without = eccentric("", "0.02"), with = eccentric("clock = \"auto\"\n", "0.02");
@@ -378,5 +463,5 @@ TEST_CASE("a scene tells its derivation and writes its integrator") {
     CHECK(scene.derivation().find("D4") != std::string::npos);
     CHECK(scene.derivation_latex().starts_with("\\documentclass"));
     CHECK(scene.emit().first == "pendulum.hpp");
-    CHECK(scene.emit_plain().second.find("namespace pendulum") != std::string::npos);
+    CHECK(scene.emit_plain().second.find("namespace lobatto::plain::pendulum") != std::string::npos);
 }

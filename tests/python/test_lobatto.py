@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The Python module: one trajectory, many, choosing, errors, what it costs."""
 
+import fractions
 import os
 import pathlib
 import signal
@@ -52,7 +53,7 @@ def test_a_companion_in_finer_numbers_measures_rounding(pendulum):
         lobatto.run(pendulum, until=5, companion="float")
 
 
-def test_dense_output_is_the_polynomial_of_the_step(pendulum):
+def test_states_between_those_that_are_kept(pendulum):
     run = lobatto.run(pendulum, until=5, points=6)
     fine = lobatto.run(pendulum, until=5, points=6, step=0.0125)
     assert numpy.max(numpy.abs(run(fine.t).q - fine.q)) < 1e-8  # measured 1.3e-10
@@ -61,6 +62,66 @@ def test_dense_output_is_the_polynomial_of_the_step(pendulum):
     assert numpy.allclose(sparse(numpy.array([3.21, 0.4])).q, run(numpy.array([3.21, 0.4])).q, rtol=0, atol=1e-12)
     with pytest.raises(lobatto.InputError, match="outside the trajectory"):
         run(6.0)
+
+
+OSCILLATOR = "x'^2/2 - x^2/2"
+KEPLER = "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)"
+
+
+def exactly(run, error=1e-9):
+    """Between 0 and the end of a run of cos(t): at many times, at the kept ones, at both ends."""
+    times = numpy.concatenate([numpy.linspace(run.t[0], run.t[-1], 37), run.t])
+    state = run(times)
+    assert numpy.max(numpy.abs(state.q[:, 0] - numpy.cos(times))) < error
+    assert numpy.max(numpy.abs(state.velocity[:, 0] + numpy.sin(times))) < error
+    assert numpy.array_equal(run(run.t).q, run.q)
+
+
+def test_states_between_are_there_for_all_kinds_of_steps():
+    scene = lobatto.Lagrangian(OSCILLATOR, x=1, step=0.05, until=4)
+    exactly(lobatto.run(scene, points=8, every=7))
+    exactly(lobatto.run(scene, splitting=14), 1e-7)
+    exactly(lobatto.run(scene, points=8, numbers="double-double"))
+    exactly(lobatto.run(scene, points=8, until=0))
+    exactly(lobatto.run(lobatto.Lagrangian(OSCILLATOR, x=1, step=0.05, until=4, extra='stop = "x = -0.5"'), points=8))
+    exactly(lobatto.run(scene, points=8, step=0.015, until=0.33))  # whose last time is another number
+    run = lobatto.run(scene, points=2)
+    assert numpy.array_equal(run(run.t[-1]).velocity, run.p[-1])
+    square = run([[0.11, 0.22], [1.3, 2.4]])
+    assert square.q.shape == (2, 2, 1) and square.t.shape == (2, 2)
+    assert numpy.array_equal(square.q.ravel(), run([0.11, 0.22, 1.3, 2.4]).q.ravel())
+    assert numpy.allclose(square.q[1, 0], numpy.cos(1.3), atol=1e-3)
+    with pytest.raises(lobatto.InputError, match="outside the trajectory"):
+        run(4.01)
+    ball = lobatto.run(str(SCENES / "bouncing_ball.toml"))
+    assert numpy.isfinite(ball(numpy.linspace(0, ball.t[-1], 101)).q).all()
+
+
+def comet(every):
+    return lobatto.Lagrangian(KEPLER, x=0.1, y=(0, 19**0.5), step=0.02, until=7, method=dict(points=9, clock="auto"),
+                              output=dict(every=every))
+
+
+def test_states_between_with_a_clock():
+    run, fine = (lobatto.run(comet(every)) for every in (0.5, 0.1))
+    assert numpy.max(numpy.abs(run(fine.t).q - fine.q)) < 1e-8
+
+
+def test_an_exception_of_the_caller_ends_the_work_and_arrives(pendulum):
+    class Enough(Exception):
+        pass
+
+    def progress(_):
+        raise Enough("of it")
+
+    for work in (lambda: lobatto.run(pendulum, until=1e6, measure=False, progress=progress),
+                 lambda: lobatto.sweep(pendulum, {"q": numpy.linspace(0, 1, 2000)}, until=1e4, progress=progress),
+                 lambda: lobatto.tune(pendulum, 1e-6, progress=progress)):
+        with pytest.raises(Enough, match="of it"):
+            work()
+    short = lobatto.run(pendulum, until=1e6, measure=False, progress=lambda share: False)
+    assert short.interrupted and short.t[-1] < 1e6 and "interrupted" in repr(short)
+    assert not lobatto.run(pendulum, until=1.03).reaches_end
 
 
 def test_arrays_are_not_copied_and_outlive_what_made_them(pendulum):
@@ -174,6 +235,28 @@ def test_errors_are_exceptions_with_the_texts_of_the_command_line(pendulum):
         lobatto.run(pendulum, set={"omga": 1})
 
 
+def test_values_of_another_kind_are_refused(pendulum):
+    for settings, message in ((dict(points=4.5), "points needs a whole number, not 4.5"),
+                              (dict(every=[1]), "every needs a whole number"), (dict(set={"m": None}), "m needs a number"),
+                              (dict(tolerance="x"), "tolerance needs a number")):
+        with pytest.raises(TypeError, match=message):
+            lobatto.run(pendulum, **settings)
+    with pytest.raises(lobatto.InputError, match="step: nan is no value"):
+        lobatto.run(pendulum, step=float("nan"))
+    with pytest.raises(lobatto.InputError, match="no value: give a number"):
+        lobatto.Lagrangian(OSCILLATOR + " + m", x=1, m=None)
+    for starts in ({}, {"q": []}):
+        with pytest.raises(lobatto.InputError, match="a sweep needs a start"):
+            lobatto.sweep(pendulum, starts)
+    third = lobatto.Lagrangian("m*x'^2/2 - x^2/2", x=numpy.float64(1), m=fractions.Fraction(1, 3))
+    assert third.parameters[0].value == 1 / 3
+    ball = lobatto.Stepper(lobatto.Scene(str(SCENES / "bouncing_ball.toml")))
+    before = ball.parameter("e")
+    with pytest.raises(lobatto.InputError, match="restitution"):
+        ball.set("e", -1)
+    assert ball.parameter("e") == before and ball.step()
+
+
 def test_warnings_are_warnings(pendulum):
     with pytest.warns(UserWarning, match="the error is"):
         lobatto.run(pendulum, step=0.25, points=3, until=5)
@@ -213,6 +296,18 @@ def test_solve_ivp_agrees_with_scipy(pendulum):
     assert found.success and found.sol(1.0).shape == (2,)
     with pytest.raises(lobatto.InputError, match="t_span"):
         lobatto.solve_ivp(pendulum, (1, 3))
+
+
+def test_solve_ivp_ends_where_it_should():
+    for step, end in ((0.015, 0.9), (0.015, 0.33), (1 / 49, 1), (0.05, 1.03)):
+        scene = lobatto.Lagrangian(OSCILLATOR, x=1, step=step, until=9)
+        solution = lobatto.solve_ivp(scene, (0, end), points=6, dense_output=True)
+        assert solution.t[-1] == end and solution.success
+        assert numpy.array_equal(lobatto.solve_ivp(scene, (0, end), points=6, t_eval=[end]).y[:, 0], solution.y[:, -1])
+        assert solution.sol(end / 3) == pytest.approx([numpy.cos(end / 3), -numpy.sin(end / 3)], abs=1e-9)
+        assert solution.sol([[0, end]]).shape == (2, 1, 2)
+    solution = lobatto.solve_ivp(comet(0.5), (0, 2.2))
+    assert numpy.allclose(solution.t, [0, 0.5, 1, 1.5, 2, 2.2], atol=1e-14)
 
 
 def test_a_notebook_shows_a_table_and_nothing_is_injected():

@@ -194,11 +194,13 @@ public:
     bool step() { return advance(1); }
     bool advance(std::int64_t steps);
     /// Equal steps while they fit, then a shorter one that ends at t exactly. That one is no step of the sequence of
-    /// equal ones: where energy counts over many steps, take step() and look in between with at().
+    /// equal ones: where energy counts over many steps, take step() and look in between with at(). With a clock the
+    /// sequence goes on as if nobody had asked.
     bool advance_to(double t);
 
     double t() const;
-    const double* q() const;  ///< n; the same place for as long as the stepper lives
+    double next_time() const;  ///< where step() leads to, unless a stop comes before it
+    const double* q() const;   ///< n; the same place for as long as the stepper lives
     const double* p() const;
     std::vector<double> velocity() const;
     double energy() const;                    ///< H(t, q, p); not a number where the kernel has none
@@ -215,7 +217,7 @@ public:
     /// All inputs, in the order of inputs().
     void set_inputs(const double* values);
 
-    std::vector<EventHit> take_events();  ///< since the last call
+    std::vector<EventHit> take_events();  ///< until t(), since the last call
 
 private:
     struct Parts;

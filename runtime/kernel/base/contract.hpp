@@ -162,6 +162,7 @@ struct Motion {
     real increment{};                 // last increment that was measured, relative to the displacement of its step
     real event_values[event_room]{};  // the last of each that was not zero (steppers/events.hpp)
     bool event_begins[event_room]{};  // whether that is of the state now, which no step has looked at
+    bool events_go_on{};              // from a motion before the start: then the first step is one like others
 
     real time() const { return start_time + real(steps) * step_size; }
     real next_time() const { return start_time + real(steps + 1) * step_size; }
@@ -249,7 +250,10 @@ struct VelocityKept : ConstantMass<K> {
         for (int k = 0; k < n; ++k) this->q[k] = position[k];
         K::velocity(coefficients, momentum, u);
         Formulas<K>::minus_acceleration(coefficients, time, this->q, W);
-        if constexpr (K::events > 0) Formulas<K>::event(coefficients, time, this->q, u, this->event_values);
+        if constexpr (K::events > 0) {
+            Formulas<K>::event(coefficients, time, this->q, u, this->event_values);
+            this->events_go_on = false;
+        }
         const real sum = time + not_finite_part(position, n) + not_finite_part(momentum, n) + not_finite_part(W, n);
         return is_finite(sum) ? Status::ok : Status::not_finite;
     }

@@ -390,7 +390,8 @@ private:
             } else if (here.value == real(0) || is_zero(here, e)) {
                 if (zero < 0) zero = i;
                 // The motion starts there, or goes on there from an impact or with other inputs.
-                if (i == 0 && (step->steps == 1 || step->event_begins[e]) && !is_wall(e)) last = real(0);
+                const bool is_first = step->steps == 1 && !step->events_go_on;
+                if (i == 0 && (is_first || step->event_begins[e]) && !is_wall(e)) last = real(0);
             } else {
                 if (changes(last, here.value)) {
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;

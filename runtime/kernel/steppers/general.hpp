@@ -86,6 +86,7 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinConstraints<K> {
         if constexpr (has_fixed_point) begin_fixed_point(fixed_point, v);
         if constexpr (K::events > 0) {
             if (status == Status::ok) Formulas<K>::event(coefficients, time, q, v, this->event_values);
+            this->events_go_on = false;
         }
         return status;
     }

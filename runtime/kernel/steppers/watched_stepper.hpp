@@ -98,6 +98,11 @@ struct KnownEvents {
             begins[e] = stepper.event_begins[e];
         }
     }
+    // As those of a stepper that has just started.
+    void continue_in(S& stepper) const {
+        put(stepper);
+        stepper.events_go_on = true;
+    }
     void put(S& stepper) const {
         for (int e = 0; e < S::event_room; ++e) {
             stepper.event_values[e] = values[e];
