@@ -231,13 +231,15 @@ struct Stepper::Parts {
     // The next of the scene's times.
     double next_arrival() const {
         const double interval = kernel.parts().start.arrivals.interval;
-        double number = std::floor((time - origin) / interval) + 1;
-        while (!is_before(time, origin + number * interval)) ++number;
-        return origin + number * interval;
+        const double number = std::floor((time - origin) / interval) + 1, next = origin + number * interval;
+        return is_before(time, next) ? next : origin + (number + 1) * interval;
     }
     bool arrive(std::int64_t times) {
-        for (std::int64_t i = 0; i < times; ++i)
-            if (!arrive_at(next_arrival())) return false;
+        for (std::int64_t i = 0; i < times; ++i) {
+            const double next = next_arrival();
+            if (!is_before(time, next)) fail(LOBATTO_TIME_STANDS_STILL, {});
+            if (!arrive_at(next)) return false;
+        }
         return true;
     }
 

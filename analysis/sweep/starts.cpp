@@ -10,6 +10,7 @@
 #include "analysis/exact_start.hpp"
 #include "analysis/method_choice.hpp"
 #include "generator/mechanics/start.hpp"
+#include "runtime/run/parts.hpp"
 
 namespace lobatto {
 
@@ -199,8 +200,10 @@ double SweepStarts::value(std::int64_t trajectory, std::size_t column) const {
 
 GiNaC::numeric SweepStarts::exact(std::int64_t trajectory, std::size_t column) const {
     const Values& values = values_[column];
-    return values.axis ? values.axis->axis().exact(place(trajectory, column))
-                       : GiNaC::numeric(value(trajectory, column));
+    if (values.axis) return values.axis->axis().exact(place(trajectory, column));
+    const double number = value(trajectory, column);
+    return GiNaC::numeric(std::fabs(number) < std::numeric_limits<double>::min() ? 0
+                                                                                 : number);  // CLN has none so small
 }
 
 Scene SweepStarts::with_settings(Scene scene, std::int64_t trajectory) const {
@@ -231,6 +234,7 @@ Scene SweepStarts::with_settings(Scene scene, std::int64_t trajectory) const {
 
 void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
     start = base_;
+    bool has_values = true;
     for (std::size_t c = 0; c < columns_.size(); ++c) {
         const VariedName& name = columns_[c].of;
         if (name.is_setting()) continue;
@@ -238,6 +242,7 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
                                        : name.role == Role::position ? start.q
                                                                      : start.rate;
         numbers[name.index] = value(trajectory, c);
+        has_values = has_values && std::isfinite(numbers[name.index]);
     }
     for (const Required& required : required_) {
         const double margin = required.value(start.parameters);
@@ -245,6 +250,13 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
             start.q.front() = std::numeric_limits<double>::quiet_NaN();  // refused as what has no value
     }
     if (dependents_.empty() && !assembled_ && parts_ == 1) return;
+    if (!has_values) {  // nor has what follows from them
+        start.q.front() = std::numeric_limits<double>::quiet_NaN();
+        start.whole_parameters = as_parts(start.parameters, parts_);
+        start.whole_q = as_parts(start.q, parts_);
+        start.whole_rate = as_parts(start.rate, parts_);
+        return;
+    }
     const std::lock_guard lock(*algebra_);
     Exact to_all_digits = exact_base_;
     std::vector<GiNaC::ex> parameters;

@@ -54,6 +54,7 @@ public:
     const Scene& scene() const { return scene_; }  // with all values that are the same for all
     const SweepStarts& starts() const { return *starts_; }
     const SweepRows& rows() const { return *rows_; }
+    bool measures() const { return options_.measures; }
     const CudaDevice* device() const { return device_.get(); }  // that takes the steps; null: the processor does
 
     // One setting of the method: what its trajectories share.

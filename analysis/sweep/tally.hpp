@@ -36,7 +36,7 @@ struct Worst {
 
 // Of the trajectories of one setting of the method.
 struct SettingTally {
-    std::int64_t trajectories = 0, failed = 0, steps_done = 0;
+    std::int64_t trajectories = 0, failed = 0, unmeasured = 0, steps_done = 0;
     Worst energy_error, error;
 };
 

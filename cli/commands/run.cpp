@@ -328,7 +328,8 @@ void run(const RunOptions& options) {
         if (from) opened.resume(from->halfway, from->observers);
         if (!quiet && !options.json)
             print_row("resumed", from ? fmt::format("at t = {:.6g}, after {} steps", from->halfway.result.time,
-                                                    from->halfway.result.steps_done)
+                                                    scene.clock ? from->halfway.result.chain_steps
+                                                                : from->halfway.result.steps_done)
                                       : "nothing was left: from the start");
     }
     Files files(options, run, header, from);
@@ -344,7 +345,10 @@ void run(const RunOptions& options) {
                                      {path, has_events ? files.events_path() : ""}));
     } else if (!quiet) {
         print_table(run, request, result, observers.watch);
-        if (verdict.error) print_row("measured error", text_of(*verdict.error, scene));
+        if (verdict.error)
+            print_row("measured error", text_of(*verdict.error, scene));
+        else if (!options.unmeasured && result.stop >= 0)
+            print_row("measured error", "none: it stopped before the first comparison; give an earlier end (--until)");
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
@@ -369,7 +373,7 @@ void add_run(CommandLine& program) {
     command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
     add_step_option(command, options->overrides);
     add_until_option(command, options->overrides);
-    command.option("--every", options->overrides.every, "Keep every N-th state").shown_as("N");
+    command.option("--every", options->overrides.every, "Keep every N-th state; with a clock after N units of time").shown_as("N");
     add_set_option(command, options->overrides);
     command.flag(
         "--resume", options->resume,

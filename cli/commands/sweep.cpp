@@ -66,8 +66,9 @@ TableHead head_of(const SweepStudy& study) {
         !starts.varies(Role::points, 0) && !starts.varies(Role::stages, 0) && !starts.varies(Role::splitting, 0);
     head.add("scene", scene.title.empty() ? scene.name : scene.title);
     const Precision numbers = scene.method.numbers;
-    head.add("method", fmt::format("{}, h {}{}", one_member ? scene.method.name() : std::string("varied"),
+    head.add("method", fmt::format("{}, h {}{}{}", one_member ? scene.method.name() : std::string("varied"),
                                    starts.varies(Role::step, 0) ? "varied" : "= " + exact_text(first.request.step),
+                                   scene.clock ? ", clock = " + scene.clock->text : "",
                                    numbers == Precision::double_ ? "" : ", in " + precision_name(numbers)));
     head.add("kernel", first.source->digest);
     EnsembleStart start;

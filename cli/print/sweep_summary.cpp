@@ -116,6 +116,11 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
     if (all.error.index >= 0)
         print_row("measured error", fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}",
                                                 all.error.value, all.error.index, starts.text_of(all.error.index)));
+    if (study.measures() && all.unmeasured > 0 && !scene.run.stops.empty())
+        print_row(
+            all.error.index >= 0 ? "  not of" : "measured error",
+            fmt::format("{}{} stopped before the first comparison; keep states on the way (--every)",
+                        all.error.index >= 0 ? "" : "none: ", counted(all.unmeasured, "trajectory", "trajectories")));
     print_state(scene, tally);
 }
 

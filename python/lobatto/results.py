@@ -23,7 +23,7 @@ def _states_at(stepper, t, q, p, times):
     """Positions and velocities at times of any shape, of a trajectory with these kept states: that shape x n."""
     order = numpy.argsort(times, axis=None, kind="stable")
     back = numpy.argsort(order, kind="stable")
-    return (rows[back].reshape(times.shape + (-1,)) for rows in stepper._states_at(t, q, p, times.ravel()[order]))
+    return (rows[back].reshape(times.shape + q.shape[1:]) for rows in stepper._states_at(t, q, p, times.ravel()[order]))
 
 
 def _table(rows):

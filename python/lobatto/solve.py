@@ -86,7 +86,11 @@ def verify(scene, **settings):
 class Solution(dict):
     """As scipy's: fields are attributes."""
 
-    __getattr__ = dict.__getitem__
+    def __getattr__(self, name):
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(name) from None
 
     def __repr__(self):
         return "\n".join(f"{name:>8}: {value!r}" for name, value in self.items())
@@ -104,6 +108,12 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     if begin != 0 or end < 0:
         raise _lobatto.InputError(f"t_span: a scene begins at t = 0 and goes on to later times, not from {begin:g} to "
                                   f"{end:g}")
+    if "until" in settings:
+        raise _lobatto.InputError("until: the end stands in t_span")
+    if t_eval is not None:
+        t_eval = numpy.asarray(t_eval, dtype=float)
+        if t_eval.ndim != 1 or (t_eval < begin).any() or (t_eval > end).any() or (numpy.diff(t_eval) < 0).any():
+            raise _lobatto.InputError(f"t_eval needs ascending times from {begin:g} to {end:g}")
     stepper = Stepper(scene, until=end, **settings)
     n = len(stepper.q)
     if y0 is not None:
@@ -133,8 +143,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
         return numpy.concatenate([numpy.moveaxis(rows, -1, 0) for rows in states])
 
     if t_eval is not None:
-        t_eval = numpy.asarray(t_eval, dtype=float)
-        t_eval = t_eval[t_eval <= t[-1]]
+        t_eval = t_eval[t_eval <= t[-1]]  # a stop or a failure may have ended the motion before
         y, t_kept = sol(t_eval), t_eval
     else:
         t_kept = t

@@ -29,6 +29,7 @@ constexpr std::size_t seal_bytes = 64 + 1;
 
 Json packed(const TrajectoryResult& result) {
     return {result.steps_done,
+            result.chain_steps,
             result.iterations,
             result.iterations_most,
             result.increment_largest,
@@ -48,6 +49,7 @@ TrajectoryResult unpacked(const Json& numbers) {
     std::size_t at = 0;
     const auto take = [&](auto& field) { numbers.at(at++).get_to(field); };
     take(result.steps_done);
+    take(result.chain_steps);
     take(result.iterations);
     take(result.iterations_most);
     take(result.increment_largest);

@@ -386,6 +386,12 @@ TEST_CASE("what has no clock says so") {
           "clock.toml:10:9: a clock needs a motion that keeps its energy, but a force acts on x; remove the clock, or "
           "the "
           "force");
+    CHECK(
+        refusal("time = \"t\"\nlagrangian = \"x'^2/2 + y'^2/2 + cos(t)/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { "
+                "position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }\n[method]\nclock = "
+                "\"auto\"\n[run]\nstep = 0.1\nuntil = 1\n") ==
+        "clock.toml:7:9: a clock needs a motion that keeps its energy, but the Lagrangian depends on the time; remove "
+        "the clock, or the time from the Lagrangian");
     CHECK(refusal(kepler(0.5, "clock = \"r\"\nfamily = \"splitting\"", "step = 0.1\nuntil = 1")) ==
           "clock.toml: splitting methods have no clock; choose Lobatto or Gauss (--points 8)");
     CHECK(refusal(kepler(0.5, "clock = \"r\"\narithmetic = \"clean\"", "step = 0.1\nuntil = 1")) ==

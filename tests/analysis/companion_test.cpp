@@ -295,6 +295,18 @@ TEST_CASE("the unit of a coordinate changes nothing: each is measured by its own
     CHECK(absolute_error(plain.out) > 1e-5);
 }
 
+// The companion goes on beyond the stop, where the motion grows without end.
+TEST_CASE("what a motion would do beyond its stop is no part of its amplitude") {
+    const Place place(scene_of("x'^2/2 + x^2/2 + 0.001*x^3", "x = { position = 0.1, velocity = 0.1 }", "points = 2",
+                               0.3, 9.6, "stop = \"x = 10\"\n"));
+    const auto relative = [](const std::string& table) {
+        return std::strtod(table.c_str() + table.find("measured error") + 14, nullptr);
+    };
+    const std::string late = place.run().out, soon = place.run({"--until", "5"}).out;
+    CHECK(relative(late) > 0.01);
+    CHECK(relative(late) == doctest::Approx(relative(soon)).epsilon(0.1));
+}
+
 TEST_CASE("a well in the way that is narrower than a step is met") {
     // Its passages take 5e-4 of the time; no node of the run falls into it.
     const std::string lagrangian = "q'^2/2 - q^2/2 + 10*exp(-((q - 0.503)/0.0001)^2)";

@@ -248,6 +248,9 @@ def test_values_of_another_kind_are_refused(pendulum):
     for starts in ({}, {"q": []}):
         with pytest.raises(lobatto.InputError, match="a sweep needs a start"):
             lobatto.sweep(pendulum, starts)
+    orbit = lobatto.Lagrangian(KEPLER, x="1 - e", y=(0, "sqrt((1 + e)/(1 - e))"), e=0.5)
+    assert not lobatto.sweep(orbit, {"e": [numpy.nan, numpy.inf]}, until=1).ok.any()
+    assert lobatto.sweep(orbit, {"e": [1e-310, 0.1]}, until=1).ok.all()
     third = lobatto.Lagrangian("m*x'^2/2 - x^2/2", x=numpy.float64(1), m=fractions.Fraction(1, 3))
     assert third.parameters[0].value == 1 / 3
     ball = lobatto.Stepper(lobatto.Scene(str(SCENES / "bouncing_ball.toml")))
@@ -306,6 +309,11 @@ def test_solve_ivp_ends_where_it_should():
         assert numpy.array_equal(lobatto.solve_ivp(scene, (0, end), points=6, t_eval=[end]).y[:, 0], solution.y[:, -1])
         assert solution.sol(end / 3) == pytest.approx([numpy.cos(end / 3), -numpy.sin(end / 3)], abs=1e-9)
         assert solution.sol([[0, end]]).shape == (2, 1, 2)
+    assert lobatto.run(scene)([]).q.shape == (0, 1) and lobatto.solve_ivp(scene, (0, 1), t_eval=[]).y.shape == (2, 0)
+    assert not hasattr(solution, "t_events")
+    for wrong in (dict(t_eval=[0.5, 2]), dict(t_eval=[0.5, 0.2]), dict(until=3)):
+        with pytest.raises(lobatto.InputError, match="t_eval needs ascending times from 0 to 1|the end stands in t_span"):
+            lobatto.solve_ivp(scene, (0, 1), **wrong)
     solution = lobatto.solve_ivp(comet(0.5), (0, 2.2))
     assert numpy.allclose(solution.t, [0, 0.5, 1, 1.5, 2, 2.2], atol=1e-14)
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "runtime/run/parts.hpp"
 
@@ -97,7 +98,7 @@ void Companion::observe(const Records& records) {
     const std::size_t count = 2 * groups_.size();
     for (std::int64_t i = 0; i < records.count; ++i) {
         const double* const row = records.rows + i * records.columns + 1;
-        widen_to(least_, most_, row, count);
+        widen_to(range_.least, range_.most, row, count);
         if (records.is_stop) continue;
         // With a clock the states at its steps stand between the arrivals, which are told by their times.
         const bool is_arrival = request_.arrivals.interval == 0 || row[-1] == time_after(request_, seen_);
@@ -140,6 +141,7 @@ struct Companion::Place {
     std::vector<double> q, p;
     Arrivals arrivals;
     lobatto_status status = LOBATTO_OK;
+    Range range = {};  // since the last comparison
 
     struct State {
         std::vector<double> time, q, p;
@@ -241,8 +243,7 @@ void Companion::take(Place& place, const Segment& part) {
             done += place.advance(count, request_.tolerance);
         }
         const std::vector<double> row = rounded(joined(place.q, place.p), parts_);
-        const std::lock_guard lock(mutex_);
-        widen_to(companion_least_, companion_most_, row.data(), row.size());
+        widen_to(place.range.least, place.range.most, row.data(), row.size());
     }
 }
 
@@ -285,6 +286,7 @@ void Companion::compute() {
             break;
         }
         companion_.push_back({part.begin + part.steps, joined(place.q, place.p)});
+        companion_ranges_.push_back(std::exchange(place.range, {}));
     }
     finished_ = true;
 }
@@ -293,9 +295,15 @@ std::vector<double> Companion::save() const {
     const std::lock_guard lock(mutex_);
     std::vector<double> all{kernel_->epsilon, static_cast<double>(seen_), static_cast<double>(run_.size()),
                             static_cast<double>(companion_.size())};
-    for (const auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
-        all.push_back(static_cast<double>(range->size()));
-        all.insert(all.end(), range->begin(), range->end());
+    const auto put = [&](const std::vector<double>& numbers) {
+        all.push_back(static_cast<double>(numbers.size()));
+        all.insert(all.end(), numbers.begin(), numbers.end());
+    };
+    put(range_.least);
+    put(range_.most);
+    for (const Range& range : companion_ranges_) {
+        put(range.least);
+        put(range.most);
     }
     for (const auto* points : {&run_, &companion_})
         for (const Point& point : *points) {
@@ -316,10 +324,16 @@ bool Companion::restore(const std::vector<double>& saved) {
     const std::vector<double> counts = take(4);
     if (counts.empty() || counts[0] != kernel_->epsilon) return false;
     seen_ = std::llround(counts[1]);
-    for (auto* range : {&least_, &most_, &companion_least_, &companion_most_}) {
+    const auto get = [&] {
         const std::vector<double> size = take(1);
-        if (!size.empty()) *range = take(std::llround(size[0]));
-    }
+        return size.empty() ? size : take(std::llround(size[0]));
+    };
+    const auto get_range = [&] {
+        const std::vector<double> least = get();
+        return Range{least, get()};
+    };
+    range_ = get_range();
+    for (std::int64_t i = 0; i < std::llround(counts[3]); ++i) companion_ranges_.push_back(get_range());
     for (const auto& [points, count] : {std::pair{&run_, counts[2]}, std::pair{&companion_, counts[3]}})
         for (std::int64_t i = 0; i < std::llround(count); ++i) {
             const std::vector<double> point = take(1 + 2 * std::ssize(groups_) * static_cast<std::ptrdiff_t>(parts_));
@@ -352,12 +366,13 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     return compare(result);
 }
 
-std::vector<double> Companion::amplitudes() const {
+std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     const std::size_t n = groups_.size();
-    std::vector<double> least = least_, most = most_;
-    for (const auto* row : {&companion_least_, &companion_most_})
-        if (!row->empty()) widen_to(least, most, row->data(), row->size());
-    std::vector<double> shared = amplitudes_of(least, most, groups_);
+    Range all = range_;
+    for (std::size_t j = 0; j < comparisons; ++j)
+        for (const std::vector<double>& row : {companion_ranges_[j].least, companion_ranges_[j].most})
+            if (!row.empty()) widen_to(all.least, all.most, row.data(), row.size());
+    std::vector<double> shared = amplitudes_of(all.least, all.most, groups_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
     NumberStepper stepper(kernel_);
     std::vector<double> T;
@@ -376,7 +391,8 @@ std::vector<double> Companion::amplitudes() const {
 
 MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const std::size_t n = groups_.size();
-    const std::vector<double> amplitude = amplitudes();
+    const std::size_t count = std::min(run_.size(), companion_.size());
+    const std::vector<double> amplitude = amplitudes(count);
     MeasuredError error;
     error.companion_stopped = stopped_;
     std::vector<std::pair<double, double>> course;  // time, largest error until then
@@ -384,7 +400,6 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         double end = 0, absolute = 0;
         std::size_t coordinate = 0;
     } worst;
-    const std::size_t count = std::min(run_.size(), companion_.size());
     for (std::size_t j = 0; j < count; ++j) {
         const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
         error.until = time_after(request_, run_[j].steps);

@@ -68,6 +68,9 @@ private:
         std::int64_t steps;       // of the run
         std::vector<double> row;  // q, p, as parts
     };
+    struct Range {
+        std::vector<double> least, most;  // 2n
+    };
     struct Segment {
         std::int64_t begin = 0, steps = 0;  // of the run
         std::int64_t taken = 0;             // of the companion
@@ -85,7 +88,8 @@ private:
     bool has_caught_up() const;
     bool can_halve(double from, double step) const;
     bool is_near_pulse(double from, double step) const;
-    std::vector<double> amplitudes() const;  // 2n; 0: of what does not move, or by rounding alone
+    // 2n, of the motion until so many comparisons; 0: of what does not move, or by rounding alone.
+    std::vector<double> amplitudes(std::size_t comparisons) const;
     MeasuredError compare(const TrajectoryResult& result) const;
 
     Kernel kernel_;
@@ -100,12 +104,12 @@ private:
     bool is_driven_ = false;     // explicit time
     std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;
-    std::vector<Point> run_;            // of the run, at comparisons
-    std::vector<double> least_, most_;  // of the run's kept states
-    mutable std::mutex mutex_;          // guards what follows
-    std::vector<Point> companion_;      // of the companion
-    std::vector<double> companion_least_, companion_most_;
-    std::optional<double> stopped_;  // where the companion stopped with another status than ok
+    std::vector<Point> run_;               // of the run, at comparisons
+    Range range_;                          // of the run's kept states
+    mutable std::mutex mutex_;             // guards what follows
+    std::vector<Point> companion_;         // of the companion
+    std::vector<Range> companion_ranges_;  // on the way to each: the run may stop before the companion does
+    std::optional<double> stopped_;        // where the companion stopped with another status than ok
     std::atomic<bool> cancelled_{false}, finished_{false};
     std::thread thread_;
 };

@@ -2,6 +2,7 @@
 #include "analysis/accuracy/companion/ensemble_companion.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -17,6 +18,7 @@ namespace {
 
 // Of companions that are computed together; a device has many trajectories at a time.
 constexpr std::int64_t numbers_at_once = 1 << 20, numbers_on_device = 1 << 24;
+constexpr double seconds_at_once = 1;      // a sweep that is killed has no rows of those that were computed last
 constexpr std::int64_t between_looks = 8;  // steps of a companion, at least
 
 const double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -59,13 +61,20 @@ void EnsembleCompanion::compute(std::int64_t first) {
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
                        rows = (request_.steps / every + 1) * looks_of(every),
                        numbers = request_.device ? numbers_on_device : numbers_at_once,
-                       count = std::min(std::max<std::int64_t>(numbers / ((4 + 2 * rows) * n * kernel_->parts), 64),
-                                        request_.first + request_.count - first);
+                       room = numbers / ((8 + 2 * rows) * n * kernel_->parts),
+                       group = 64 * std::max(request_.threads, 1),
+                       fast = request_.device        ? room
+                              : seconds_of_one_ == 0 ? group
+                                                     : std::llround(seconds_at_once / seconds_of_one_),
+                       count = std::min(std::max(std::min(room, fast), group), request_.first + request_.count - first);
+    const auto begun = std::chrono::steady_clock::now();
     first_ = first;
     known_.assign(static_cast<std::size_t>(count), {});
     const std::int64_t whole = request_.steps / every * every;
     take(0, whole, every);
     if (whole < request_.steps) take(whole, request_.steps - whole, request_.steps - whole);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
+    seconds_of_one_ = std::fmax(took.count(), 1e-9) / static_cast<double>(count);
 }
 
 // The positions by four units in the last place.
@@ -110,12 +119,16 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
     companion.sink = [&](const EnsembleTrajectory& trajectory) {
         Known& known = known_[static_cast<std::size_t>(trajectory.index)];
         if (begin == 0 || known.status == LOBATTO_OK) known.status = trajectory.status;
+        std::vector<double> least, most;
         for (std::int64_t i = 0; i < trajectory.kept.count; ++i) {
-            const double* const row = trajectory.kept.rows + i * trajectory.kept.columns + 1;
-            widen_to(known.least, known.most, row, 2 * n);
+            widen_to(least, most, trajectory.kept.rows + i * trajectory.kept.columns + 1, 2 * n);
             if (i == 0 || i % looks != 0) continue;
             const double* const whole = whole_row(trajectory.kept, i);
             known.rows.insert(known.rows.end(), whole, whole + 2 * n * parts_);
+            for (std::vector<double>* const range : {&least, &most}) {
+                known.ranges.insert(known.ranges.end(), range->begin(), range->end());
+                range->clear();
+            }
         }
     };
     if (integrate(kernel_, companion).interrupted) known_.clear();
@@ -183,6 +196,7 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     result.steps_done = trajectory.steps_done;
     result.time = time_after(request_, trajectory.steps_done);
     const std::optional<MeasuredError> error = companion.finish(result);
+    if (!error && trajectory.stop >= 0) return {unknown, false};  // before anything could be compared
     if (!error || error->companion_stopped) return {unknown, true};
     return {error->end, error->is_lost()};
 }
@@ -206,10 +220,13 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     // Of a trajectory that was stopped: the start, and where it was stopped, between two steps.
     const std::int64_t comparisons = is_stopped ? std::max<std::int64_t>(kept.count - 2, 0) : compared,
                        skipped = is_stopped ? 1 : kept.count - comparisons;
+    if (is_stopped && comparisons == 0) return {unknown, false};
     if (known.status != LOBATTO_OK && !(is_stopped && comparisons < compared)) return {unknown, true};
-    for (std::int64_t i = 0; i < kept.count; ++i)
-        widen_to(known.least, known.most, kept.rows + i * kept.columns + 1, 2 * n);
-    const std::vector<double> amplitude = amplitudes_of(known.least, known.most, groups_);
+    std::vector<double> least, most;
+    for (std::int64_t i = 0; i < kept.count; ++i) widen_to(least, most, kept.rows + i * kept.columns + 1, 2 * n);
+    for (std::int64_t i = 0; i < 2 * comparisons; ++i)
+        widen_to(least, most, known.ranges.data() + i * static_cast<std::int64_t>(2 * n), 2 * n);
+    const std::vector<double> amplitude = amplitudes_of(least, most, groups_);
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio

@@ -33,8 +33,8 @@ public:
 private:
     struct Known {
         lobatto_status status = LOBATTO_NOT_FINITE;
-        std::vector<double> least, most;  // 2n
-        std::vector<double> rows;         // 2n x parts each: where the trajectory keeps its states, but for the start
+        std::vector<double> rows;    // 2n x parts each: where the trajectory keeps its states, but for the start
+        std::vector<double> ranges;  // 2n, 2n: the least and the most on the way to each
     };
     void compute(std::int64_t first);
     // `steps` of the sweep's own from `begin` on; the companions are at `begin` already.
@@ -56,7 +56,8 @@ private:
     NarrowTerms narrow_;
     LoadedStepper<double> stepper_;
     std::int64_t first_ = 0;
-    std::vector<Known> known_;  // from trajectory first_ on
+    double seconds_of_one_ = 0;  // that a companion took, of those computed last
+    std::vector<Known> known_;   // from trajectory first_ on
 };
 
 }  // namespace lobatto

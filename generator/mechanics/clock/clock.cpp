@@ -21,10 +21,28 @@ using Symbols = std::vector<GiNaC::symbol>;
 // Terms longer than this are not expanded to find their degree.
 constexpr std::size_t longest_term = 2000;
 
+void require_conservation(const Scene& scene) {
+    for (const Coordinate& coordinate : scene.coordinates)
+        if (!coordinate.force.is_zero())
+            fail_at_clock(
+                scene, fmt::format("a clock needs a motion that keeps its energy, but a force acts on {}; remove the "
+                                   "clock, or the force",
+                                   coordinate.written));
+    if (scene.lagrangian.has(scene.time))
+        fail_at_clock(
+            scene,
+            "a clock needs a motion that keeps its energy, but the Lagrangian depends on the time; remove the "
+            "clock, or the time from the Lagrangian");
+}
+
+ex rate_of(const Scene& scene) {
+    require_conservation(scene);
+    return scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate;
+}
+
 class Transformation {
 public:
-    explicit Transformation(const Scene& scene)
-        : scene_(scene), g_(scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate) {
+    explicit Transformation(const Scene& scene) : scene_(scene), g_(rate_of(scene)) {
         for (const Coordinate& coordinate : scene.coordinates) {
             q_.push_back(coordinate.position);
             v_.push_back(coordinate.velocity);
@@ -36,7 +54,6 @@ public:
     }
 
     Scene transform() {
-        require_conservation();
         require_positive_rate();
         Scene result = scene_;
         Clock& clock = *result.clock;
@@ -69,26 +86,12 @@ public:
     }
 
 private:
-    [[noreturn]] void refuse(const std::string& why) const { fail_at_clock(scene_, why); }
-
-    void require_conservation() const {
-        for (const Coordinate& coordinate : scene_.coordinates)
-            if (!coordinate.force.is_zero())
-                refuse(
-                    fmt::format("a clock needs a motion that keeps its energy, but a force acts on {}; remove the "
-                                "clock, or the force",
-                                coordinate.written));
-        if (scene_.lagrangian.has(scene_.time))
-            refuse(
-                "a clock needs a motion that keeps its energy, but the Lagrangian depends on the time; remove the "
-                "clock, or the time from the Lagrangian");
-    }
-
     void require_positive_rate() const {
         const GiNaC::numeric rate = scene_.evaluate(at_start(g_), "the clock at the start");
         if (!rate.is_positive())
-            refuse(fmt::format("the clock is {:.6g} at the start; it must be positive wherever the motion goes",
-                               rate.to_double()));
+            fail_at_clock(scene_,
+                          fmt::format("the clock is {:.6g} at the start; it must be positive wherever the motion goes",
+                                      rate.to_double()));
     }
 
     ex in_clock_time(const ex& expression) const { return expression.subs(slower_, GiNaC::subs_options::no_pattern); }

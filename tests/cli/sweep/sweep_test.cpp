@@ -576,6 +576,36 @@ TEST_CASE("a machine that refuses to write is an error of exit code 4; a reader 
     CHECK(head.err == "lobatto: cannot write the table to /dev/stdout: Broken pipe. Its reader has gone\n");
 }
 
+TEST_CASE(
+    "the error of a stopped trajectory is relative to the motion until its stop, and known where it was compared") {
+    const test::SweepFolder place;
+    test::write_text(place.file("away.toml"),
+                     "lagrangian = \"x'^2/2 + x^2/2 + 0.001*x^3\"\n[coordinates]\nx = { position = 0.1, velocity = 0.1 "
+                     "}\n[method]\npoints = 2\n[run]\nstep = 0.3\nuntil = 9.6\nstop = \"x = 10\"\n");
+    const auto errors = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> words{"sweep", place.file("away.toml"), "--vary", "x=0.1,0.09",
+                                       "-o",    place.file("away.csv")};
+        words.insert(words.end(), more.begin(), more.end());
+        const test::Finished done = place.lobatto(words);
+        CHECK(done.exit_code == 0);
+        std::vector<double> found;
+        for (const double error : test::column_of(read_trajectory(place.file("away.csv")), "error"))
+            if (!std::isnan(error)) found.push_back(error);
+        const bool says_none = contains(done.out, "none: 2 trajectories stopped before the first comparison");
+        CHECK(says_none == found.empty());
+        return found;
+    };
+    const std::vector<double> late = errors({"--every", "1"}), soon = errors({"--every", "1", "--until", "5"});
+    REQUIRE(late.size() == 2);
+    REQUIRE(soon.size() == 2);
+    for (std::size_t i = 0; i < 2; ++i) {
+        CHECK(late[i] > 0.01);
+        CHECK(late[i] == doctest::Approx(soon[i]).epsilon(0.1));
+    }
+    // Stopped before a state is looked at: not measured, and not 0.
+    CHECK(errors({"--until", "2000"}).empty());
+}
+
 TEST_CASE("a sweep measures the error of every trajectory; what is not resolved is no success and no statistic") {
     const Place place;
     const std::string scene = place.file("oscillator.toml");

@@ -45,7 +45,7 @@ const std::string rolling =
 // alone.
 const Clocked all[] = {
     {kepler, "points = 9\nclock = \"auto\"", {1}, {0.2, 0}, {0, 3}, 0.1, 30, 1500},
-    {kepler, "family = \"gauss\"\nstages = 8\nclock = \"auto\"", {1}, {0.2, 0}, {0, 3}, -0.1, 30, 2500},
+    {kepler, "family = \"gauss\"\nstages = 8\nclock = \"auto\"", {1}, {0.2, 0}, {0, 3}, -0.09, 30, 2500},
     {kepler, "points = 4\nclock = \"sqrt(x^2 + y^2)\"", {1}, {0.2, 0}, {0, 3}, 0.05, 10, 1500},
     {three_bodies, "points = 12\nclock = \"auto\"", {3, 4, 5}, {1, -2, 1, 3, -1, -1}, {0, 0, 0, 0, 0, 0}, 0.2, 5, 6e4},
     {double_pendulum, "points = 5\nclock = \"2 + cos(a - b)\"", {1.5}, {1, 1.4}, {0, 0}, 0.1, 10, 50},
