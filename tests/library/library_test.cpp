@@ -111,7 +111,8 @@ TEST_CASE("advance_to ends at its time exactly, also between steps, and goes on 
 
 TEST_CASE("advance_to is at its time to the last bit, however many steps lead there") {
     const lob::Scene scene = lob::Scene::from_text(
-        "lagrangian = \"x'^2/2 - 1e-3*x^4\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[run]\nstep = 0.015\nuntil = 1\n");
+        "lagrangian = \"x'^2/2 - 1e-3*x^4\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[run]\nstep = "
+        "0.015\nuntil = 1\n");
     lob::Stepper stepper(lob::compile(scene));
     stepper.advance_to(0.33);  // 22 steps, whose sum is another number
     CHECK(stepper.t() == 0.33);

@@ -37,11 +37,12 @@ void require_start_before_walls(const Scene& scene) {
 void refuse_impacts(const Scene& scene, const std::string& what) {
     if (!scene.impacts.empty())
         scene.source.fail(scene.impacts.front().when.at,
-                          what + " knows no impacts; run, sweep, emit, derive, check and verify do");
+                          what + " knows no impacts; run, sweep, tune, tradeoff, emit, derive, check and verify do");
     if (!scene.switches.empty() || !scene.tables.empty())
-        scene.source.fail(
-            scene.switches.empty() ? scene.tables.front().at : scene.switches.front().at,
-            what + " knows smooth formulas only; run, sweep, emit, derive, check and verify know such as this");
+        scene.source.fail(scene.switches.empty() ? scene.tables.front().at : scene.switches.front().at,
+                          what +
+                              " knows smooth formulas only; run, sweep, tune, tradeoff, emit, derive, check and verify "
+                              "know such as this");
 }
 
 void refuse_jumps(const Scene& scene, const std::string& what) {
