@@ -175,20 +175,24 @@ NumberStepper::Parts stop_at(const NumberStepper::Parts& events, std::size_t par
     return row;
 }
 
-// With a clock: the states at the times asked for that the step of the chain has passed in which the motion stopped.
-void arrive_before_stop(NumberStepper& stepper, const TrajectoryRequest& request, std::int64_t rows, Keeper& keeper,
-                        TrajectoryResult& result) {
-    NumberStepper::Parts records, events;
-    const double interval = request.arrivals.interval;
+// At the stop that is the last of `events`. With a clock, the step of the chain that leads past it has passed times at
+// which states are asked for, too.
+void end_at_stop(NumberStepper& stepper, const TrajectoryRequest& request, std::int64_t rows,
+                 const NumberStepper::Parts& events, Keeper& keeper, TrajectoryResult& result) {
+    result.status = LOBATTO_OK;
+    const NumberStepper::Parts stop = stop_at(events, stepper.parts(), 1 + 2 * request.q.size(), result);
+    NumberStepper::Parts records, none;
+    const double interval = request.arrivals.interval;  // 0: no clock
     const auto next = [&] { return request.time + static_cast<double>(result.steps_done + 1) * interval; };
     while (result.steps_done < request.steps && (result.time - next()) * interval > 0) {
         lobatto_advance call = call_for(request, rows, 0);
         call.steps = 1;
-        result.status = stepper.advance(call, records, events);
-        if (result.status != LOBATTO_OK) return;
+        result.status = stepper.advance(call, records, none);
+        if (result.status != LOBATTO_OK) break;
         add(result, call);
         keeper.keep(records, call.records_written, request.dense);
     }
+    keeper.keep(stop, 1, 0, true);
 }
 
 constexpr int most_halvings = 14;    // of a step that could not be taken
@@ -309,10 +313,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         }
         keeper.keep(records, call.records_written, request.dense);
         if (result.status == LOBATTO_STOPPED) {
-            result.status = LOBATTO_OK;
-            const NumberStepper::Parts stop = stop_at(events, parts, columns, result);
-            if (kernel->clocked != 0) arrive_before_stop(stepper, request, rows, keeper, result);
-            keeper.keep(stop, 1, 0, true);
+            end_at_stop(stepper, request, rows, events, keeper, result);
             return result;
         }
         pace.took(seconds, call.steps_done);
