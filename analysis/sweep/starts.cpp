@@ -201,9 +201,9 @@ double SweepStarts::value(std::int64_t trajectory, std::size_t column) const {
 GiNaC::numeric SweepStarts::exact(std::int64_t trajectory, std::size_t column) const {
     const Values& values = values_[column];
     if (values.axis) return values.axis->axis().exact(place(trajectory, column));
+    // CLN has no number below the smallest normal double.
     const double number = value(trajectory, column);
-    return GiNaC::numeric(std::fabs(number) < std::numeric_limits<double>::min() ? 0
-                                                                                 : number);  // CLN has none so small
+    return std::fabs(number) < std::numeric_limits<double>::min() ? GiNaC::numeric(0) : GiNaC::numeric(number);
 }
 
 Scene SweepStarts::with_settings(Scene scene, std::int64_t trajectory) const {

@@ -98,7 +98,7 @@ struct KnownEvents {
             begins[e] = stepper.event_begins[e];
         }
     }
-    // As those of a stepper that has just started.
+    // In a stepper that has just started: it goes on with the motion.
     void continue_in(S& stepper) const {
         put(stepper);
         stepper.events_go_on = true;
