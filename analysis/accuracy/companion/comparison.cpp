@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What the difference between a run and its companion says of the error.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/companion/companion.hpp"
+#include "runtime/run/parts.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr double noise = 1e-10;     // of what the others move it by in a step: what cancelled forces leave
+constexpr int most_coupled = 16;    // coordinates of which that is looked for
+constexpr double exponential = 30;  // times more than errors that grow with the square of the time
+
+// `row`: q, p.
+void lose(MeasuredError& error, double time, const std::vector<double>& row) {
+    const auto middle = row.begin() + std::ssize(row) / 2;
+    error.lost_after = time;
+    error.lost_q.assign(row.begin(), middle);
+    error.lost_p.assign(middle, row.end());
+}
+
+}  // namespace
+
+std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
+    const std::size_t n = groups_.size();
+    Range all = range_;
+    for (std::size_t j = 0; j < comparisons; ++j)
+        for (const std::vector<double>& row : {companion_ranges_[j].least, companion_ranges_[j].most})
+            if (!row.empty()) widen_to(all.least, all.most, row.data(), row.size());
+    std::vector<double> shared = amplitudes_of(all.least, all.most, groups_);
+    // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
+    NumberStepper stepper(kernel_);
+    std::vector<double> T;
+    if (kernel_->has_tangent != 0 && n <= most_coupled &&
+        stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
+        stepper.tangent(as_parts({request_.time}, parts_), request_.whole_q, request_.whole_p, T) == LOBATTO_OK) {
+        T = rounded(T, parts_);
+        const std::vector<double> found = shared;
+        for (std::size_t i = 0; i < 2 * n; ++i)
+            for (std::size_t j = 0; j < 2 * n; ++j)
+                if (i % n != j % n && found[i] > 0)
+                    shared[i] = std::fmax(shared[i], noise * std::fabs(T[i * 2 * n + j]) * found[j]);
+    }
+    return shared;
+}
+
+MeasuredError Companion::compare(const TrajectoryResult& result) const {
+    const std::size_t n = groups_.size();
+    const std::size_t count = std::min(run_.size(), companion_.size());
+    const std::vector<double> amplitude = amplitudes(count);
+    MeasuredError error;
+    error.companion_stopped = stopped_;
+    std::vector<std::pair<double, double>> course;  // time, largest error until then
+    struct {
+        double end = 0, absolute = 0;
+        std::size_t coordinate = 0;
+    } worst;
+    for (std::size_t j = 0; j < count; ++j) {
+        const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
+        error.until = time_after(request_, run_[j].steps);
+        error.end = 0;
+        double apart = 0;
+        for (std::size_t i = 0; i < 2 * n; ++i) {
+            if (!(amplitude[i] > 0)) continue;
+            const double distance =
+                std::fabs(difference(run_[j].row.data() + i * parts_, companion_[j].row.data() + i * parts_, parts_));
+            apart = std::fmax(apart, distance / amplitude[i]);
+            if (i >= n || !(of_run * distance / amplitude[i] > error.end)) continue;
+            error.end = of_run * distance / amplitude[i];
+            error.coordinate = i;
+            error.absolute = of_run * distance;
+        }
+        if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
+        error.largest = std::fmax(error.largest, error.end);
+        course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
+        if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, rounded(run_[j].row, parts_));
+    }
+    if (!error.lost_after && stopped_ && count > 0) {
+        lose(error, *stopped_, rounded(run_[count - 1].row, parts_));
+    } else if (!error.lost_after && stopped_) {
+        error.lost_after = stopped_;
+        error.lost_q = request_.q;
+        error.lost_p = request_.p;
+    }
+    error.complete = count == run_.size();
+    // Exponential growth: from the first error that is there to the first that is as large as it can be.
+    const auto first = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > 0; });
+    auto last = std::find_if(first, course.end(), [](const auto& c) { return c.second > out_of_step / 2; });
+    if (last == course.end() && first != course.end()) last = std::prev(course.end());
+    if (first != course.end() && last > first) {
+        const double growth = last->second / first->second, times = last->first / first->first;
+        // Half of the way in half of the time: a jump is no growth.
+        const auto middle = first + (last - first) / 2;
+        const double part = std::log(middle->second / first->second) / std::log(growth);
+        if (growth > exponential * times * times && part > 0.2 && part < 0.8)
+            error.doubling = (last->first - first->first) / std::log2(growth);
+    }
+    // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
+    const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
+    if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
+        const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
+        lose(error, time_after(request_, point.steps), rounded(point.row, parts_));
+    }
+    // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
+    // difference is what is known.
+    if (error.largest > by_chance) {
+        error.end = worst.end;
+        error.absolute = worst.absolute;
+        error.coordinate = worst.coordinate;
+    }
+    error.at_end = error.end;
+    if (!error.complete && !course.empty()) {
+        const double whole = std::fabs(result.time - request_.time), part = course.back().first;
+        error.at_end *= error.doubling ? std::exp2((whole - part) / *error.doubling) : whole * whole / (part * part);
+    }
+    return error;
+}
+
+}  // namespace lobatto
