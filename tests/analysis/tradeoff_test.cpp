@@ -310,10 +310,13 @@ TEST_CASE("tune proposes no step that is unstable for an oscillation at rest, an
                          "lagrangian = \"(x'^2 + y'^2)/2 - x^2/2 - x^4/4 - 100^2*y^2/2\"\n[coordinates]\nx = { "
                          "velocity = 0, position = " +
                              start + " }\ny = { position = 0, velocity = 0 }\n[run]\nstep = 0.01\nuntil = 10\n");
-        return place.run({"tune", file, "--error", "1e-6", "--budget", "4s"});
+        return test::with_enough_time([&](const std::string& budget) {
+            return place.run({"tune", file, "--error", "1e-6", "--budget", budget});
+        });
     };
     const test::Finished moving = tuned("1");
     CAPTURE(moving.out);
+    CAPTURE(moving.err);
     REQUIRE(moving.exit_code == 0);
     CHECK(contains(moving.out, "h omega"));
     CHECK_FALSE(contains(moving.out, "only for moments"));

@@ -16,11 +16,8 @@ std::string scene(const std::string& name) {
 }
 
 // The answer of a command, by its schema.
-nlohmann::json answer_of(const std::string& schema, std::vector<std::string> command, int exit_code = 0) {
-    command.insert(command.begin(), LOBATTO_PROGRAM);
-    command.emplace_back("--json");
-    const test::Finished finished = test::run(command);
-    CAPTURE(command[1]);
+nlohmann::json answer_in(const test::Finished& finished, const std::string& schema, int exit_code = 0) {
+    CAPTURE(schema);
     CAPTURE(finished.err);
     CHECK(finished.exit_code == exit_code);
     const nlohmann::json answer = nlohmann::json::parse(finished.out);
@@ -29,6 +26,16 @@ nlohmann::json answer_of(const std::string& schema, std::vector<std::string> com
     if (schema != "derive" && schema.find("stability") == std::string::npos) CHECK(answer["command"] == schema);
     CHECK(answer["format"] == 1);
     return answer;
+}
+
+test::Finished asked(std::vector<std::string> command) {
+    command.insert(command.begin(), LOBATTO_PROGRAM);
+    command.emplace_back("--json");
+    return test::run(command);
+}
+
+nlohmann::json answer_of(const std::string& schema, const std::vector<std::string>& command, int exit_code = 0) {
+    return answer_in(asked(command), schema, exit_code);
 }
 
 }  // namespace
@@ -97,14 +104,20 @@ TEST_SUITE("slow") {
         const auto proof = answer_of("verify", {"verify", scene("pendulum")});
         CHECK(proof["holds"] == true);
         CHECK(proof["claims"].size() > 10);
-        const auto choice =
-            answer_of("tune", {"tune", scene("pendulum"), "--error", "1e-3", "--until", "5", "--budget", "20s"});
+        const auto choice = answer_in(
+            test::with_enough_time([&](const std::string& budget) {
+                return asked({"tune", scene("pendulum"), "--error", "1e-3", "--until", "5", "--budget", budget});
+            }),
+            "tune");
         CHECK(choice["choice"]["error"].get<double>() <= 1e-3);
         const auto noise = answer_of("roundoff", {"roundoff", scene("kepler"), "--steps", "1000", "--trajectories", "2",
                                                   "--no-picture", "-o", folder / "roundoff"});
         CHECK(noise["plain"]["rows"].size() == noise["clean"]["rows"].size());
-        const auto trade = answer_of(
-            "tradeoff", {"tradeoff", scene("pendulum"), "--until", "5", "--budget", "3s", "-o", folder / "tradeoff"});
+        const auto trade = answer_in(test::with_enough_time([&](const std::string& budget) {
+                                         return asked({"tradeoff", scene("pendulum"), "--until", "5", "--budget",
+                                                       budget, "-o", folder / "tradeoff"});
+                                     }),
+                                     "tradeoff");
         CHECK(trade == nlohmann::json::parse(test::read_file(folder / "tradeoff/tradeoff.json")));
         const auto emitted = answer_of("emit", {"emit", scene("pendulum"), "-o", folder / "kernels"});
         CHECK(emitted["files"].size() == 2);

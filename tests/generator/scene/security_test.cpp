@@ -140,7 +140,9 @@ TEST_CASE("the name of a chart is no command and no option of the program that d
 TEST_CASE("the title in the pictures of tradeoff is no command") {
     Pieces pieces;
     pieces.title = "\"`touch pwned` it's $(touch pwned)\"";
-    const Finished done = attack("tradeoff", pieces, {"--budget", "2s", "-o", "drawings"});
+    const Finished done = with_enough_time([&](const std::string& budget) {
+        return attack("tradeoff", pieces, {"--budget", budget, "-o", "drawings"});
+    });
     CHECK_MESSAGE(done.exit_code == 0, done.err);
 }
 
