@@ -110,6 +110,7 @@ const std::vector<Room> rooms = {
     {"runtime/kernel/iteration", {"runtime/kernel/base"}},
     {"runtime/kernel/steppers", {"runtime/kernel/base", "runtime/kernel/iteration"}},
     {"runtime/kernel", {"runtime/kernel/base", "runtime/kernel/iteration", "runtime/kernel/steppers"}},
+    {"runtime/kernel/export", {"runtime/kernel"}},
     {"runtime/files", {"runtime"}},
     {"runtime/build", {"runtime", "runtime/kernel", "runtime/kernel/base"}},
     {"runtime/run", {"runtime", "runtime/build", "runtime/files", "runtime/kernel"}},

@@ -60,7 +60,9 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     append_part(translation.text, std::string(kernel_abi_h_text));
     append_part(translation.text, support_of(source, together > 0, refilled));
     append_part(translation.text, source.header);
-    append_part(translation.text, std::string(kernel_export_hpp_text));
+    for (const std::string_view text :
+         {kernel_export_lanes_hpp_text, kernel_export_advance_hpp_text, kernel_export_export_hpp_text})
+        append_part(translation.text, std::string(text));
     translation.text += "\nLOBATTO_EXPORT_KERNEL(lobatto::kernels::" + source.name + ")\n";
     return translation;
 }

@@ -14,11 +14,13 @@ struct SupportPart {
 
 // The parts of runtime/kernel/kernel.hpp; each stands after those that it includes.
 extern const std::vector<SupportPart> support_parts;
-extern const std::string_view kernel_abi_h_text;             // runtime/kernel/abi.h
-extern const std::string_view kernel_export_hpp_text;        // runtime/kernel/export.hpp
-extern const std::string_view kernel_kept_hpp_text;          // runtime/kernel/kept.hpp
-extern const std::string_view kernel_device_lanes_hpp_text;  // runtime/kernel/device_lanes.hpp
-extern const std::string_view kernel_device_host_hpp_text;   // runtime/kernel/device_host.hpp
+extern const std::string_view kernel_abi_h_text;               // runtime/kernel/abi.h
+extern const std::string_view kernel_export_lanes_hpp_text;    // runtime/kernel/export/lanes.hpp
+extern const std::string_view kernel_export_advance_hpp_text;  // runtime/kernel/export/advance.hpp
+extern const std::string_view kernel_export_export_hpp_text;   // runtime/kernel/export/export.hpp
+extern const std::string_view kernel_kept_hpp_text;            // runtime/kernel/kept.hpp
+extern const std::string_view kernel_device_lanes_hpp_text;    // runtime/kernel/device_lanes.hpp
+extern const std::string_view kernel_device_host_hpp_text;     // runtime/kernel/device_host.hpp
 
 // The named parts and those that they include, as one file. Throws std::logic_error for a name that is none.
 std::string support_text(const std::vector<std::string>& names);

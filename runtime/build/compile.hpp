@@ -11,7 +11,7 @@ namespace lobatto {
 // What is compiled: one self-contained translation unit.
 struct Translation {
     std::string name;          // C identifier, for file names
-    std::string text;          // the whole C++ source: abi.h, kernel.hpp, the emitted header, export.hpp,
+    std::string text;          // the whole C++ source: abi.h, kernel.hpp, the emitted header, export/,
                                // LOBATTO_EXPORT_KERNEL
     bool quadruple = false;    // links libquadmath (g++ only)
     int many_digits = 0;       // links MPFR, for numbers of so many digits; 0: does not

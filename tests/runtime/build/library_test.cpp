@@ -23,7 +23,7 @@ struct KernelBuilder {
     std::string build(const std::string& name, const std::string& text) const { return compile({name, text}).object; }
     std::string build_pendulum() const {
         return build("pendulum",
-                     "#include \"tests/handwritten/pendulum.hpp\"\n#include \"runtime/kernel/export.hpp\"\n"
+                     "#include \"tests/handwritten/pendulum.hpp\"\n#include \"runtime/kernel/export/export.hpp\"\n"
                      "LOBATTO_EXPORT_KERNEL(lobatto::HandwrittenPendulum)\n");
     }
     std::string build_double_pendulum(const std::string& number) const {
@@ -31,7 +31,7 @@ struct KernelBuilder {
         return compile({"double_pendulum",
                         std::string(quadruple ? "#define LOBATTO_USE_FLOAT128\n" : "") +
                             "#include \"tests/handwritten/double_pendulum.hpp\"\n"
-                            "#include \"runtime/kernel/export.hpp\"\n"
+                            "#include \"runtime/kernel/export/export.hpp\"\n"
                             "using K = lobatto::HandwrittenDoublePendulum<" +
                             number + ", lobatto::LobattoFour<" + number + ">>;\nLOBATTO_EXPORT_KERNEL(K)\n",
                         quadruple})

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "runtime/kernel/export.hpp"
+#include "runtime/kernel/export/export.hpp"
 #include "tests/handwritten/cyclic.hpp"
 #include "tests/handwritten/pendulum.hpp"
 

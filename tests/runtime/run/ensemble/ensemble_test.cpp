@@ -19,7 +19,7 @@ using namespace lobatto;
 namespace {
 
 const char* const includes =
-    "#include \"tests/handwritten/pendulum.hpp\"\n#include \"runtime/kernel/export.hpp\"\n"
+    "#include \"tests/handwritten/pendulum.hpp\"\n#include \"runtime/kernel/export/export.hpp\"\n"
     "using K = lobatto::HandwrittenPendulum;\n";
 
 // Four lanes made of four steppers, so that a lane must give the bits of a stepper; what the contract of abi.h
