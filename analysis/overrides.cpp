@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "generator/formula/expression.hpp"
@@ -13,7 +14,7 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::int64_t most_every = 9'000'000'000'000'000;  // the steps that a run can have
+constexpr double most_every = 9e15;  // the steps that a run can have
 
 [[noreturn]] void fail_unknown(const Source& source, const Scene& scene, const std::string& name) {
     for (const Parameter& constant : scene.constants) {
@@ -59,6 +60,27 @@ GiNaC::ex in_parameters(const std::string& option, const std::string& argument, 
     return expression;
 }
 
+void keep_every(double every, Scene& scene) {
+    const std::string given = fmt::format("{}", every);
+    if (scene.clock) {
+        if (!(every > 0) || !std::isfinite(every))
+            throw InputError(fmt::format(
+                "--every: with a clock it is the time from one kept state to the next, above 0, not {}", given));
+        scene.outputs.interval = in_parameters("--every", given, "the time between two states", scene);
+        return;
+    }
+    if (every > most_every)
+        throw InputError(fmt::format("--every: {} is more than a run has steps; at most 9e15", given));
+    if (!(every >= 1) || every != std::floor(every))
+        throw InputError(
+            fmt::format("--every: {} is not a number of states; give 1 to keep each, 10 to keep every tenth", given));
+    if (every > 1 && scene.outputs.dense > 0)
+        throw InputError(
+            fmt::format("--every: the scene asks for states between two steps (dense = {}), so all steps are kept",
+                        scene.outputs.dense));
+    scene.outputs.every = static_cast<std::int64_t>(every);
+}
+
 }  // namespace
 
 Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
@@ -83,19 +105,7 @@ void apply(const Overrides& overrides, Scene& scene) {
     }
     if (!overrides.step.empty()) scene.run.step = in_parameters("--step", overrides.step, "the step", scene);
     if (!overrides.until.empty()) scene.run.until = in_parameters("--until", overrides.until, "the end time", scene);
-    if (overrides.every && *overrides.every > most_every)
-        throw InputError(fmt::format("--every: {} is more than a run has steps; at most 9e15", *overrides.every));
-    if (overrides.every && *overrides.every < 1)
-        throw InputError(fmt::format(
-            "--every: {} is not a number of states; give 1 to keep each, 10 to keep every tenth", *overrides.every));
-    if (overrides.every && *overrides.every > 1 && scene.outputs.dense > 0)
-        throw InputError(
-            fmt::format("--every: the scene asks for states between two steps (dense = {}), so all steps are kept",
-                        scene.outputs.dense));
-    if (overrides.every && scene.clock)
-        scene.outputs.interval = GiNaC::numeric(static_cast<long>(*overrides.every));
-    else if (overrides.every)
-        scene.outputs.every = *overrides.every;
+    if (overrides.every) keep_every(*overrides.every, scene);
 }
 
 }  // namespace lobatto

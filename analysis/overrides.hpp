@@ -15,7 +15,7 @@ namespace lobatto {
 struct Overrides {
     std::vector<std::string> set;  // "name=expression": run-time parameters; the expression is a number such as 2*pi
     std::string step, until;       // expressions in the parameters; empty: as in the scene
-    std::optional<std::int64_t> every;
+    std::optional<double> every;   // states; with a clock the time between two
 };
 
 // The bytes of an argument from `begin` on, to before `end`, each with its column.

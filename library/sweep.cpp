@@ -143,8 +143,7 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
                 if (!ask(options.progress, static_cast<double>(done) / study->steps_of(0, count))) is_interrupted = 1;
             };
         // With a clock the scene itself says which states there are between.
-        const std::int64_t every =
-            swept.clock ? std::min<std::int64_t>(options.every.value_or(0), 1) : options.every.value_or(0);
+        const std::int64_t every = !options.every ? 0 : swept.clock ? 1 : static_cast<std::int64_t>(*options.every);
         if (every > 0) sweep.states.first.push_back(0);
         const auto sink = [&](const EnsembleTrajectory& trajectory, const Verdict& verdict,
                               const EnsembleRequest& request) {

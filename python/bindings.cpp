@@ -10,8 +10,6 @@
 
 #include <lobatto/lobatto.hpp>
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,6 +39,10 @@ py::array view(const double* numbers, std::size_t count, const py::object& owner
     py::array_t<double> array(static_cast<py::ssize_t>(count), numbers, owner);
     array.attr("flags").attr("writeable") = false;
     return array;
+}
+
+std::vector<double> vector_of(const Array& array) {
+    return {array.data(), array.data() + array.size()};
 }
 
 const double* row_of(const Array& array, std::size_t count, const char* what) {
@@ -73,44 +75,15 @@ auto unlocked(const Work& work) {
     return result;
 }
 
-// States at ascending times of a trajectory whose kept states are given: these themselves, and between them what steps
-// from the kept state before lead to, of which the last is shortened to end there.
-std::pair<py::array, py::array> states_at(lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
+std::pair<py::array, py::array> states_at(const lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
                                           const Array& times) {
-    const std::size_t n = stepper.coordinates(), kept = static_cast<std::size_t>(t.size());
-    const auto count = static_cast<std::size_t>(times.size());
-    const double *const at = times.data(), *const first = t.data(), *const end = first + kept;
-    const double rounding = 1e-12 * std::fmax(std::fabs(*first), std::fabs(end[-1]));
-    std::vector<double> positions, velocities;
-    std::size_t begun = kept;
-    const auto begin = [&](std::size_t from) {
-        stepper.start(first[from], q.data() + from * n, p.data() + from * n);
-        begun = from;
-    };
-    const auto keep = [&](const lob::Stepper& here) {
-        positions.insert(positions.end(), here.q(), here.q() + n);
-        const std::vector<double> velocity = here.velocity();
-        velocities.insert(velocities.end(), velocity.begin(), velocity.end());
-    };
-    for (std::size_t i = 0; i < count; ++i) {
-        if (!(at[i] >= *first - rounding && at[i] <= end[-1] + rounding))
-            throw lob::InputError("t = " + std::to_string(at[i]) + " is outside the trajectory, which leads from " +
-                                  std::to_string(*first) + " to " + std::to_string(end[-1]));
-        const auto from = static_cast<std::size_t>(std::upper_bound(first, end, at[i] + rounding) - first) - 1;
-        const bool is_kept = at[i] - first[from] <= rounding;
-        if (begun != from || is_kept || stepper.t() > at[i]) begin(from);
-        bool goes_on = !is_kept;
-        while (goes_on && stepper.next_time() <= at[i] + rounding) goes_on = stepper.step();
-        if (!goes_on || at[i] - stepper.t() <= rounding) {
-            keep(stepper);
-        } else {
-            lob::Stepper inside = stepper;
-            inside.advance_to(at[i]);
-            keep(inside);
-        }
-    }
-    const auto columns = static_cast<py::ssize_t>(n);
-    return {owned(std::move(positions), columns), owned(std::move(velocities), columns)};
+    lob::Trajectory run;
+    run.t = vector_of(t);
+    run.q = vector_of(q);
+    run.p = vector_of(p);
+    auto states = lob::states_at(stepper, run, vector_of(times));
+    const auto columns = static_cast<py::ssize_t>(stepper.coordinates());
+    return {owned(std::move(states.first), columns), owned(std::move(states.second), columns)};
 }
 
 py::list events_of(const std::vector<lob::EventHit>& hits, const std::vector<std::string>& names) {

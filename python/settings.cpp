@@ -47,7 +47,7 @@ lob::Settings settings_of(const py::kwargs& given) {
         else if (name == "tolerance")
             settings.tolerance = number_of<double>(name, value);
         else if (name == "every")
-            settings.every = number_of<std::int64_t>(name, value);
+            settings.every = number_of<double>(name, value);
         else if (name == "arithmetic")
             settings.arithmetic = text(value);
         else if (name == "numbers")

@@ -46,8 +46,8 @@ std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures) {
 
 // Of so many states one is kept, 0: the last alone. With a clock `every` is the time between them.
 std::int64_t states_kept(const Overrides& overrides, const Scene& scene) {
-    const std::int64_t every = overrides.every.value_or(0);
-    return scene.clock ? std::min<std::int64_t>(every, 1) : every;
+    if (!overrides.every) return 0;
+    return scene.clock ? 1 : static_cast<std::int64_t>(*overrides.every);
 }
 
 // Whether trajectories of these numbers go side by side in vector registers.

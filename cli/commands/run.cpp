@@ -373,7 +373,7 @@ void add_run(CommandLine& program) {
     command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
     add_step_option(command, options->overrides);
     add_until_option(command, options->overrides);
-    command.option("--every", options->overrides.every, "Keep every N-th state; with a clock after N units of time")
+    command.option("--every", options->overrides.every, "Keep every N-th state; with a clock the time between two")
         .shown_as("N");
     add_set_option(command, options->overrides);
     command.flag(

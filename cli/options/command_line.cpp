@@ -40,6 +40,16 @@ std::string whole_number_complaint(const std::string& number) {
                        number);
 }
 
+// The same for a number.
+std::string any_number_complaint(const std::string& number) {
+    if (const std::string complaint = number_complaint(number); !complaint.empty()) return complaint;
+    double value{};
+    const char* const end = number.data() + number.size();
+    const auto [stopped, error] = std::from_chars(number.data() + number.starts_with('+'), end, value);
+    if (error != std::errc::invalid_argument && stopped == end) return "";
+    return fmt::format("a number is wanted, such as 0.25 or 1e-6, not {}", number);
+}
+
 // "TYPE:{plain,clean}": what the value is called, and what there is to say of it.
 std::pair<std::string, std::string> value_of(const CLI::Option& option) {
     const std::string type = option.get_type_name();
@@ -178,11 +188,11 @@ Option Command::option(const std::string& name, std::optional<std::int64_t>& tar
 }
 
 Option Command::option(const std::string& name, double& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help)).checked_by(number_complaint);
+    return Option(app_->add_option(name, target, help)).checked_by(any_number_complaint);
 }
 
 Option Command::option(const std::string& name, std::optional<double>& target, const std::string& help) {
-    return Option(app_->add_option(name, target, help)).checked_by(number_complaint);
+    return Option(app_->add_option(name, target, help)).checked_by(any_number_complaint);
 }
 
 Option Command::choice_of(const std::string& name, std::function<void(int)> store,

@@ -92,6 +92,34 @@ TEST_CASE("a stepper takes the same steps as a run, and looks inside the last on
         message_of<lob::InputError>([&] { static_cast<void>(stepper.at(5)); }).starts_with("at: t = 5 is not inside"));
 }
 
+TEST_CASE("between the rows of a run its states are those of steps from the row before") {
+    const lob::Scene scene(scenes + "pendulum.toml");
+    lob::RunOptions options;
+    options.until = "1";
+    options.every = 5;
+    const lob::Trajectory run = lob::run(scene, options);
+    const lob::Stepper stepper(lob::compile(scene));
+    const auto [q, v] = lob::states_at(stepper, run, {0, 0.4, 0.42, 0.5, 1, 0.4});
+    REQUIRE(q.size() == 6);
+    CHECK(q[0] == run.q[0]);
+    CHECK(q[3] == run.q[2]);
+    CHECK(q[4] == run.q.back());
+    lob::Stepper between = stepper;
+    between.start(run.t[1], &run.q[1], &run.p[1]);
+    between.advance(3);
+    CHECK(q[1] == between.q()[0]);
+    CHECK(v[1] == between.velocity()[0]);
+    CHECK(q[5] == q[1]);
+    between.advance_to(0.42);
+    CHECK(q[2] == between.q()[0]);
+    CHECK(v[2] == between.velocity()[0]);
+    CHECK(message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(stepper, run, {1.5})); }) ==
+          "t = 1.5 is outside the trajectory, which leads from 0 to 1");
+    const lob::Stepper other(lob::compile(lob::Scene(scenes + "double_pendulum.toml")));
+    CHECK(message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(other, run, {0})); })
+              .starts_with("states_at: the trajectory is of another scene"));
+}
+
 TEST_CASE("advance_to ends at its time exactly, also between steps, and goes on with steps of the usual length") {
     lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
     stepper.advance_to(0.33);
@@ -369,6 +397,18 @@ TEST_CASE("a clock is a setting: the same steps as with the scene's own, and equ
     // What a scene keeps counts steps without a clock, and is a time with one: the other kind of step keeps all.
     const lob::Trajectory all = lob::run(eccentric("clock = \"auto\"\n", "0.02", "[output]\nevery = 3\n"), equal);
     CHECK(all.count == static_cast<std::size_t>(all.steps) + 1);
+
+    // The setting has the same two meanings.
+    automatic.every = 0.25;
+    const lob::Trajectory kept = lob::run(without, automatic);
+    const lob::Trajectory as_written = lob::run(eccentric("clock = \"auto\"\n", "0.02", "[output]\nevery = 0.25\n"));
+    CHECK(kept.t == as_written.t);
+    CHECK(kept.q == as_written.q);
+    equal.every = 0.25;
+    CHECK(message_of<lob::InputError>([&] { lob::run(without, equal); }).starts_with("--every: 0.25 is not a number of"));
+    automatic.every = 0;
+    CHECK(message_of<lob::InputError>([&] { lob::run(without, automatic); }) ==
+          "--every: with a clock it is the time from one kept state to the next, above 0, not 0");
 }
 
 TEST_CASE("with a clock advance_to goes to any times, and steps go on to those of the scene") {

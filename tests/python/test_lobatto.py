@@ -237,7 +237,7 @@ def test_errors_are_exceptions_with_the_texts_of_the_command_line(pendulum):
 
 def test_values_of_another_kind_are_refused(pendulum):
     for settings, message in ((dict(points=4.5), "points needs a whole number, not 4.5"),
-                              (dict(every=[1]), "every needs a whole number"), (dict(set={"m": None}), "m needs a number"),
+                              (dict(every=[1]), "every needs a number"), (dict(set={"m": None}), "m needs a number"),
                               (dict(tolerance="x"), "tolerance needs a number")):
         with pytest.raises(TypeError, match=message):
             lobatto.run(pendulum, **settings)

@@ -67,7 +67,7 @@ typedef struct lobatto_settings {
     const char *arithmetic, *numbers; /* "plain", "clean"; "double", "float", ... */
     const char* clock;                /* "none": equal steps; "auto" */
     const char *step, *until;         /* formulas in the parameters */
-    int64_t every;                    /* keep every such state */
+    double every;                     /* keep every such state; with a clock, each such time */
     const char* const* set;           /* "name=formula" each; the last is NULL */
 } lobatto_settings;
 

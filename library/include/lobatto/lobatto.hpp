@@ -81,7 +81,7 @@ struct Settings {
     std::string clock;                                     ///< "none": equal steps; "auto" (docs/clocks.md)
     std::vector<std::pair<std::string, std::string>> set;  ///< parameters: {"omega", "2*pi"}
     std::string step, until;                               ///< formulas in the parameters: "2*pi/omega/50"
-    std::optional<std::int64_t> every;                     ///< keep every such state
+    std::optional<double> every;                           ///< keep every such state; with a clock, each such time
 };
 
 /// A mechanical system, read and checked. Copies share it.
@@ -277,6 +277,17 @@ struct RunOptions : Settings {
 ///     std::printf("q = %g after %g, error %.1e\n", run.q.back(), run.t.back(), run.error.value());
 ///
 LOBATTO_API Trajectory run(const Scene& scene, const RunOptions& options = {});
+
+/// Positions and velocities at ascending times of a run: those of its rows, and between two rows what steps from the
+/// earlier one lead to, of which the last is shortened to end there. `stepper` is of the same scene and settings; only
+/// t, q and p of the run are read. Both results are times x n.
+///
+///     const lob::Trajectory swing = lob::run(scene);
+///     const auto [positions, velocities] = lob::states_at(stepper, swing, {0.25, 0.5});
+///     std::printf("q = %g and %g\n", positions[0], positions[1]);
+///
+LOBATTO_API std::pair<std::vector<double>, std::vector<double>> states_at(Stepper stepper, const Trajectory& run,
+                                                                          const std::vector<double>& times);
 
 // --- Sweeps ----------------------------------------------------------------------------------------------------------
 
