@@ -116,8 +116,9 @@ TEST_CASE("between the rows of a run its states are those of steps from the row 
     CHECK(message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(stepper, run, {1.5})); }) ==
           "t = 1.5 is outside the trajectory, which leads from 0 to 1");
     const lob::Stepper other(lob::compile(lob::Scene(scenes + "double_pendulum.toml")));
-    CHECK(message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(other, run, {0})); })
-              .starts_with("states_at: the trajectory is of another scene"));
+    CHECK(message_of<lob::InputError>([&] {
+              static_cast<void>(lob::states_at(other, run, {0}));
+          }).starts_with("states_at: the trajectory is of another scene"));
 }
 
 TEST_CASE("advance_to ends at its time exactly, also between steps, and goes on with steps of the usual length") {
@@ -405,7 +406,8 @@ TEST_CASE("a clock is a setting: the same steps as with the scene's own, and equ
     CHECK(kept.t == as_written.t);
     CHECK(kept.q == as_written.q);
     equal.every = 0.25;
-    CHECK(message_of<lob::InputError>([&] { lob::run(without, equal); }).starts_with("--every: 0.25 is not a number of"));
+    CHECK(
+        message_of<lob::InputError>([&] { lob::run(without, equal); }).starts_with("--every: 0.25 is not a number of"));
     automatic.every = 0;
     CHECK(message_of<lob::InputError>([&] { lob::run(without, automatic); }) ==
           "--every: with a clock it is the time from one kept state to the next, above 0, not 0");
