@@ -88,6 +88,7 @@ int main(int argc, char** argv) {
     keep_streams_apart();
     // `lobatto derive scene | head -1` ends quietly, even when the parent process ignores closed pipes.
     std::signal(SIGPIPE, SIG_DFL);
+    std::signal(SIGCHLD, SIG_DFL);  // else nobody can wait for a compiler
     std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of write(2)
     CommandLine program(
         "Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.", "lobatto");

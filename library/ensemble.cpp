@@ -55,6 +55,7 @@ OpenedSweep study_of(const Scene& scene, const Starts& starts, const Settings& s
 struct Ensemble::Parts {
     OpenedSweep study;
     std::vector<Variable> parameters;  // as the scene has them
+    std::vector<Required> required;
     std::vector<double> step;
     std::int64_t steps = 0;  // taken
     std::vector<Lanes> lanes;
@@ -64,6 +65,7 @@ struct Ensemble::Parts {
     Parts(const Scene& scene, const Starts& starts, const Settings& settings)
         : study(study_of(scene, starts, settings)),
           parameters(in_algebra([&] { return parameters_of(study->scene()); })),
+          required(in_algebra([&] { return required_of(study->scene()); })),
           step{request().step},
           q(starts.count * n()),
           p(starts.count * n()),
@@ -143,9 +145,18 @@ struct Ensemble::Parts {
         steps += count;
     }
 
+    // Values that one of the trajectories may not have change nothing.
     void set(std::size_t parameter, const double* values) {
+        const auto all = static_cast<std::size_t>(kernel()->parameters);
+        for (const Lanes& side_by_side : lanes)
+            for (std::size_t lane = 0; lane < side_by_side.count; ++lane) {
+                if (status[side_by_side.first + lane] != LOBATTO_OK) continue;
+                const auto begin = side_by_side.parameters.begin() + static_cast<std::ptrdiff_t>(lane * all);
+                std::vector<double> changed(begin, begin + static_cast<std::ptrdiff_t>(all));
+                changed[parameter] = values[side_by_side.first + lane];
+                check_change(required, changed, parameter, 1);
+            }
         for (Lanes& side_by_side : lanes) {
-            const std::size_t all = side_by_side.parameters.size() / side_by_side.status.size();
             for (std::size_t lane = 0; lane < side_by_side.status.size(); ++lane)
                 side_by_side.parameters[lane * all + parameter] =
                     values[side_by_side.first + std::min(lane, side_by_side.count - 1)];

@@ -24,6 +24,18 @@ struct Scene::Parts {
     double step, until;
 };
 
+// Of parameters: above zero, or not below it.
+struct Required {
+    Tape value;
+    bool may_vanish;
+    std::string complaint;
+};
+std::vector<Required> required_of(const lobatto::Scene& scene);
+// InputError where one of the `count` parameters from `first` on, which have changed, is no number, or where all of
+// them together are no values that the scene allows.
+void check_change(const std::vector<Required>& required, const std::vector<double>& parameters, std::size_t first,
+                  std::size_t count);
+
 struct Kernel::Parts {
     lobatto::Scene scene;  // with its method and values
     lobatto::Kernel kernel;
@@ -31,11 +43,6 @@ struct Kernel::Parts {
     TrajectoryRequest start;  // of the scene, in numbers
     std::vector<Variable> coordinates, parameters, inputs;
     std::vector<std::string> events;
-    struct Required {  // of parameters: above zero, or not below it
-        Tape value;
-        bool may_vanish;
-        std::string complaint;
-    };
     std::vector<Required> required;
 };
 

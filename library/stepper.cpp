@@ -39,18 +39,27 @@ const std::vector<std::string>& Kernel::events() const {
     return parts_->events;
 }
 
-namespace {
+namespace {}  // namespace
 
-std::vector<Kernel::Parts::Required> required_of(const lobatto::Scene& scene) {
+std::vector<Required> required_of(const lobatto::Scene& scene) {
     std::vector<GiNaC::symbol> symbols;
     for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
-    std::vector<Kernel::Parts::Required> all;
+    std::vector<Required> all;
     for (const Requirement& requirement : scene.requirements)
         all.push_back({Tape::of(requirement.value, symbols).value(), requirement.may_vanish, requirement.complaint});
     return all;
 }
 
-}  // namespace
+void check_change(const std::vector<Required>& required, const std::vector<double>& parameters, std::size_t first,
+                  std::size_t count) {
+    for (std::size_t i = first; i < first + count; ++i)
+        if (!std::isfinite(parameters[i]))
+            throw InputError(fmt::format("{} is no value of a parameter", parameters[i]));
+    for (const Required& one : required) {
+        const double value = one.value(parameters);
+        if (!(value > 0 || (one.may_vanish && value == 0))) throw InputError(one.complaint);
+    }
+}
 
 Kernel compile(const Scene& scene, const Settings& settings) {
     return in_algebra([&] {
@@ -152,19 +161,11 @@ struct Stepper::Parts {
     // Parameters from `first` on; where the kernel refuses them, those of before.
     void change(std::size_t first, const std::vector<double>& values) {
         const std::vector<double> before = parameters;
-        std::copy(values.begin(), values.end(), parameters.begin() + static_cast<std::ptrdiff_t>(first));
-        if (parameters == before) return;
-        for (const double value : values)
-            if (!std::isfinite(value)) {
-                parameters = before;
-                throw InputError(fmt::format("{} is no value of a parameter", value));
-            }
-        for (const Kernel::Parts::Required& required : kernel.parts().required) {
-            const double value = required.value(parameters);
-            if (value > 0 || (required.may_vanish && value == 0)) continue;
-            parameters = before;
-            throw InputError(required.complaint);
-        }
+        std::vector<double> after = before;
+        std::copy(values.begin(), values.end(), after.begin() + static_cast<std::ptrdiff_t>(first));
+        if (after == before) return;
+        check_change(kernel.parts().required, after, first, values.size());
+        parameters = after;
         const lobatto_kernel& table = stepper.kernel().table();
         const auto begin = static_cast<std::size_t>(table.first_input),
                    end = begin + static_cast<std::size_t>(table.inputs);

@@ -10,6 +10,7 @@
 
 #include <lobatto/lobatto.hpp>
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,16 +65,31 @@ std::function<bool(Arguments...)> watched(const py::object& progress) {
     };
 }
 
-// What was computed without the lock, or the exception that Ctrl-C left.
+// What was computed without the interpreter's lock, or the exception that Ctrl-C left. All that takes the lock of
+// formulas goes through here: who has that one waits for the interpreter's, to look for Ctrl-C.
 template <class Work>
 auto unlocked(const Work& work) {
-    auto result = [&] {
-        const py::gil_scoped_release release;
-        return work();
-    }();
-    if (PyErr_Occurred() != nullptr) throw py::error_already_set();
-    return result;
+    try {
+        auto result = [&] {
+            const py::gil_scoped_release release;
+            return work();
+        }();
+        if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+        return result;
+    } catch (const lob::Error&) {
+        if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+        throw;
+    }
 }
+
+// What the last holder of a scene destroys are formulas, too.
+struct Freed {
+    template <class T>
+    void operator()(T* held) const {
+        const py::gil_scoped_release release;
+        delete held;
+    }
+};
 
 std::pair<py::array, py::array> states_at(const lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
                                           const Array& times) {
@@ -81,7 +97,8 @@ std::pair<py::array, py::array> states_at(const lob::Stepper& stepper, const Arr
     run.t = vector_of(t);
     run.q = vector_of(q);
     run.p = vector_of(p);
-    auto states = lob::states_at(stepper, run, vector_of(times));
+    const std::vector<double> all = vector_of(times);
+    auto states = unlocked([&] { return lob::states_at(stepper, run, all); });
     const auto columns = static_cast<py::ssize_t>(stepper.coordinates());
     return {owned(std::move(states.first), columns), owned(std::move(states.second), columns)};
 }
@@ -188,14 +205,7 @@ py::dict tune(const lob::Scene& scene, double error, double budget, const py::ob
               const py::kwargs& given) {
     const lob::Settings settings = settings_of(given);
     const auto going_on = watched<const std::string&>(progress);
-    const lob::Choice choice = [&] {
-        try {
-            return unlocked([&] { return lob::tune(scene, error, settings, budget, going_on); });
-        } catch (const lob::Error&) {
-            if (PyErr_Occurred() != nullptr) throw py::error_already_set();
-            throw;
-        }
-    }();
+    const lob::Choice choice = unlocked([&] { return lob::tune(scene, error, settings, budget, going_on); });
     py::dict dict;
     dict["settings"] = dict_of_settings(choice.settings);
     dict["method"] = choice.method;
@@ -241,16 +251,17 @@ void add_scene(py::module_& module) {
             return "Variable(" + variable.name + " = " + std::string(py::repr(py::float_(variable.value))) +
                    (variable.unit.empty() ? "" : " " + variable.unit) + ")";
         });
-    using Text = std::string (lob::Scene::*)(const lob::Settings&) const;
-    const auto text = [](Text function) {
+    const auto text = [](auto function) {
         return [function](const lob::Scene& scene, const py::kwargs& given) {
             const lob::Settings settings = settings_of(given);
             return unlocked([&] { return (scene.*function)(settings); });
         };
     };
-    py::class_<lob::Scene>(module, "Scene", "A mechanical system, read from a scene file and checked.")
-        .def(py::init<const std::string&>(), py::arg("path"))
-        .def_static("from_text", &lob::Scene::from_text, py::arg("text"), py::arg("path") = "scene.toml",
+    using Scenes = py::class_<lob::Scene, std::unique_ptr<lob::Scene, Freed>>;
+    const py::call_guard<py::gil_scoped_release> without_lock;
+    Scenes(module, "Scene", "A mechanical system, read from a scene file and checked.")
+        .def(py::init<const std::string&>(), py::arg("path"), without_lock)
+        .def_static("from_text", &lob::Scene::from_text, py::arg("text"), py::arg("path") = "scene.toml", without_lock,
                     "The text of a scene file; `path` stands in errors.")
         .def_property_readonly("path", &lob::Scene::path)
         .def_property_readonly("name", &lob::Scene::name)
@@ -270,13 +281,8 @@ void add_scene(py::module_& module) {
         .def("_derivation_json", text(&lob::Scene::derivation_json))
         .def("_check_json", text(&lob::Scene::check_json))
         .def("_stability_json", text(&lob::Scene::stability_json))
-        .def(
-            "emit", [](const lob::Scene& scene, const py::kwargs& given) { return scene.emit(settings_of(given)); },
-            "The integrator as one C++17 header: (file name, text).")
-        .def(
-            "emit_plain",
-            [](const lob::Scene& scene, const py::kwargs& given) { return scene.emit_plain(settings_of(given)); },
-            "The integrator as a textbook prints it: (file name, text).")
+        .def("emit", text(&lob::Scene::emit), "The integrator as one C++17 header: (file name, text).")
+        .def("emit_plain", text(&lob::Scene::emit_plain), "The integrator as a textbook prints it: (file name, text).")
         .def("__repr__",
              [](const lob::Scene& scene) { return "Scene('" + scene.path() + "': " + scene.title() + ")"; });
 }
@@ -286,9 +292,10 @@ void add_stepper(py::module_& module) {
         const auto& stepper = self.cast<const lob::Stepper&>();
         return view((stepper.*function)(), stepper.coordinates(), self);
     };
-    py::class_<lob::Stepper>(module, "Stepper",
-                             "A trajectory that the caller takes forward.\n\n"
-                             "q and p are read-only views of where the motion is now; copy them to keep them.")
+    using Steppers = py::class_<lob::Stepper, std::unique_ptr<lob::Stepper, Freed>>;
+    Steppers(module, "Stepper",
+             "A trajectory that the caller takes forward.\n\n"
+             "q and p are read-only views of where the motion is now; copy them to keep them.")
         .def(py::init([](const lob::Scene& scene, const py::kwargs& given) {
                  const lob::Settings settings = settings_of(given);
                  return unlocked([&] { return lob::Stepper(lob::compile(scene, settings)); });

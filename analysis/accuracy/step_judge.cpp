@@ -131,7 +131,11 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
 
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     const std::vector<bool> moves = moving(least_, most_);
-    std::vector<double> measure = scale;
+    std::vector<double> measure = scale, sizes(2 * n, 0.0);
+    for (std::size_t i = 0; i < 2 * n; ++i)
+        if (moves[i]) sizes[i] = scale[i];
+    const std::vector<double> levels = noise_of(sizes);
+    for (std::size_t i = 0; i < 2 * n; ++i) measure[i] = std::fmax(measure[i], levels[i]);
     for (std::size_t k = 0; k < n; ++k)
         if (!moves[k]) measure[k] = measure[n + k] = std::numeric_limits<double>::infinity();
     const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,

@@ -243,6 +243,7 @@ StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink
         request.first = first;
         request.count = std::min(last, (first / of_setting + 1) * of_setting) - first;
         request.interrupted = interrupted;
+        request.progress = nullptr;
         if (progress) request.progress = [&](std::int64_t done) { progress(steps_gone + done); };
         request.sink = [&](const EnsembleTrajectory& trajectory) {
             if (times.interrupted) return;  // what is handed on has no gaps

@@ -2,6 +2,7 @@
 #include "analysis/tradeoff/kernel_builder.hpp"
 
 #include <algorithm>
+#include <system_error>
 
 #include "analysis/kernel/kernel_of.hpp"
 #include "generator/mechanics/clock/automatic_clock.hpp"
@@ -38,8 +39,12 @@ KernelBuilder::KernelBuilder(const Scene& scene, bool tries_clocks) {
             own != StepClock::automatic && (automatic = derive_with_automatic_clock(equal)))
             allowed_.insert(derivations_.emplace(StepClock::automatic, std::move(*automatic)).first->first);
     }
-    for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
-        workers_.emplace_back([this] { work(); });
+    try {
+        for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+            workers_.emplace_back([this] { work(); });
+    } catch (const std::system_error&) {
+        if (workers_.empty()) throw;  // fewer do, too
+    }
 }
 
 KernelBuilder::~KernelBuilder() {

@@ -355,8 +355,7 @@ std::string page_of(const std::vector<Row>& rows) {
     return fmt::format(
         R"(# The promises of `lobatto tune`
 
-What was chosen for each scene and each error was run again and compared, at its own steps, with Gauss 10 in long double with short steps; and it was timed in turn with the fastest that a search
-through the whole family finds (21 members, steps in ratios of 1.1, six tolerances; the error kept at the steps). Written by
+Each choice was run again. Its states at its own steps were compared with Gauss 10 in long double with short steps. It was timed in turn with the fastest method that a search through the whole family finds (21 members, steps in ratios of 1.1, six tolerances; it must keep the error at its steps). Written by
 
     ninja -C build/release bench_promise
     build/release/bench_promise promises.csv scenes/*.toml && build/release/bench_promise --page promises.csv > docs/promises.md

@@ -2,13 +2,8 @@
 // lobatto emit: a scene's kernel as a C++ header, and what each pass saved.
 #include <fmt/format.h>
 #include <fmt/ostream.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 
@@ -22,6 +17,7 @@
 #include "library/whole.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 
@@ -40,34 +36,6 @@ struct EmitCommand {
     bool plain = false;
     bool json = false;
 };
-
-[[noreturn]] void fail_to_write(const fs::path& path, const std::string& reason) {
-    throw MachineError(fmt::format("cannot write {}: {}", path.string(), reason));
-}
-
-// Under a name of its own first: whoever reads `path` sees the old text or the new one, never a part.
-void write_atomically(const fs::path& path, const std::string& text) {
-    std::string temporary = path.string() + ".XXXXXX";
-    const int file = ::mkstemp(temporary.data());
-    if (file < 0) fail_to_write(path, std::strerror(errno));
-    const auto give_up = [&](int error) {
-        ::unlink(temporary.c_str());
-        fail_to_write(path, std::strerror(error));
-    };
-    for (std::size_t done = 0; done < text.size();) {
-        const ssize_t count = ::write(file, text.data() + done, text.size() - done);
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0) {
-            const int error = errno;
-            ::close(file);
-            give_up(error);
-        }
-        done += static_cast<std::size_t>(count);
-    }
-    ::fchmod(file, 0644);
-    if (::close(file) != 0) give_up(errno);
-    if (std::rename(temporary.c_str(), path.c_str()) != 0) give_up(errno);
-}
 
 void print_report(const std::vector<PassReport>& report) {
     fmt::print(std::cout, "{:<26}{:>11}{:>17}{:>11}{:>11}{:>8}   largest relative change of a value\n", "pass",
@@ -106,7 +74,7 @@ void print_use(const KernelSource& source, const EmitCommand& options, const Sce
 fs::path path_for(const EmitCommand& options, const std::string& name) {
     std::error_code error;
     fs::create_directories(options.folder, error);
-    if (error) fail_to_write(options.folder, error.message());
+    if (error) fail_to_write("the header", options.folder, error.value());
     const fs::path path = fs::path(options.folder) / (name + ".hpp");
     keep_scene(options.scene, path);
     keep_foreign(path);
@@ -126,7 +94,7 @@ bool is_printed(const EmitCommand& options) {
 
 void write_plain(const PlainSource& source, const EmitCommand& options) {
     const fs::path path = path_for(options, source.name);
-    write_atomically(path, source.header);
+    write_whole(path, "the header", source.header);
     if (options.json) {
         fmt::print(std::cout, "{}", json_of_emitted(options.scene, {path.string()}, source.name, {}));
         return;
@@ -174,9 +142,9 @@ void emit_scene(const EmitCommand& options) {
         const fs::path support = fs::path(options.folder) / "kernel.hpp";
         keep_scene(options.scene, support);
         keep_foreign(support);
-        write_atomically(support, support_text());
+        write_whole(support, "the header", support_text());
     }
-    write_atomically(path, source.header);
+    write_whole(path, "the header", source.header);
     if (options.json) {
         std::vector<std::string> files{path.string()};
         if (!options.standalone && !options.no_support)

@@ -183,8 +183,11 @@ void view(const ViewCommand& options) {
         print_row("page", fmt::format("{}, {} kB: open it in a browser", path, (page.size() + 999) / 1000));
         if (!options.video.empty()) print_row("video", options.video);
     }
-    for (const Viewed& one : all)
-        if (!one.failure.empty()) tell("lobatto: warning: {}: {}\n", one.title, one.failure);
+    for (const Viewed& one : all) {
+        if (one.failure.empty()) continue;
+        const std::string which = one.motion.label == one.title ? "" : ", " + one.motion.label + ", " + one.motion.note;
+        tell("lobatto: warning: {}{}: {}\n", one.title, which, one.failure);
+    }
 }
 
 }  // namespace

@@ -176,7 +176,10 @@ private:
         const Operand rate = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
         if (rate.velocities || rate.expression.has(scene_.time))
             fail(at, "a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
-        if (!rate.moves) fail(at, "this clock holds no position, so that all its steps are equal; leave it out");
+        const bool moves = std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(),
+                                       [&](const Coordinate& one) { return rate.expression.has(one.position); });
+        if (!rate.moves || !moves)
+            fail(at, "this clock holds no position, so that all its steps are equal; leave it out");
         clock.rate = rate.expression;
         scene_.clock = clock;
     }

@@ -85,12 +85,13 @@ std::string configured_folder() {
     return home + "/.cache/lobatto";
 }
 
-// An open lock on STEM.lock, or -1 when `wait` is false and another holds it. Locks are removed by their holders, so
-// the file that was locked may no longer be the one in the folder: then try again.
+// An open lock on STEM.lock, or -1 when `wait` is false and another holds it, or it is no file of ours. Locks are
+// removed by their holders, so the file that was locked may no longer be the one in the folder: then try again.
 int lock_stem(const std::string& stem, bool wait) {
     const std::string path = stem + ".lock";
     while (true) {
         const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+        if (descriptor < 0 && !wait) return -1;  // what cannot be locked is left alone
         if (descriptor < 0) fail("create", path, errno);
         while (::flock(descriptor, wait ? LOCK_EX : LOCK_EX | LOCK_NB) != 0) {
             const int error = errno;

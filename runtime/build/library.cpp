@@ -224,15 +224,15 @@ lobatto_status LoadedStepper<real>::jacobian(real time, const std::vector<real>&
                                              const std::vector<real>& X, std::vector<real>& J) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     assert(std::ssize(X) == kernel_->unknowns);
-    J.resize(kernel_->unknowns * kernel_->unknowns);
+    J.resize(X.size() * X.size());
     return static_cast<lobatto_status>(kernel_->jacobian(stepper_, &time, q.data(), p.data(), X.data(), J.data()));
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::tangent(real time, const std::vector<real>& q, const std::vector<real>& p,
                                             std::vector<real>& q1, std::vector<real>& p1, std::vector<real>& T) const {
-    const std::int32_t n = kernel_->coordinates;
-    assert(std::ssize(q) == n && std::ssize(p) == n);
+    const std::size_t n = q.size();
+    assert(std::ssize(q) == kernel_->coordinates && p.size() == n);
     q1.resize(n);
     p1.resize(n);
     T.resize(4 * n * n);

@@ -148,7 +148,8 @@ ProcessResult run_process(const ProcessRequest& request) {
         ::poll(&watched, 1, watched.fd >= 0 ? 100 : 1);
         if (watched.fd >= 0 && !drain(*output_end, result.output)) watched.fd = -1;
         // Not reaped yet: until the group is killed, its number must not be given to another.
-        ::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOWAIT | WNOHANG);
+        if (::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOWAIT | WNOHANG) != 0 && errno != EINTR)
+            fail(request, "wait (is SIGCHLD ignored in this process?)", errno);
     }
     ::kill(-pid, SIGKILL);
     int status = 0;

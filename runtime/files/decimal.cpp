@@ -98,7 +98,7 @@ std::string written(bool negative, std::string digits, long exponent) {
 
 std::string decimal_text(const double* parts, int count) {
     const bool has_rest = std::any_of(parts + 1, parts + count, [](double part) { return part != 0; });
-    if (!has_rest && (count == 1 || parts[0] == 0 || !std::isfinite(parts[0]))) {
+    if (count == 1 || !std::isfinite(parts[0]) || (parts[0] == 0 && !has_rest)) {
         char digits[32];
         return {digits, std::to_chars(digits, digits + sizeof digits, parts[0]).ptr};
     }

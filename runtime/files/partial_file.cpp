@@ -199,8 +199,7 @@ void PartialFile::write(std::string_view bytes) {
         if (written < 0) {
             if (errno == EINTR) continue;
             const int error = errno;
-            if (is_regular()) [[maybe_unused]]
-                const int cut = ftruncate(descriptor_, size_);
+            if (is_regular() && ftruncate(descriptor_, size_) == 0) lseek(descriptor_, size_, SEEK_SET);
             fail(partial_, error);
         }
         bytes.remove_prefix(static_cast<std::size_t>(written));

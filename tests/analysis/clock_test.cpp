@@ -380,6 +380,8 @@ TEST_CASE("what has no clock says so") {
           "clock.toml:10:9: a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
     CHECK(refusal(kepler(0.5, "clock = \"2*e\"", "step = 0.1\nuntil = 1")) ==
           "clock.toml:10:9: this clock holds no position, so that all its steps are equal; leave it out");
+    CHECK(refusal(kepler(0.5, "clock = \"2 + 0*x\"", "step = 0.1\nuntil = 1")) ==
+          "clock.toml:10:9: this clock holds no position, so that all its steps are equal; leave it out");
     CHECK(refusal(kepler(0.5, "clock = \"-r\"", "step = 0.1\nuntil = 1")) ==
           "clock.toml:10:9: the clock is -0.5 at the start; it must be positive wherever the motion goes");
     CHECK(refusal(kepler(0.5, "clock = \"r\"", "step = 0.1\nuntil = 1\n[forces]\nx = \"-x'\"")) ==

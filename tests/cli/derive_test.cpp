@@ -243,8 +243,15 @@ TEST_CASE("emit that cannot write says where and why, with exit code 4, and leav
     const std::string path = folder / "file";
     const test::Finished failed = lobatto_program({"emit", tree + "/scenes/pendulum.toml", "-o", path});
     CHECK(failed.exit_code == 4);
-    CHECK(failed.err == "lobatto: cannot write " + path + ": Not a directory\n");
+    CHECK(failed.err ==
+          "lobatto: cannot write the header to " + path + ": Not a directory. Choose another place with -o\n");
     CHECK(test::read_file(path) == "not a folder");
+    const std::string kernels = folder / "kernels";
+    const test::Finished modest =
+        test::run({"sh", "-c",
+                   "umask 077; '" LOBATTO_PROGRAM "' emit '" + tree + "/scenes/pendulum.toml' --plain -o '" + kernels +
+                       "' && stat -c %a '" + kernels + "/pendulum.hpp'"});
+    CHECK(modest.out.ends_with("\n600\n"));
 }
 
 TEST_CASE("emit and derive refuse what they cannot do with exit code 2") {

@@ -207,6 +207,11 @@ TEST_CASE("a motion that fails on its way is shown as far as it came, with a war
     const test::Finished finished = test::run({LOBATTO_PROGRAM, "view", tree + "/scenes/pendulum.toml", "--step", "2.9",
                                                "--until", "100", "-o", folder / "x.html"});
     CHECK(finished.exit_code == 0);
-    CHECK(finished.err.find("the motion on the page ends early") != std::string::npos);
+    CHECK(finished.err.find("A plane pendulum: the motion on the page ends early") != std::string::npos);
     CHECK(std::filesystem::exists(folder / "x.html"));
+    const test::Finished beside = test::run({LOBATTO_PROGRAM, "view", tree + "/scenes/pendulum.toml", "--until", "100",
+                                             "--beside", "points=3 step=2.9", "-o", folder / "y.html"});
+    CHECK(beside.err.find("A plane pendulum, Lobatto, 3 points, h = 2.9: the motion on the page ") !=
+          std::string::npos);
+    CHECK(beside.err.find("Lobatto, 4 points") == std::string::npos);
 }

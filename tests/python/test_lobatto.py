@@ -336,3 +336,18 @@ def test_examples(name, wanted, tmp_path):
     assert wanted in ran.stdout
     if arguments:
         assert (tmp_path / "picture.png").stat().st_size > 5000
+
+
+def test_a_thread_that_tunes_does_not_hold_up_those_that_read_scenes():
+    code = ("import lobatto, threading\n"
+            "scene = lobatto.Scene(%r)\n"
+            "tuning = threading.Thread(target=lobatto.tune, args=(scene, 1e-8), kwargs=dict(until=20, budget=3))\n"
+            "tuning.start()\n"
+            "while tuning.is_alive():\n"
+            "    other = lobatto.Scene(%r)\n"
+            "    other.emit()\n"
+            "    del other\n"
+            "tuning.join()\n"
+            "print('done')\n") % ((str(SCENES / "pendulum.toml"),) * 2)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0 and done.stdout == "done\n", done.stderr

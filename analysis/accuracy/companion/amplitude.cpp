@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "analysis/accuracy/companion/amplitude.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -13,6 +14,7 @@ constexpr double at_rest = 0x1p-40;  // of the place: what rounding moves it by
 // Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
 // squares it each time; a motion that small beside others is none.
 constexpr double held_at_zero = 0x1p-100;
+constexpr std::size_t first_compared = 16;  // comparisons: by then other motions are known, if steps are of any use
 
 }  // namespace
 
@@ -49,6 +51,29 @@ std::vector<bool> moving(const std::vector<double>& least, const std::vector<dou
         moves[i] = half > at_rest * place(i) && half > held_at_zero * farthest[i / n];
     }
     return moves;
+}
+
+std::vector<double> noise_of(const std::vector<double>& sizes) {
+    const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+    std::vector<double> levels;
+    for (const auto& [begin, end] : {std::pair{sizes.begin(), middle}, std::pair{middle, sizes.end()}})
+        levels.insert(levels.end(), static_cast<std::size_t>(end - begin), noise * *std::max_element(begin, end));
+    return levels;
+}
+
+void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
+                     const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
+    const std::vector<double> levels = noise_of(amplitudes);
+    for (std::size_t i = 0; i < amplitudes.size(); ++i) {
+        if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i])) continue;
+        int agree = 0, disagree = 0;
+        for (std::size_t j = 0; j < std::min(comparisons, first_compared); ++j) {
+            const auto [run, companion] = pair(j, i);
+            const double size = std::fmax(std::fabs(run), std::fabs(companion));
+            if (size > 0) ++(std::fabs(run - companion) > by_chance * size ? disagree : agree);
+        }
+        if (disagree > agree) amplitudes[i] = 0;
+    }
 }
 
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,

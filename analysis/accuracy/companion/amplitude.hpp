@@ -2,6 +2,9 @@
 // What errors are measured by: how far each position and momentum moves.
 #pragma once
 
+#include <cstddef>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include "generator/scene/scene.hpp"
@@ -10,6 +13,8 @@ namespace lobatto {
 
 constexpr double by_chance = 0.1;  // of an amplitude: what is apart by more may meet again, and is no small error then
 constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
+
+constexpr double noise = 1e-10;  // of what moves a number: forces that cancel leave less
 
 // Where a companion begins: a few units in the last place beside the start, so that it leaves it where nearby
 // trajectories diverge, also when the motion itself stands still in rounding.
@@ -23,6 +28,15 @@ void widen_to(std::vector<double>& least, std::vector<double>& most, const doubl
 
 // Of q then p: which move by more than rounding does.
 std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most);
+
+// Of each number the largest of its kind, positions or momenta, times this: forces that cancel, and constraints that
+// hold a momentum at 0, leave less of the others. What moves that little may be rounding alone.
+std::vector<double> noise_of(const std::vector<double>& sizes);
+
+// Amplitudes that may be rounding alone, of what a run and its companion do not agree on from the beginning: these
+// become 0. `pair(j, i)`: number i at comparison j, of the run and of the companion.
+void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
+                     const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
 // Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding.
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,

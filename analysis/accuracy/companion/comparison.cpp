@@ -12,7 +12,6 @@ namespace lobatto {
 
 namespace {
 
-constexpr double noise = 1e-10;     // of what the others move it by in a step: what cancelled forces leave
 constexpr int most_coupled = 16;    // coordinates of which that is looked for
 constexpr double exponential = 30;  // times more than errors that grow with the square of the time
 
@@ -46,6 +45,9 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
                 if (i % n != j % n && found[i] > 0)
                     shared[i] = std::fmax(shared[i], noise * std::fabs(T[i * 2 * n + j]) * found[j]);
     }
+    leave_out_noise(shared, comparisons, [&](std::size_t j, std::size_t i) {
+        return std::pair(run_[j].row[i * parts_], companion_[j].row[i * parts_]);
+    });
     return shared;
 }
 
@@ -54,7 +56,10 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const std::size_t count = std::min(run_.size(), companion_.size());
     const std::vector<double> amplitude = amplitudes(count);
     MeasuredError error;
-    error.companion_stopped = stopped_;
+    // Where a stop ended the run, the companion went on: what it met there is nothing of this motion.
+    const bool is_beyond = stopped_ && (*stopped_ - result.time) * request_.step >= 0;
+    const std::optional<double> stopped = is_beyond ? std::nullopt : stopped_;
+    error.companion_stopped = stopped;
     std::vector<std::pair<double, double>> course;  // time, largest error until then
     struct {
         double end = 0, absolute = 0;
@@ -80,10 +85,10 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
         if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, rounded(run_[j].row, parts_));
     }
-    if (!error.lost_after && stopped_ && count > 0) {
-        lose(error, *stopped_, rounded(run_[count - 1].row, parts_));
-    } else if (!error.lost_after && stopped_) {
-        error.lost_after = stopped_;
+    if (!error.lost_after && stopped && count > 0) {
+        lose(error, *stopped, rounded(run_[count - 1].row, parts_));
+    } else if (!error.lost_after && stopped) {
+        error.lost_after = stopped;
         error.lost_q = request_.q;
         error.lost_p = request_.p;
     }

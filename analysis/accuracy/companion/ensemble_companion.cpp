@@ -226,7 +226,15 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     for (std::int64_t i = 0; i < kept.count; ++i) widen_to(least, most, kept.rows + i * kept.columns + 1, 2 * n);
     for (std::int64_t i = 0; i < 2 * comparisons; ++i)
         widen_to(least, most, known.ranges.data() + i * static_cast<std::int64_t>(2 * n), 2 * n);
-    const std::vector<double> amplitude = amplitudes_of(least, most, groups_);
+    const auto run_at = [&](std::int64_t j) { return whole_row(kept, skipped + j); };
+    const auto companion_at = [&](std::int64_t j) {
+        return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
+    };
+    std::vector<double> amplitude = amplitudes_of(least, most, groups_);
+    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), [&](std::size_t j, std::size_t i) {
+        const auto at = static_cast<std::int64_t>(j);
+        return std::pair(run_at(at)[i * parts_], companion_at(at)[i * parts_]);
+    });
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
@@ -235,8 +243,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     Error error{0, false};
     double largest = 0;
     for (std::int64_t j = 0; j < comparisons; ++j) {
-        const double* const run = whole_row(kept, skipped + j);
-        const double* const companion = known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
+        const double *const run = run_at(j), *const companion = companion_at(j);
         error.relative = 0;
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;

@@ -67,12 +67,18 @@ cln::cl_R rounding_of(ExactEnergy& energy, const State& state, double steps) {
         for (const double sign : {-1.0, 1.0}) {
             std::vector<double> q = state.q;
             q[k] += sign * walk * std::sqrt(1 + steps) * a_rounding * std::fabs(q[k]);
-            if (const auto there = energy.at(q, state.v)) change = change + cln::abs(there->value - here->value);
+            if (const auto there = energy.at(q, state.v, true)) change = change + cln::abs(there->value - here->value);
         }
     return change;
 }
 
-std::string why(double step, bool too_coarse) {
+std::string why(const Scene& scene, double step, bool too_coarse) {
+    if (!scene.switches.empty())
+        return fmt::format(
+            "The Lagrangian jumps where it goes from one piece to another ({}), which no motion follows, or the step "
+            "is too long: write it so that both pieces have one value there, or try a smaller step, such as h = "
+            "{:.6g}.",
+            scene.switches.front().text, step / 2);
     if (too_coarse)
         return "Positions are so large that the potential changes its shape from one number to the next. Try to "
                "measure positions from a place nearer to the motion.";
@@ -91,7 +97,7 @@ std::int64_t mixed_number(std::int64_t number) {
 }  // namespace
 
 bool EnergyWatch::can_watch(const Outline& outline) {
-    return !outline.scene.clock && outline.scene.switches.empty() && outline.conserves_energy() &&
+    return !outline.scene.clock && outline.conserves_energy() &&
            outline.system.q.size() <= ExactEnergy::most_coordinates;
 }
 
@@ -228,7 +234,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
         error ? fmt::format("is off there by {:.2g} of the mean kinetic energy{}",
                             cln::double_approx(*error) / scale_at(state), scale_at(state) < mean ? " until then" : "")
               : "is no real number there",
-        why(request.step, too_coarse));
+        why(outline.scene, request.step, too_coarse));
 }
 
 }  // namespace lobatto

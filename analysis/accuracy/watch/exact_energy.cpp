@@ -12,15 +12,25 @@ ExactEnergy::ExactEnergy(const Outline& outline, const std::vector<double>& para
         for (const GiNaC::symbol& symbol : {system_.q[k], system_.v[k]}) formulas_.set(symbol, 0);
     }
     energy_ = formulas_.convert({energy});
+    std::vector<GiNaC::ex> switched;
+    for (const Switch& one : outline.scene.switches) {
+        sides_.push_back(one.side);
+        switched.push_back(one.value);
+    }
+    switched_ = formulas_.convert(switched);
 }
 
-std::optional<ExactEnergy::Energy> ExactEnergy::at(const std::vector<double>& q, const std::vector<double>& velocity) {
+std::optional<ExactEnergy::Energy> ExactEnergy::at(const std::vector<double>& q, const std::vector<double>& velocity,
+                                                   bool same_sides) {
     const auto energy_with = [&](bool moving) -> std::optional<Sized> {
         for (std::size_t k = 0; k < q.size(); ++k) {
             formulas_.set(system_.q[k], float_of(GiNaC::numeric(q[k])));
             formulas_.set(system_.v[k], float_of(GiNaC::numeric(moving ? velocity[k] : 0.0)));
         }
         try {
+            if (moving && !same_sides)  // at rest they are where the motion is
+                for (std::size_t i = 0; i < sides_.size(); ++i)
+                    formulas_.set(sides_[i], cln::minusp(formulas_.evaluate({switched_[i]}).front()) ? -1 : 1);
             return formulas_.evaluate_sized(energy_).front();
         } catch (const DomainError&) {
             return std::nullopt;

@@ -191,6 +191,12 @@ void ConstrainedStart::keep_velocities() {
         for (std::size_t k = 0; k < system_.v.size(); ++k)
             start_.set(system_.v[k], start_.get(system_.v[k]) - step.vector[k]);
     }
+    // What constraints take away wholly is 0, not the rounding that is left of it.
+    const cln::cl_R nothing = largest_of(given) * power_of_ten(-30);
+    for (std::size_t k = 0; k < given.size(); ++k) {
+        const cln::cl_R value = start_.get(system_.v[k]);
+        if (value != given[k] && cln::abs(value) <= nothing) start_.set(system_.v[k], cln::cl_R(0));
+    }
     if (!off || scene_.run.assemble) return;
     refuse(*off, what,
            by_momentum ? "the velocities " + moved_text(system_.v, Numbers(given.size(), cln::cl_R(0)))

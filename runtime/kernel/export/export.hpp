@@ -165,7 +165,7 @@ struct Export {
     static void to_parts(const void* numbers, std::int64_t count, double* to) {
         for (std::int64_t i = 0; i < count; ++i) {
             real rest = in(numbers)[i];
-            const bool finite = is_finite(rest);
+            const bool finite = is_finite(static_cast<double>(rest));  // the largest of its numbers are no doubles
             for (std::int32_t j = 0; j < parts; ++j) {
                 to[i * parts + j] = finite || j == 0 ? static_cast<double>(rest) : 0.0;
                 rest -= real(to[i * parts + j]);

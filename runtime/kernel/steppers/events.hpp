@@ -29,6 +29,9 @@ LOBATTO_DEVICE inline auto is_no_dip(const T* y, int i, const T& largest) {
            (after < here + here);
 }
 
+// How a step is cut: not at all; at an impact; where the motion passes a switch.
+enum class Cut { none, impact, passage };
+
 // One function of the motion, sampled over a step.
 template <class real>
 struct SampledFunction {
@@ -74,18 +77,54 @@ struct SampledFunction {
         }
         return middle;
     }
+
+    // The root between a and b, to the rounding of theta: secants, with the value of an end that stays halved (the
+    // Illinois method), and every third time the middle. None where g grows: its sign changes at a pole.
+    template <class G>
+    static real root_between(Sample a, Sample b, bool& is_root, const G& g) {
+        const real largest = fabs(a.value) < fabs(b.value) ? fabs(b.value) : fabs(a.value);
+        Sample nearest = fabs(a.value) < fabs(b.value) ? a : b;
+        real weight_a = real(1), weight_b = real(1);
+        int stays = 0;  // the end that the last secant left in place: -1 is a, 1 is b
+        for (int iteration = 1; b.theta - a.theta > rounding; ++iteration) {
+            const real left = weight_a * a.value, right = weight_b * b.value;
+            const real middle = a.theta + real(0.5) * (b.theta - a.theta);
+            real theta = iteration % 3 == 0 ? middle : b.theta - right * ((b.theta - a.theta) / (right - left));
+            if (theta < a.theta + rounding) theta = a.theta + rounding;
+            if (theta > b.theta - rounding) theta = b.theta - rounding;
+            if (!(theta > a.theta && theta < b.theta)) theta = middle;
+            const Sample there{theta, g(theta), true};
+            if (!is_finite(there.value)) break;
+            nearest = there;
+            if (there.value == real(0)) break;
+            if (changes(there.value, a.value)) {
+                b = there;
+                weight_b = real(1);
+                weight_a = stays == -1 ? real(0.5) * weight_a : real(1);
+                stays = -1;
+            } else {
+                a = there;
+                weight_a = real(1);
+                weight_b = stays == 1 ? real(0.5) * weight_b : real(1);
+                stays = 1;
+            }
+        }
+        is_root = is_finite(nearest.value) && fabs(nearest.value) <= largest;
+        return nearest.theta;
+    }
 };
 
 template <class K>
 struct Events : SampledFunction<typename K::real> {
     using real = typename K::real;
     using Sampled = SampledFunction<real>;
-    using Sampled::changes, Sampled::has_sign, Sampled::last_defined, Sampled::least_between, Sampled::rounding;
+    using Sampled::changes, Sampled::has_sign, Sampled::last_defined, Sampled::least_between, Sampled::root_between,
+        Sampled::rounding;
     using typename Sampled::Sample;
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, pieces = 2 * S::nodes;
-    static constexpr int grid_size = pieces + 3;     // the ends of pieces, and a place next to each end of the step
-    static constexpr int room = grid_size + pieces;  // samples of one function
+    static constexpr int grid_size = pieces + 3;         // the ends of pieces, and a place next to each end of the step
+    static constexpr int room = grid_size + pieces + 2;  // samples of one function
     static constexpr int columns = 1 + Between<K>::columns;
     static constexpr int most = K::events * room;  // rows of one step
     static constexpr int walls = S::walls, first_wall = K::events - walls;
@@ -121,9 +160,12 @@ struct Events : SampledFunction<typename K::real> {
     }
 
     // What happened with functions `first` ... `last` - 1 until theta in the step taken since keep: `found` places in
-    // the order of the motion, each with its number. Where a shortened step fails, its status.
-    Status find(S& stepper, int first, int last, real until) {
+    // the order of the motion, each with its number. Where a shortened step fails, its status. What is zero at a cut
+    // happens there if the step would change its sign beyond an impact; if the motion does beyond a switch, which the
+    // step from there on tells.
+    Status find(S& stepper, int first, int last, real until, Cut at = Cut::none) {
         step = &stepper;
+        cut = at;
         status = Status::ok;
         found = 0;
         knows_end[0] = knows_end[1] = false;
@@ -147,6 +189,7 @@ struct Events : SampledFunction<typename K::real> {
 private:
     S* step{};
     S* partial;  // the shortened step
+    Cut cut{};
     Status status{};
     real time{}, q[n]{}, p[n]{};
     static constexpr int basis_room = S::basis > 0 ? S::basis : 1;
@@ -257,7 +300,22 @@ private:
         make_exact(samples[sample_count - 1], e);
         decide_signs(e);
         reach_undefined(true, e);  // where the motion, not only its polynomial, leaves the domain of g
+        if (cut != Cut::none) look_at_cut(e, until);
         walk(e, until);
+    }
+
+    // A sample at the cut, and one beyond, if the step ends there.
+    void look_at_cut(int e, real until) {
+        int place = 0;
+        while (place < sample_count && samples[place].theta < until) ++place;
+        if (place < sample_count && samples[place].theta == until)
+            make_exact(samples[place], e);
+        else
+            insert(place, {until, exactly(until, e), true});
+        if (cut == Cut::impact && until == real(1)) {
+            const real beyond = real(1) + real(1) / real(pieces);
+            insert(sample_count, {beyond, on_polynomial(beyond, e), false});
+        }
     }
 
     // Where the step begins at the wall, a sample on the way that it takes before it comes back. False: it stays there.
@@ -352,7 +410,7 @@ private:
         return is_wall(e) ? fabs(sample.value) <= slack[e - first_wall] : is_rounding(sample, e);
     }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
-    // time, in which a position goes its way.
+    // time, in which a position goes its way and a velocity changes.
     bool is_rounding(const Sample& sample, int e) {
         if (!sample.is_exact) return false;
         real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
@@ -362,12 +420,17 @@ private:
         state_at(sample.theta, row);
         if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
         if (status != Status::ok) return false;
+        real place[n], begin[n], end[n];  // velocities
+        step->polynomial(real(0), place, begin);
+        step->polynomial(real(1), place, end);
         const real few = real(64) * Limits<real>::epsilon, h = fabs(step->step_size),
                    passed = fabs(row[0]) > h ? fabs(row[0]) : h;
         real change = real(0);
         for (int k = 0; k <= 2 * n; ++k) {
             real& number = k == 0 ? row[0] : k <= n ? row[k] : velocity[k - n - 1];
-            const real before = number, way = k == 0 || k > n ? real(0) : fabs(velocity[k - 1]) * passed;
+            const real before = number, way = k == 0   ? real(0)
+                                              : k <= n ? fabs(velocity[k - 1]) * passed
+                                                       : fabs(end[k - n - 1] - begin[k - n - 1]) / h * passed;
             number += few * (fabs(number) > way ? number : way);
             Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
             number = before;
@@ -380,10 +443,13 @@ private:
     // it is another: else g only touches zero. Where g is not defined in between, nothing has happened.
     void walk(int e, real until) {
         if (e < 0) __builtin_unreachable();  // what g++ would warn of
+        const auto g = [&](real theta) { return exactly(theta, e); };
         real& last = step->event_values[e];  // that is not zero
         int zero = -1, before = -1;          // samples: the first zero since the one before, which has the sign of last
         for (int i = 0; i < sample_count && status == Status::ok; ++i) {
             const Sample& here = samples[i];
+            const bool is_beyond = cut != Cut::none && here.theta > until;
+            if (is_beyond && !(cut == Cut::impact && zero >= 0)) break;
             if (!is_finite(here.value)) {
                 last = real(0);
                 zero = before = -1;
@@ -399,11 +465,12 @@ private:
                         const int from = before >= 0 ? before : 0;
                         const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
                         bool is_root = true;
-                        const real root = is_exactly ? samples[zero].theta
+                        const real root = is_beyond    ? until
+                                          : is_exactly ? samples[zero].theta
                                           : changes(samples[from].value, here.value)
-                                              ? locate(e, samples[from], here, is_root)
+                                              ? root_between(samples[from], here, is_root, g)
                                               : samples[from].theta;
-                        if (is_root && root <= until) add(e, root);
+                        if (is_root) add(e, root);
                     }
                 }
                 last = here.value;
@@ -412,40 +479,6 @@ private:
             }
         }
         step->event_begins[e] = false;
-    }
-
-    // The root between a and b, to the rounding of theta: secants, with the value of an end that stays halved (the
-    // Illinois method), and every third time the middle. None where g grows: its sign changes at a pole.
-    real locate(int e, Sample a, Sample b, bool& is_root) {
-        const real largest = fabs(a.value) < fabs(b.value) ? fabs(b.value) : fabs(a.value);
-        Sample nearest = fabs(a.value) < fabs(b.value) ? a : b;
-        real weight_a = real(1), weight_b = real(1);
-        int stays = 0;  // the end that the last secant left in place: -1 is a, 1 is b
-        for (int iteration = 1; b.theta - a.theta > rounding && status == Status::ok; ++iteration) {
-            const real left = weight_a * a.value, right = weight_b * b.value;
-            const real middle = a.theta + real(0.5) * (b.theta - a.theta);
-            real theta = iteration % 3 == 0 ? middle : b.theta - right * ((b.theta - a.theta) / (right - left));
-            if (theta < a.theta + rounding) theta = a.theta + rounding;
-            if (theta > b.theta - rounding) theta = b.theta - rounding;
-            if (!(theta > a.theta && theta < b.theta)) theta = middle;
-            const Sample there{theta, exactly(theta, e), true};
-            if (!is_finite(there.value)) break;
-            nearest = there;
-            if (there.value == real(0)) break;
-            if (changes(there.value, a.value)) {
-                b = there;
-                weight_b = real(1);
-                weight_a = stays == -1 ? real(0.5) * weight_a : real(1);
-                stays = -1;
-            } else {
-                a = there;
-                weight_a = real(1);
-                weight_b = stays == 1 ? real(0.5) * weight_b : real(1);
-                stays = 1;
-            }
-        }
-        is_root = is_finite(nearest.value) && fabs(nearest.value) <= largest;
-        return nearest.theta;
     }
 
     void add(int e, real root) {

@@ -232,7 +232,7 @@ public:
             if (status != Status::ok) go_back(stepper);
             return status;
         } else {
-            return rows == nullptr ? Status::ok : find(stepper, real(1), rows, count);
+            return rows == nullptr ? Status::ok : find(stepper, real(1), Cut::none, rows, count);
         }
     }
 
@@ -244,8 +244,8 @@ private:
     int impacts{};  // of this step
 
     // Events and stops until theta.
-    Status find(S& stepper, real until, real* rows, std::int64_t& count) {
-        Status status = events.find(stepper, 0, first_wall, until);
+    Status find(S& stepper, real until, Cut cut, real* rows, std::int64_t& count) {
+        Status status = events.find(stepper, 0, first_wall, until, cut);
         for (int i = 0; i < events.found && status == Status::ok; ++i) {
             real* const row = rows + count * columns;
             row[0] = real(events.numbers[i]);
@@ -283,11 +283,13 @@ private:
             const bool is_hit = events.found > 0;
             const real theta = is_hit ? events.thetas[0] : real(1);
             const int number = is_hit ? events.numbers[0] : -1;
+            const Cut cut = !is_hit ? Cut::none : number - first_wall < impacts_of<K>() ? Cut::impact : Cut::passage;
             if (rows != nullptr) {
-                status = find(*step, theta, rows, count);
+                status = find(*step, theta, cut, rows, count);
                 if (status != Status::ok) break;
             }
             if (!is_hit) break;
+            const KnownEvents<S> known(*step);
             real row[1 + 2 * n];
             status = events.state(theta, row);
             if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
@@ -297,9 +299,10 @@ private:
             step = rest;
             if (!(left * stepper.step_size > real(0)) || wall.time + left == wall.time) {
                 put(stepper, wall.q, wall.p, stepper.steps);
+                if (cut == Cut::passage) known.put(stepper);
                 return Status::ok;
             }
-            status = take_rest(stepper, wall, left);
+            status = take_rest(stepper, wall, left, cut == Cut::passage ? &known : nullptr);
         }
         if (status == Status::ok && step == rest) finish(stepper);
         return status;
@@ -338,11 +341,13 @@ private:
         }
     }
 
-    Status take_rest(S& stepper, const Walls<K>& wall, real left) {
+    // `known`: of the events of a motion that goes on.
+    Status take_rest(S& stepper, const Walls<K>& wall, real left, const KnownEvents<S>* known) {
         rest->parameters = stepper.parameters;
         Status status = rest->prepare(stepper.parameters, left);
         rest->tolerance = stepper.tolerance;
         if (status == Status::ok) status = rest->start(wall.time, wall.q, wall.p);
+        if (known != nullptr) known->continue_in(*rest);
         events.keep(*rest);
         if (status == Status::ok) status = rest->step();
         if constexpr (S::N > 0) stepper.iterations += rest->iterations;

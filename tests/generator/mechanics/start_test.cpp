@@ -162,3 +162,13 @@ TEST_CASE("a start is moved to the nearest that keeps the constraints, to all di
         CHECK(distance(cln::double_approx(x), cln::double_approx(y)) <= least * (1 + 1e-12));
     }
 }
+
+TEST_CASE("a velocity that the constraints take away wholly is 0") {
+    const Scene scene = read_scene(
+        Source("scene.toml",
+               "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 - y\"\n[coordinates]\nx = { position = 3, velocity = 3 }\ny = { "
+               "position = 1, velocity = 0 }\nz = { position = 0.5, velocity = 0 }\n[constraints]\na = \"x^2 + y^2 + "
+               "z^2 = 1\"\nb = \"(x - 0.5)^2 + y^2 + z^2 = 1\"\n[run]\nstep = 0.02\nuntil = 2\nassemble = true\n"));
+    const StartOnConstraints start = start_on_constraints(scene, build_system(scene));
+    for (const cln::cl_R& v : start.v) CHECK(cln::zerop(v));
+}

@@ -502,6 +502,28 @@ TEST_CASE("a program's output is taken up to its limit and not waited for when a
     CHECK_FALSE(is_running(std::stoi(left_behind.output)));
 }
 
+TEST_CASE("where children are not told of, a program is not taken for one that succeeded, and lobatto tells of them") {
+    {
+        const auto before = ::signal(SIGCHLD, SIG_IGN);
+        const auto start = std::chrono::steady_clock::now();
+        std::string said;
+        try {
+            run_process({{"/bin/false"}, "/", {}, 50});
+        } catch (const MachineError& error) {
+            said = error.what();
+        }
+        ::signal(SIGCHLD, before);
+        CHECK(said.find("is SIGCHLD ignored in this process?") != std::string::npos);
+        CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(40));
+    }
+    const test::TemporaryFolder folder;
+    const test::EnvironmentVariable own("LOBATTO_CACHE_DIR", folder / "cache");
+    const test::Finished done =
+        test::run({"env", "--ignore-signal=CHLD", LOBATTO_PROGRAM, "run", LOBATTO_SOURCE_DIR "/scenes/pendulum.toml",
+                   "--until", "1", "-o", folder / "run.csv"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+}
+
 TEST_CASE("the words of the real compiler reach the reader") {
     const KernelBuilder kernel_builder;
     const std::string message = message_of<MachineError>([] {

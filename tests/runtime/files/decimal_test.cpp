@@ -53,6 +53,7 @@ TEST_CASE("decimals have the digits that a number needs, and no more") {
     CHECK(text_of({-0.0, 0.0}) == "-0");
     CHECK(text_of({3.0, 0.0}) == "3");
     CHECK(text_of({std::numeric_limits<double>::infinity(), 0.0}) == "inf");
+    CHECK(text_of({std::nan(""), std::nan("")}) == "nan");
     CHECK(text_of(parts_of("-1.5e-40", 2)) == "-1.5e-40");
     CHECK(text_of(parts_of("6.02214076e+23", 3)) == "6.02214076e+23");
     double parts[2];

@@ -19,6 +19,7 @@ namespace {
 struct Motion {
     std::string lagrangian, start, method;
     double step, until;
+    std::string more = "";  // tables of the scene
 };
 
 // The times of each event of the list, in the order of the motion.
@@ -27,10 +28,11 @@ std::vector<std::vector<double>> times_of(const Motion& motion, const std::vecto
     const test::TemporaryFolder folder;
     std::string list;
     for (const std::string& event : events) list += fmt::format("\"{}\", ", event);
-    test::write_text(folder / "scene.toml",
-                     fmt::format("time = \"t\"\nlagrangian = \"{}\"\n[coordinates]\nx = {{ {} }}\n[method]\n{}\n"
-                                 "[run]\nstep = {}\nuntil = {}\n[output]\nevents = [{}]\n",
-                                 motion.lagrangian, motion.start, motion.method, motion.step, motion.until, list));
+    test::write_text(
+        folder / "scene.toml",
+        fmt::format("time = \"t\"\nlagrangian = \"{}\"\n[coordinates]\nx = {{ {} }}\n[method]\n{}\n"
+                    "[run]\nstep = {}\nuntil = {}\n[output]\nevents = [{}]\n{}",
+                    motion.lagrangian, motion.start, motion.method, motion.step, motion.until, list, motion.more));
     const test::Finished done = test::run(
         {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--beyond-horizon", option});
     INFO(done.err);
@@ -40,7 +42,8 @@ std::vector<std::vector<double>> times_of(const Motion& motion, const std::vecto
     for (const std::vector<double>& row : read_trajectory(folder / "run.events.csv").rows) {
         CHECK(row[1] >= before);
         before = row[1];
-        times.at(static_cast<std::size_t>(row[0]) - 1).push_back(row[1]);
+        const auto event = static_cast<std::size_t>(row[0]) - 1;
+        if (event < times.size()) times[event].push_back(row[1]);  // impacts are the last
     }
     return times;
 }
@@ -134,4 +137,48 @@ TEST_CASE("a touch of zero is no event where rounding takes the function across"
             for (std::size_t e = 0; e + 1 < times.size(); ++e) CHECK(times[e].empty());
             CHECK(times.back().size() == 6);
         }
+}
+
+// Whatever the step: events at the place where a step is cut, and touches there.
+TEST_CASE("an event where the motion goes through a switch is met once, and a touch there is none") {
+    for (const double step : {0.1, 0.25, 0.07, 0.01}) {
+        CAPTURE(step);
+        const auto crossed =
+            times_of({"x'^2/2 - max(x, 0)^2/2", "position = -1, velocity = 1", "", step, 3},
+                     {"sin(x) = 0", "x^3 = 0", "x*abs(x) = 0", "x = 0", "x = 0 rising"}, "--unmeasured");
+        for (const std::vector<double>& times : crossed) {
+            REQUIRE(times.size() == 1);
+            CHECK(std::fabs(times[0] - 1) < 1e-12);
+        }
+        // The velocity turns with the friction, at pi, 2 pi and 3 pi.
+        const auto turned = times_of(
+            {"x'^2/2 - x^2/2", "position = 3.05, velocity = 0", "", step, 9.6, "[forces]\nx = \"-0.3*sign(x')\"\n"},
+            {"x' = 0", "x' = 0 falling"}, "--unmeasured");
+        REQUIRE(turned[0].size() == 3);
+        for (std::size_t i = 0; i < 3; ++i)
+            CHECK(std::fabs(turned[0][i] - static_cast<double>(i + 1) * std::numbers::pi) < 1e-5 * step);
+        CHECK(turned[1].size() == 1);
+        // A velocity between 0 and 1/2, which it touches where the force jumps.
+        const auto touched = times_of({"x'^2/2 + sign(sin(2*pi*t))*x", "position = 0, velocity = 0", "", step, 3.2},
+                                      {"x' = 0", "x' = 0.5"}, "--unmeasured");
+        CHECK(touched[0].empty());
+        CHECK(touched[1].empty());
+    }
+}
+
+TEST_CASE("an event where a wall is happens at each impact") {
+    for (const double step : {0.1, 0.3, 0.25, 0.07, 0.01, 0.125}) {
+        CAPTURE(step);
+        const auto met =
+            times_of({"x'^2/2 - 10*x", "position = 5, velocity = 0", "", step, step * std::ceil(2.6 / step),
+                      "[impacts]\nfloor = { when = \"x = 0 falling\", restitution = 0.5 }\n"},
+                     {"x = 0", "x = 0 falling"}, "--unmeasured");
+        // Falls of 1 s, then there and back in 2/2 s, then in 2/4 s.
+        for (const std::vector<double>& times : {met[0], met[1]}) {
+            REQUIRE(times.size() == 3);
+            CHECK(std::fabs(times[0] - 1) < 1e-12);
+            CHECK(std::fabs(times[1] - 2) < 1e-12);
+            CHECK(std::fabs(times[2] - 2.5) < 1e-12);
+        }
+    }
 }

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What runs say of themselves where little moves, where a stop ends them, and where no motion follows the Lagrangian.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+test::Finished run(const std::string& scene) {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", scene);
+    return test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "out.csv"});
+}
+
+double error_in(const std::string& said) {
+    const std::string label = "measured error";
+    const std::size_t at = said.find(label);
+    return at == std::string::npos ? HUGE_VAL : std::atof(said.c_str() + at + label.size());
+}
+
+const std::string bouncing =
+    "lagrangian = \"y'^2/2 - 10*y\"\n[coordinates]\ny = { position = 5, velocity = 0 }\n[impacts]\nfloor = { when = "
+    "\"y "
+    "= 0 falling\", restitution = 0.5 }\n[run]\nstep = 0.1\nuntil = 10\n";
+
+std::string jumping(const std::string& lagrangian) {
+    return "lagrangian = \"" + lagrangian +
+           "\"\n[coordinates]\nx = { position = -1, velocity = 0.1 }\n[run]\nstep = 0.02\nuntil = 10\n";
+}
+
+}  // namespace
+
+TEST_CASE("a momentum that constraints hold at 0 tells nothing of the error, in runs and in sweeps") {
+    const std::string held =
+        "lagrangian = \"(a' + b')^2/2 + a'^2/2 + 9.81*cos(a)\"\n[coordinates]\na = { position = 1, velocity = 0.3 }\nb "
+        "= "
+        "{ position = -1, velocity = -0.3 }\n[constraints]\nlevel = \"a + b = 0\"\n[run]\nstep = 0.02\nuntil = 5\n";
+    const test::Finished alone = run(held);
+    CHECK_MESSAGE(alone.exit_code == 0, alone.err);
+    CHECK(error_in(alone.out) < 1e-10);
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", held);
+    const test::Finished swept = test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--zip", "--vary",
+                                            "a'=0.3,0.4", "--vary", "b'=-0.3,-0.4", "-o", folder / "table.csv"});
+    CHECK_MESSAGE(swept.exit_code == 0, swept.err);
+    // A plate on two parallel rods does not turn.
+    const test::Finished plate = run(
+        "lagrangian = \"-9.81*b.y\"\n[bodies]\nb = { mass = 1, inertia = 0.3, position = [0.5, -0.5], velocity = "
+        "[0.3, 0] }\n[joints]\ne = { type = \"distance\", bodies = [\"ground\", \"b\"], from = [0, 1], to = [0, -0.5] "
+        "}\nf = { type = \"distance\", bodies = [\"ground\", \"b\"], from = [1, 1], to = [1, -0.5] }\n[run]\nstep = "
+        "0.01\nuntil = 3\nassemble = true\n");
+    CHECK_MESSAGE(plate.exit_code == 0, plate.err);
+    CHECK(plate.err == "");
+    CHECK(error_in(plate.out) < 1e-11);
+}
+
+TEST_CASE("what a companion meets beyond the stop of a run is nothing of its motion") {
+    const test::Finished stopped = run(bouncing + "stop = \"y' = 0\"\n");
+    CHECK_MESSAGE(stopped.exit_code == 0, stopped.err);
+    CHECK(stopped.out.find("by 'y' = 0' at t = 1.5") != std::string::npos);
+    CHECK(error_in(stopped.out) < 1e-13);
+    CHECK(run(bouncing).exit_code == 3);  // its impacts accumulate
+}
+
+TEST_CASE("a Lagrangian that jumps has no motion there, and a run says so") {
+    for (const std::string lagrangian : {"x'^2/2 - x^4/4 - 100*if(x > 0, 1, 0)", "x'^2/2*if(x > -0.5, 1, 8)"}) {
+        CAPTURE(lagrangian);
+        const test::Finished done = run(jumping(lagrangian));
+        CHECK(done.exit_code == 3);
+        CHECK(done.err.find("The Lagrangian jumps where it goes from one piece to another (if in the Lagrangian)") !=
+              std::string::npos);
+    }
+    for (const std::string lagrangian : {"x'^2/2 - x^2*if(x > 0, 1, 4)", "x'^2/2 - abs(abs(x) - 0.5)"}) {
+        CAPTURE(lagrangian);
+        const test::Finished done = run(jumping(lagrangian));
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+    }
+}
