@@ -76,8 +76,8 @@ void describe(CommandLine& program) {
 
 }  // namespace
 
-// A closed standard stream would become the next file that is opened, and get what is told: nothing is written to it.
-// Output that goes nowhere stays an error.
+// If a standard stream is closed, the next file that is opened would get its number, and our messages. So /dev/null is
+// opened in its place, for reading only except for standard error: writing to a closed standard output stays an error.
 static void keep_streams_apart() {
     for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         if (::fcntl(descriptor, F_GETFD) < 0)

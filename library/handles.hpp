@@ -81,7 +81,7 @@ inline const char* text(const std::string* string) {
     return string == nullptr ? nullptr : string->c_str();
 }
 
-// Element `index` of a list of what may have failed.
+// Element `index` of a list; null if there is no list or no such element.
 template <class List>
 const typename List::value_type* element(const List* list, std::size_t index) {
     return list != nullptr && index < list->size() ? &(*list)[index] : nullptr;

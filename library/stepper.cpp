@@ -154,9 +154,8 @@ struct Stepper::Parts {
         if (status != LOBATTO_OK) fail(status, {});
         origin = time;
         stop_ahead.reset();
-        std::erase_if(found, [&](const EventHit& hit) { return is_before(time, hit.t); });
+        std::erase_if(found, [&](const EventHit& hit) { return time < hit.t; });
     }
-    bool is_before(double a, double b) const { return step > 0 ? a < b : a > b; }
 
     // Parameters from `first` on; where the kernel refuses them, those of before.
     void change(std::size_t first, const std::vector<double>& values) {
@@ -188,7 +187,7 @@ struct Stepper::Parts {
     bool advance(std::int64_t steps, double arrival = 0) {
         lobatto_advance call{};
         call.tolerance = kernel.parts().start.tolerance;
-        call.interval = std::copysign(std::numeric_limits<double>::infinity(), step);
+        call.interval = std::numeric_limits<double>::infinity();
         call.end = arrival;
         lobatto_status status = LOBATTO_OK;
         for (std::int64_t done = 0; done < steps && status == LOBATTO_OK; done += call.steps_done) {
@@ -200,7 +199,7 @@ struct Stepper::Parts {
             status = stepper.advance(call);
             keep_events(call.events_written);
             taken += call.steps_done;
-            if (status == LOBATTO_STOPPED && is_clocked() && is_before(arrival, found.back().t)) {
+            if (status == LOBATTO_STOPPED && is_clocked() && arrival < found.back().t) {
                 stop_ahead = found.back();
                 status = LOBATTO_OK;
             }
@@ -227,18 +226,18 @@ struct Stepper::Parts {
     bool is_clocked() const { return stepper.kernel()->clocked != 0; }
 
     bool arrive_at(double t) {
-        return stop_ahead && !is_before(t, stop_ahead->t) ? stop_at(EventHit(*stop_ahead)) : advance(1, t);
+        return stop_ahead && stop_ahead->t <= t ? stop_at(EventHit(*stop_ahead)) : advance(1, t);
     }
     // The next of the scene's times.
     double next_arrival() const {
         const double interval = kernel.parts().start.arrivals.interval;
         const double number = std::floor((time - origin) / interval) + 1, next = origin + number * interval;
-        return is_before(time, next) ? next : origin + (number + 1) * interval;
+        return time < next ? next : origin + (number + 1) * interval;
     }
     bool arrive(std::int64_t times) {
         for (std::int64_t i = 0; i < times; ++i) {
             const double next = next_arrival();
-            if (!is_before(time, next)) fail(LOBATTO_TIME_STANDS_STILL, {});
+            if (next <= time) fail(LOBATTO_TIME_STANDS_STILL, {});
             if (!arrive_at(next)) return false;
         }
         return true;
@@ -246,7 +245,7 @@ struct Stepper::Parts {
 
     bool advance_to(double t) {
         if (!std::isfinite(t)) throw InputError(fmt::format("advance_to: {} is no time", t));
-        if (is_before(t, time))
+        if (t < time)
             throw InputError(fmt::format(
                 "advance_to: the motion is at t = {:.17g} already, beyond {:.17g}; start() goes to another place", time,
                 t));
@@ -430,7 +429,7 @@ void Stepper::set_inputs(const double* values) {
 std::vector<EventHit> Stepper::take_events() {
     Parts& parts = *parts_;
     const auto ahead = std::stable_partition(parts.found.begin(), parts.found.end(),
-                                             [&](const EventHit& hit) { return !parts.is_before(parts.time, hit.t); });
+                                             [&](const EventHit& hit) { return hit.t <= parts.time; });
     std::vector<EventHit> taken(parts.found.begin(), ahead);
     parts.found.erase(parts.found.begin(), ahead);
     return taken;

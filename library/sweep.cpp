@@ -116,7 +116,7 @@ OpenedSweep open_sweep(const Scene& scene, const StartsRequest& starts, const Sw
         wish.threads = options.threads;
         wish.measures = options.measure;
         wish.beyond_horizon = options.beyond_horizon;
-        OpenedSweep made(new SweepStudy(std::move(read), starts, wish, &algebra()));
+        OpenedSweep made(new SweepStudy(std::move(read), starts, wish, algebra()));
         refuse_both(options, made->starts());
         return made;
     });

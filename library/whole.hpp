@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What is found, written, measured, chosen and proved of a scene, with all that is known of it: lobatto.hpp hands out
-// what is worth a promise, the command line prints the rest too. Both come here, so there is one way.
+// Everything that is computed of a scene. lobatto.hpp returns the part whose interface stays stable; the command line
+// prints the rest too. Both call these functions, so each operation exists once.
 //
 // These throw what the parts of the program throw; callers stand in in_algebra() or guarded() (parts.hpp).
 #pragma once

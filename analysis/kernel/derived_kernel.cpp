@@ -19,7 +19,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Everything that the kernel's text depends on. Two scenes with the same text may differ in what was set since.
+// Everything that the kernel's text depends on. The text of the file is not enough: the method and the outputs may have
+// been changed after it was read.
 std::string key_of(const Scene& scene, const KernelWish& wish) {
     std::string key =
         fmt::format("program: {}\nname: {}\nnumbers: {}, general: {}, wants energy: {}\n", build_id(), scene.name,

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
+#include <optional>
 #include <sstream>
 
 #include "analysis/kernel/kernel_of.hpp"
@@ -12,6 +12,7 @@
 #include "generator/emit/support.hpp"
 #include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
+#include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 
@@ -24,11 +25,9 @@ std::string stem_of(const Compiled& compiled) {
 }
 
 std::string content_of(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream content;
-    content << file.rdbuf();
-    if (!file) throw MachineError("cannot read " + path + "; delete it, and it is compiled again");
-    return content.str();
+    const std::optional<std::string> content = read_whole(path);
+    if (!content) throw MachineError("cannot read " + path + "; delete it, and it is compiled again");
+    return *content;
 }
 
 // Formulas are for the device too. In emitted text these lines are theirs alone.

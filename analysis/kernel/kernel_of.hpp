@@ -11,7 +11,7 @@
 namespace lobatto {
 
 // The whole translation unit of a kernel: the support headers, the emitted header, the export.
-// `together` > 0: with what ensembles need of which a thread has so many trajectories; that takes longer to compile.
+// `together` > 0: with ensembles, for so many trajectories on each thread; that takes longer to compile.
 // `refilled`: of trajectories that end at times of their own, or are looked at after every step.
 Translation translation_of(const KernelSource& source, Precision precision, std::int64_t together = 0,
                            bool refilled = false);

@@ -33,11 +33,11 @@ bool is_family(Role role) {
 
 }  // namespace
 
-SweepStarts::SweepStarts(const Scene& scene, const StartsRequest& request, std::recursive_mutex* algebra)
+SweepStarts::SweepStarts(const Scene& scene, const StartsRequest& request, std::recursive_mutex& algebra)
     : scene_(scene),
       seed_(request.seed),
       parts_(static_cast<std::size_t>(lobatto::parts_of(scene.method.numbers))),
-      algebra_(algebra == nullptr ? &own_ : algebra) {
+      algebra_(algebra) {
     std::vector<Axis> axes;
     for (const std::string& argument : request.vary) axes.push_back(read_axis(scene, argument));
     add_axes(axes, request.zip, true);
@@ -195,7 +195,7 @@ double SweepStarts::value(std::int64_t trajectory, std::size_t column) const {
     // The same starts for each setting, so that settings can be compared.
     if (values.draw) return values.draw->value(seed_, trajectory % of_setting_);
     const std::int64_t at = place(trajectory, column);
-    return values.axis ? (*values.axis)(at, *algebra_) : values.listed[static_cast<std::size_t>(at)];
+    return values.axis ? (*values.axis)(at, algebra_) : values.listed[static_cast<std::size_t>(at)];
 }
 
 GiNaC::numeric SweepStarts::exact(std::int64_t trajectory, std::size_t column) const {
@@ -257,7 +257,7 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
         start.whole_rate = as_parts(start.rate, parts_);
         return;
     }
-    const std::lock_guard lock(*algebra_);
+    const std::lock_guard lock(algebra_);
     Exact to_all_digits = exact_base_;
     std::vector<GiNaC::ex> parameters;
     for (const Parameter& parameter : scene_.parameters) parameters.push_back(parameter.value);

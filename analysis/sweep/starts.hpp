@@ -39,7 +39,7 @@ class SweepStarts {
 public:
     // `scene` outlives it. `algebra` guards formulas, which are not made for several threads, where others evaluate
     // some at the same time. Throws InputError.
-    SweepStarts(const Scene& scene, const StartsRequest& request, std::recursive_mutex* algebra = nullptr);
+    SweepStarts(const Scene& scene, const StartsRequest& request, std::recursive_mutex& algebra);
 
     // What varies, in the order of the columns of a table.
     struct Column {
@@ -56,8 +56,8 @@ public:
     // The scene with the settings of this trajectory.
     Scene with_settings(Scene scene, std::int64_t trajectory) const;
     // Parameters, positions and rates of a trajectory; formulas of the scene that hold a varied parameter follow it.
-    // What has no value is not a number, nor is the first position where a parameter has a value that the scene
-    // refuses. Thread-safe.
+    // A value that does not exist is NaN. If the scene refuses the value of a parameter, the first position is NaN.
+    // Thread-safe.
     void start(std::int64_t trajectory, EnsembleStart& start) const;
 
     // "q = 0.5, omega = 2", or the settings among them
@@ -114,8 +114,7 @@ private:
     std::vector<Dependent> dependents_;
     std::vector<Required> required_;
     std::optional<System> assembled_;  // of a scene whose starts are moved onto its constraints
-    mutable std::recursive_mutex own_;
-    std::recursive_mutex* algebra_;
+    std::recursive_mutex& algebra_;
 };
 
 }  // namespace lobatto

@@ -32,7 +32,8 @@ std::int64_t prime_from(std::int64_t number) {
     return number;
 }
 
-// How often states are kept: as often as is asked for, and some 61 times for the companions to be compared with.
+// After how many steps a state is kept: as often as the user asks for, and about 61 times in all if companions are
+// compared.
 std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures) {
     constexpr std::int64_t comparisons = 61, most_tried = 1000;  // no part of times that one writes
     if (!measures || steps == 0) return every;
@@ -82,8 +83,8 @@ void StudyTimes::add(const StudyTimes& more) {
 }
 
 SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options,
-                       std::recursive_mutex* algebra)
-    : as_written_(std::move(scene)), options_(options), algebra_(algebra == nullptr ? own_.get() : algebra) {
+                       std::recursive_mutex& algebra)
+    : as_written_(std::move(scene)), options_(options), algebra_(algebra) {
     if (!as_written_.outputs.kept.empty() && options.overrides.every)
         throw InputError("--every: what is kept of a trajectory is one row; leave out --every, or --keep");
     check_numbers(as_written_);
@@ -124,7 +125,7 @@ void SweepStudy::choose_device() {
     } catch (const InputError&) {    // no lanes
     }
     device_ = nullptr;
-    const std::lock_guard lock(*algebra_);
+    const std::lock_guard lock(algebra_);
     first_ = prepare(0);
 }
 
@@ -132,7 +133,7 @@ void SweepStudy::put_on_device(Setting& setting) const {
     if (!device_) return;
     WatchedLanes watched;
     {
-        const std::lock_guard lock(*algebra_);
+        const std::lock_guard lock(algebra_);
         watched.events = !scene_.watched().empty() && (setting.request.stops || setting.request.reducer);
         if (!scene_.outputs.kept.empty()) watched.kept = Reductions(scene_).text();
     }
@@ -222,14 +223,13 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
 
 void SweepStudy::enter(std::int64_t number) {
     if (current_ && current_->number == number) return;
-    const std::lock_guard lock(*algebra_);
+    const std::lock_guard lock(algebra_);
     note_warning();
     judges_.reset();
     current_ = prepare(number);
     const Setting& setting = *current_;
     judges_.emplace(setting.scene, *setting.outline, *setting.plain_source, *setting.plain, *setting.kernel,
-                    setting.request, options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon,
-                    *algebra_);
+                    setting.request, options_.measures, options_.beyond_horizon || scene_.run.beyond_horizon, algebra_);
 }
 
 StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink& sink,

@@ -45,8 +45,7 @@ class SweepStudy {
 public:
     // `scene` with its method and what it keeps, as read; `options` are applied here. Compiles the kernel of the first
     // setting. InputError where something makes no sense; MachineError where a device is asked for and cannot be had.
-    SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options,
-               std::recursive_mutex* algebra = nullptr);
+    SweepStudy(Scene scene, const StartsRequest& starts, const StudyOptions& options, std::recursive_mutex& algebra);
     // StudyDevice::automatic: takes the faster of processor and device, after trials in several threads. The caller
     // must not hold `algebra`, for which they wait.
     void choose_device();
@@ -82,7 +81,7 @@ public:
 
     // Of trajectories first, ..., last - 1; for the progress.
     double steps_of(std::int64_t first, std::int64_t last) const;
-    // The sweep as text: two sweeps of which this is the same have the same rows.
+    // A text that identifies the sweep: two sweeps with the same text have the same rows.
     std::string identity() const;
 
 private:
@@ -95,8 +94,7 @@ private:
 
     Scene as_written_, scene_;
     StudyOptions options_;
-    std::unique_ptr<std::recursive_mutex> own_ = std::make_unique<std::recursive_mutex>();
-    std::recursive_mutex* algebra_;  // formulas in more than one thread: one at a time
+    std::recursive_mutex& algebra_;  // formulas in more than one thread: one at a time
     std::unique_ptr<SweepStarts> starts_;
     std::unique_ptr<SweepRows> rows_;
     struct Derived {

@@ -30,9 +30,9 @@ public:
     KernelBuilder& operator=(const KernelBuilder&) = delete;
 
     const Derivation& derivation(StepClock clock = StepClock::none) const { return derivations_.at(clock); }
-    // Whether steps of the scene may be by this member; equal ones by it may serve references all the same.
+    // Whether the search may take this member for the scene. A reference may take it with equal steps even if not.
     bool allows(const Member& member) const;
-    std::vector<StepClock> clocks() const;  // that it allows, but none
+    std::vector<StepClock> clocks() const;  // all that are allowed, without StepClock::none
     void forget(StepClock clock) { allowed_.erase(clock); }
     unsigned threads() const { return static_cast<unsigned>(workers_.size()); }
 

@@ -68,7 +68,7 @@ void keep_foreign(const std::string& path) {
     file.read(begin.data(), static_cast<std::streamsize>(looked_at));
     begin.resize(static_cast<std::size_t>(file.gcount()));
     std::transform(begin.begin(), begin.end(), begin.begin(), [](unsigned char c) { return std::tolower(c); });
-    // Files that can name nobody are replaced by files of their kind.
+    // Binary files do not name the program that wrote them: files of these formats may be overwritten.
     const bool names_nobody = begin.starts_with("\x93numpy") || begin.starts_with("\x89hdf") ||
                               begin.starts_with("\x89png") || begin.starts_with("gif8") || begin.find("ftyp") == 4;
     if (!begin.empty() && begin.find("lobatto") == std::string::npos && begin.find("gnuplot") == std::string::npos &&

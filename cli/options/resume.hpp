@@ -12,7 +12,7 @@
 
 namespace lobatto {
 
-// What a run is: two runs of which this is the same have the same bytes. `object`: the compiled kernel.
+// A text that identifies a run: two runs with the same text have the same bytes. `object`: the compiled kernel.
 std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader& header, const std::string& object);
 
 inline std::string checkpoint_path(const std::string& trajectory) {

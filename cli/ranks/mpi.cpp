@@ -17,7 +17,7 @@ namespace lobatto {
 
 namespace {
 
-// A wait costs a processor next to nothing: MPI's own would turn in a loop.
+// Sleeping takes hardly any processor time; MPI's own wait is a busy loop.
 constexpr std::chrono::microseconds shortest_moment{100}, longest_moment{10000};
 
 class MpiRanks : public Ranks {

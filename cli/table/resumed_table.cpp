@@ -90,7 +90,7 @@ std::optional<ResumedTable> resume_table(const std::string& path, TableFormat fo
     // A process that was killed before it had written a row leaves nothing.
     const std::size_t least = format == TableFormat::csv ? csv_head(head).size() : npy_head(head.columns, 0).size();
     if (is_there(partial, least)) {
-        // One that was killed at its very end has given what it says of itself its last name already.
+        // A process that was killed just before its end has already renamed NAME.partial.json to NAME.json.
         const std::string json = (is_there(partial + ".json", 0) ? partial : path) + ".json";
         TableReader reader(partial, format == TableFormat::h5 ? TableFormat::npy : format, json);
         require_same(partial, reader.head(), head);

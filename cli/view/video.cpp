@@ -36,6 +36,7 @@ ProcessResult run_into(const std::string& output, const std::string& folder, std
     request.arguments.insert(request.arguments.end(), command.begin(), command.end());
     request.folder = folder;
     request.seconds_limit = longest_work;
+    request.interrupted = Interruption::flag();
     ProcessResult result = run_process(request);
     if (*Interruption::flag() != 0) throw ExitCode{interrupted_exit};
     return result;

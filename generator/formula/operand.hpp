@@ -57,7 +57,6 @@ public:
 class Work {
 public:
     void spend(double operations);  // throws Refusal
-    bool affords(double operations) const { return operations <= left_; }
 
 private:
     double left_ = ExpressionLimits::operations;

@@ -10,8 +10,8 @@
 
 namespace lobatto {
 
-// Decimal digits of every computation on constants: 60, once numbers of more digits than that were asked for as many as
-// these need, from then on in the whole process.
+// Decimal digits of every computation on constants. 60 at first; once numbers with more digits were asked for, as many
+// as those need, until the process ends.
 int working_digits();
 void need_digits(int digits);  // before anything is computed that is to have so many
 

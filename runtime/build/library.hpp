@@ -82,12 +82,12 @@ public:
     std::vector<real> momentum(real time, const std::vector<real>& q, const std::vector<real>& velocity) const;
     lobatto_status velocity(real time, const std::vector<real>& q, const std::vector<real>& p,
                             std::vector<real>& velocity) const;
-    // Lv = dL/dq' and Lq = dL/dq + forces, n each.
     // phi, dphi/dt at fixed q, and dphi/dq, row by row: of kernels with constraints.
     void constraint(real time, const std::vector<real>& q, std::vector<real>& phi, std::vector<real>& phi_t,
                     std::vector<real>& G) const;
     lobatto_status multipliers(real time, const std::vector<real>& q, const std::vector<real>& p,
                                std::vector<real>& lambda) const;
+    // Lv = dL/dq' and Lq = dL/dq + forces, n each.
     void slopes(real time, const std::vector<real>& q, const std::vector<real>& velocity, std::vector<real>& Lv,
                 std::vector<real>& Lq) const;
     lobatto_status residual(real time, const std::vector<real>& q, const std::vector<real>& p,

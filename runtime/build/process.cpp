@@ -141,7 +141,8 @@ ProcessResult run_process(const ProcessRequest& request) {
     siginfo_t ended{};
     while (ended.si_pid == 0) {
         result.timed_out = Clock::now() >= deadline;
-        result.abandoned = request.abandoned != nullptr && *request.abandoned;
+        result.abandoned = (request.abandoned != nullptr && *request.abandoned) ||
+                           (request.interrupted != nullptr && *request.interrupted != 0);
         if (result.timed_out || result.abandoned) ::kill(-pid, SIGKILL);
         // The output ends together with the process, unless one of the two is strange: then look again every 100 ms or
         // every 1 ms.

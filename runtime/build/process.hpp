@@ -14,7 +14,9 @@ struct ProcessRequest {
     std::string folder;                                            // where it runs
     std::vector<std::pair<std::string, std::string>> environment;  // set in addition to ours
     double seconds_limit = 120;
-    const std::atomic<bool>* abandoned = nullptr;  // true: nobody waits for it any longer, so it is ended
+    // True, or not 0: nobody waits for it any longer, so it is ended.
+    const std::atomic<bool>* abandoned = nullptr;
+    const volatile int* interrupted = nullptr;
 };
 
 struct ProcessResult {

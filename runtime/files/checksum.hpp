@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tells bytes that were altered, by chance or by hand, at a cost that is nothing beside writing them. It is no seal
-// against forgers; that is SHA-256.
+// A checksum that detects altered bytes, and takes hardly any time beside writing them. It gives no protection against
+// forgery; SHA-256 does.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A new folder for files of the moment, under a name that no text of others is part of; goes with its contents.
+// A new temporary folder, removed with its content by the destructor. Its name contains no text of a user.
 #pragma once
 
 #include <cerrno>

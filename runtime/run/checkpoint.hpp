@@ -22,9 +22,10 @@ struct Checkpoint {
 // Appears whole or not at all, and is on the disk before the one of before goes. MachineError as PartialFile.
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 
-// Nothing when there is none. MachineError when it is damaged, or another user could have written it: what is in it
-// goes into the kernel's memory.
+// Whether a file begins as a checkpoint does: with a checksum on a line of its own.
 bool is_checkpoint(const std::string& path);
+// Nothing if there is no file. MachineError if the file is damaged, or if another user could have written it: its
+// content is copied into the kernel's memory.
 std::optional<Checkpoint> read_checkpoint(const std::string& path);
 
 // The first line in which `ours` differs from what stands in the checkpoint, for an error; empty when none does.

@@ -24,8 +24,9 @@ struct Reason {
 // At the start, or on the way.
 Reason off_constraints(bool on_the_way) {
     if (on_the_way)
-        return {"the reset of an impact leads to positions or momenta that do not keep the constraints",
-                "a reset that keeps them, or a restitution, which does"};
+        return {"the motion goes on from an impact, or beyond a switch, with positions or momenta that do not keep the "
+                "constraints: a reset leads elsewhere, or the constraints have a corner there",
+                "a reset that keeps them, a restitution, which does, or constraints without corners"};
     return {"the start does not keep the constraints, or is behind a wall",
             "positions and velocities that keep them, or assemble = true under [run] of a scene with constraints"};
 }

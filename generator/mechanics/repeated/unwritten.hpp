@@ -25,8 +25,8 @@ struct Unwritten {
     std::vector<Element> elements;  // terms of -L that hold positions and parameters only
     // Where their sum has second derivatives, row by row. Each changes with the positions.
     std::vector<std::pair<int, int>> places;
-    // For each place a position that it changes with and that only one term of the sum there holds: whatever does not
-    // hold it cannot take that away.
+    // For each place a position on which its second derivative depends, and which only one term of the sum there holds.
+    // So the other terms cannot cancel this dependence.
     std::vector<int> witnesses;
 
     bool empty() const { return elements.empty(); }

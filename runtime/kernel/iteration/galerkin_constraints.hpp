@@ -17,17 +17,38 @@ struct GalerkinConstraints : GalerkinNewton<K> {
     using typename Newton::real, typename Newton::Arrays;
     static constexpr int multiplier_room = constraints > 0 ? constraints : 1;
 
+private:
+    struct Masses {
+        real of[K::mass_entries > 0 ? K::mass_entries : 1];
+    };
+    template <class Use>
+    static void each_mass(const Masses& M, const Use& use) {
+        for (int e = 0; e < K::mass_entries; ++e)
+            if (K::mass_row[e] == K::mass_column[e] && M.of[e] != real(0)) use(K::mass_row[e], fabs(M.of[e]));
+    }
+    // How far positions go in a step; one that a constraint holds fixed, as far as the others, in the metric of the
+    // mass.
+    void way_in_step(const real& time, const real* at, const real* v, real* way, Masses& M) const {
+        real momentum_there[n], moved = real(0);  // sum M_kk (h v_k)^2
+        Formulas<K>::legendre(coefficients, time, at, v, momentum_there, M.of);
+        each_mass(M, [&](int k, real mass) { moved += mass * (step_size * v[k]) * (step_size * v[k]); });
+        for (int k = 0; k < n; ++k) way[k] = fabs(step_size * v[k]);
+        each_mass(M, [&](int k, real mass) { way[k] += sqrt(moved / mass); });
+    }
+
 protected:
     // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers.
     Status check_constraints(const real* v, const real* mu) const {
         if constexpr (constraints > 0) {
-            real phi[constraints], phi_t[constraints], G[K::constraint_entries], size[constraints], force[n];
+            real phi[constraints], phi_t[constraints], G[K::constraint_entries], size[constraints], force[n], way[n];
+            Masses M;
             Formulas<K>::constraint(coefficients, this->time(), q, phi, phi_t, G);
+            way_in_step(this->time(), q, v, way, M);
             for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
             for (int k = 0; k < n; ++k) force[k] = real(0);
             for (int e = 0; e < K::constraint_entries; ++e) {
                 const int c = K::constraint_row[e], k = K::constraint_column[e];
-                size[c] += fabs(G[e]) * (fabs(q[k]) + fabs(step_size * v[k]));
+                size[c] += fabs(G[e]) * (fabs(q[k]) + way[k]);
                 force[k] += G[e] * mu[c];
             }
             for (int c = 0; c < constraints; ++c)
@@ -43,22 +64,15 @@ protected:
     }
 
     // Whether positions at the end of the stages just solved keep the constraints, to half of the digits of the
-    // positions, of the way, and of how far the forces of the step move them; of one that a constraint holds fixed, of
-    // the way of the others, in the metric of the mass.
+    // positions, of the way, and of how far the forces of the step move them.
     bool keeps_constraints(const real* q1, const real* v, const real* phi, const real* phi_t, const real* G,
                            const Arrays& a) const {
-        real size[multiplier_room], reach[n], momentum_there[n], M[K::mass_entries > 0 ? K::mass_entries : 1];
+        real size[multiplier_room], reach[n];
+        Masses M;
         for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
-        for (int k = 0; k < n; ++k) reach[k] = fabs(q[k]) + fabs(q1[k]) + fabs(step_size * v[k]);
-        Formulas<K>::legendre(coefficients, this->next_time(), q1, v, momentum_there, M);
-        real moved = real(0);  // sum M_kk (h v_k)^2
-        const auto each_mass = [&](const auto& use) {
-            for (int e = 0; e < K::mass_entries; ++e)
-                if (K::mass_row[e] == K::mass_column[e] && M[e] != real(0)) use(K::mass_row[e], fabs(M[e]));
-        };
-        each_mass([&](int k, real mass) { moved += mass * (step_size * v[k]) * (step_size * v[k]); });
-        each_mass([&](int k, real mass) {
-            reach[k] += sqrt(moved / mass);
+        way_in_step(this->next_time(), q1, v, reach, M);
+        for (int k = 0; k < n; ++k) reach[k] += fabs(q[k]) + fabs(q1[k]);
+        each_mass(M, [&](int k, real mass) {
             for (int b = 0; b < active; ++b)
                 for (int i = 0; i < r && K::active_index[b] == k; ++i)
                     reach[k] += fabs(step_size * (step_size * K::b[i] * a.g[i * Z + active + b]) / mass);

@@ -174,8 +174,8 @@ struct CleanFixedPoint {
     }
 
     // What the positions of a step are made of before any iteration, and the measures of changes. W: the accelerations
-    // of the step before. What a coordinate that hardly moves gets from its neighbours' rounding is much by its own
-    // measure.
+    // of the step before. For a coordinate that hardly moves, the rounding of its neighbours is large beside its own
+    // motion.
     void set_out(const real* q, const real* u, const real* u_rest, const real* W, Arrays& a) const {
         if constexpr (m == 0) return;
         real largest_scale = real(0);

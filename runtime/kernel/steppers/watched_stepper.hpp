@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // A stepper whose motion is watched: states between its steps, and what is known of its events and walls.
 //
-// Of the K::events functions the last are walls (impacts.hpp), on one side of which the motion is until it meets them;
-// values that are rounding there are zero. Of these K::impacts throw it back, and K::switches, the very last, change
-// its formulas: their sides, 1 or -1, are the last parameters. The K::stops before the walls end the motion. impact(k,
-// q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not below 0,
-// reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
+// K::events functions are watched: first events, then the K::stops, which end the motion, then walls (impacts.hpp). The
+// motion stays on one side of a wall until it meets it; a value that is only rounding counts as zero. K::impacts walls
+// throw the motion back. The last K::switches walls change its formulas; their sides, 1 or -1, are the last parameters.
+// impact(k, q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not
+// below 0, reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
 #ifndef LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 #define LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 

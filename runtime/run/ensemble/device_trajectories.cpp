@@ -188,7 +188,8 @@ void DeviceTrajectories::launch(std::int64_t begin) {
     queue_.download(progress_.data(), there_.steps, bytes_of_words(3));
 }
 
-// Where steps are looked at, such lanes stay behind the others until all have to arrive.
+// If each step is looked at, a lane that had to wait for the host is behind the others. It catches up only in a call at
+// whose end all lanes must have arrived.
 void DeviceTrajectories::advance(const EnsembleRequest& request, std::int64_t steps, std::int32_t* status,
                                  std::int64_t* steps_done, std::int64_t* iterations) {
     const std::vector<std::int64_t> steps_before(steps_.begin(), steps_.end()),

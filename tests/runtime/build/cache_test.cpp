@@ -491,6 +491,15 @@ TEST_CASE("a program that does not finish is ended, with everything it started")
     CHECK_FALSE(is_running(std::stoi(result.output.substr(6))));
 }
 
+TEST_CASE("a program that nobody waits for any longer is ended") {
+    const auto start = std::chrono::steady_clock::now();
+    ProcessRequest request{{"/bin/sleep", "60"}, "/", {}, 50};
+    const volatile int interrupted = 1;
+    request.interrupted = &interrupted;
+    CHECK(run_process(request).abandoned);
+    CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(40));
+}
+
 TEST_CASE("a program's output is taken up to its limit and not waited for when a child keeps it open") {
     const ProcessResult result =
         run_process({{"/bin/sh", "-c", "yes | head -c 3000000; sleep 60 & exit 7"}, "/", {}, 50});
