@@ -88,9 +88,9 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             return off_constraints(result.started);
         case LOBATTO_IMPACTS_ACCUMULATE:
             why =
-                "impacts accumulate within this step, more than 100 of them or nearer to one another than can be told "
-                "apart: the motion comes to rest on a wall, or slides along it, and walls throw back only; or friction "
-                "holds it fast, and formulas that are not smooth are known on their two sides only";
+                "impacts accumulate within this step: more than 100 of them, or nearer to one another than can be told "
+                "apart. The motion comes to rest on a wall, slides along it, or is held fast by friction; none of these "
+                "is computed";
             advice = "an end before that time, a stop under [run] where the motion has become slow, or " + smaller +
                      " where many impacts belong into a step";
             break;

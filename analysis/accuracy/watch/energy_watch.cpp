@@ -73,12 +73,14 @@ cln::cl_R rounding_of(ExactEnergy& energy, const State& state, double steps) {
 }
 
 std::string why(const Scene& scene, double step, bool too_coarse) {
-    if (!scene.switches.empty())
+    const auto jump = std::find_if(scene.switches.begin(), scene.switches.end(),
+                                   [&](const Switch& one) { return scene.lagrangian.has(one.side); });
+    if (jump != scene.switches.end())
         return fmt::format(
             "The Lagrangian jumps where it goes from one piece to another ({}), which no motion follows, or the step "
             "is too long: write it so that both pieces have one value there, or try a smaller step, such as h = "
             "{:.6g}.",
-            scene.switches.front().text, step / 2);
+            jump->text, step / 2);
     if (too_coarse)
         return "Positions are so large that the potential changes its shape from one number to the next. Try to "
                "measure positions from a place nearer to the motion.";

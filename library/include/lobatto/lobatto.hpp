@@ -378,7 +378,8 @@ public:
     const std::vector<int>& status() const;  ///< 0: it goes on; else as in Sweep
     const double* q() const;                 ///< count x n; the same place for as long as the ensemble lives
     const double* p() const;
-    /// A parameter or an input, a value for each trajectory, from the next step on.
+    /// A parameter or an input, a value for each trajectory, from the next step on. InputError, and nothing changes,
+    /// where one of them is a value that the scene refuses.
     void set(const std::string& name, const double* values);
 
 private:
