@@ -24,9 +24,10 @@ struct Reason {
 // At the start, or on the way.
 Reason off_constraints(bool on_the_way) {
     if (on_the_way)
-        return {"the motion goes on from an impact, or beyond a switch, with positions or momenta that do not keep the "
-                "constraints: a reset leads elsewhere, or the constraints have a corner there",
-                "a reset that keeps them, a restitution, which does, or constraints without corners"};
+        return {
+            "the motion goes on from an impact, or beyond a switch, with positions or momenta that do not keep the "
+            "constraints: a reset leads elsewhere, or the constraints have a corner there",
+            "a reset that keeps them, a restitution, which does, or constraints without corners"};
     return {"the start does not keep the constraints, or is behind a wall",
             "positions and velocities that keep them, or assemble = true under [run] of a scene with constraints"};
 }
@@ -89,7 +90,8 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
         case LOBATTO_IMPACTS_ACCUMULATE:
             why =
                 "impacts accumulate within this step: more than 100 of them, or nearer to one another than can be told "
-                "apart. The motion comes to rest on a wall, slides along it, or is held fast by friction; none of these "
+                "apart. The motion comes to rest on a wall, slides along it, or is held fast by friction; none of "
+                "these "
                 "is computed";
             advice = "an end before that time, a stop under [run] where the motion has become slow, or " + smaller +
                      " where many impacts belong into a step";
