@@ -3,7 +3,7 @@
 set(parts base/numbers.hpp base/many_digits.hpp base/registers.hpp base/pack.hpp base/functions.hpp base/trigonometry.hpp base/exponential.hpp base/arc.hpp base/spline.hpp base/double_double.hpp base/double_double_functions.hpp base/angles.hpp base/full_matrix.hpp base/contract.hpp base/dense.hpp base/grouped.hpp base/shifts.hpp base/rows.hpp
     iteration/tangent.hpp iteration/convergence.hpp iteration/stage_coefficients.hpp iteration/stage_equations.hpp iteration/newton.hpp iteration/stage_map.hpp iteration/fixed_point.hpp iteration/refinement.hpp
     iteration/neighbours.hpp iteration/constrained_fixed_point.hpp iteration/node_mass.hpp iteration/hamilton.hpp iteration/galerkin_tables.hpp iteration/galerkin.hpp iteration/galerkin_equations.hpp iteration/galerkin_newton.hpp iteration/galerkin_constraints.hpp iteration/velocity_of_momentum.hpp iteration/ensemble_tables.hpp iteration/ensemble_fixed_point.hpp steppers/linear.hpp steppers/separable.hpp
-    steppers/clean.hpp steppers/splitting.hpp steppers/general.hpp steppers/shortened.hpp steppers/clocked.hpp steppers/ensemble.hpp steppers/clocked_lanes.hpp steppers/watched_stepper.hpp steppers/events.hpp steppers/impacts.hpp steppers/lent_steps.hpp steppers/refilled.hpp steppers/inputs.hpp)
+    steppers/clean.hpp steppers/splitting.hpp steppers/general.hpp steppers/shortened.hpp steppers/clocked.hpp steppers/ensemble.hpp steppers/clocked_lanes.hpp steppers/watched_stepper.hpp steppers/sampled_function.hpp steppers/events.hpp steppers/impacts.hpp steppers/lent_steps.hpp steppers/refilled.hpp steppers/inputs.hpp)
 
 # The text of a file of runtime/kernel/ as a C++ literal, for which every compiler has 65,536 characters.
 function(literal name result)

@@ -51,6 +51,7 @@
 #include "steppers/lent_steps.hpp"
 #include "steppers/linear.hpp"
 #include "steppers/refilled.hpp"
+#include "steppers/sampled_function.hpp"
 #include "steppers/separable.hpp"
 #include "steppers/shortened.hpp"
 #include "steppers/splitting.hpp"
