@@ -108,4 +108,9 @@ void apply(const Overrides& overrides, Scene& scene) {
     if (overrides.every) keep_every(*overrides.every, scene);
 }
 
+std::int64_t kept_by_sweeps(const Overrides& overrides, const Scene& scene) {
+    if (!overrides.every) return 0;
+    return scene.clock ? 1 : static_cast<std::int64_t>(*overrides.every);
+}
+
 }  // namespace lobatto

@@ -15,7 +15,7 @@ namespace lobatto {
 struct Overrides {
     std::vector<std::string> set;  // "name=expression": run-time parameters; the expression is a number such as 2*pi
     std::string step, until;       // expressions in the parameters; empty: as in the scene
-    std::optional<double> every;   // states; with a clock the time between two
+    std::optional<double> every;   // one of so many states is kept; with a clock, the time between two
 };
 
 // The bytes of an argument from `begin` on, to before `end`, each with its column.
@@ -23,5 +23,8 @@ Text text_of(const std::string& argument, std::size_t begin, std::size_t end = s
 
 // Throws InputError with the place in the argument.
 void apply(const Overrides& overrides, Scene& scene);
+
+// A sweep keeps one of so many states; 0: the last one alone. With a clock those at the scene's times are kept.
+std::int64_t kept_by_sweeps(const Overrides& overrides, const Scene& scene);
 
 }  // namespace lobatto

@@ -39,8 +39,6 @@ const std::vector<std::string>& Kernel::events() const {
     return parts_->events;
 }
 
-namespace {}  // namespace
-
 std::vector<Required> required_of(const lobatto::Scene& scene) {
     std::vector<GiNaC::symbol> symbols;
     for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);

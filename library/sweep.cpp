@@ -142,8 +142,7 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
             progress = [&](std::int64_t done) {
                 if (!ask(options.progress, static_cast<double>(done) / study->steps_of(0, count))) is_interrupted = 1;
             };
-        // With a clock the scene itself says which states there are between.
-        const std::int64_t every = !options.every ? 0 : swept.clock ? 1 : static_cast<std::int64_t>(*options.every);
+        const std::int64_t every = kept_by_sweeps(overrides_of(options), swept);
         if (every > 0) sweep.states.first.push_back(0);
         const auto sink = [&](const EnsembleTrajectory& trajectory, const Verdict& verdict,
                               const EnsembleRequest& request) {

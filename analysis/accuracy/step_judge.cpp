@@ -134,7 +134,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     std::vector<double> measure = scale, sizes(2 * n, 0.0);
     for (std::size_t i = 0; i < 2 * n; ++i)
         if (moves[i]) sizes[i] = scale[i];
-    const std::vector<double> levels = noise_of(sizes);
+    const std::vector<double> levels = noise_levels(sizes);
     for (std::size_t i = 0; i < 2 * n; ++i) measure[i] = std::fmax(measure[i], levels[i]);
     for (std::size_t k = 0; k < n; ++k)
         if (!moves[k]) measure[k] = measure[n + k] = std::numeric_limits<double>::infinity();

@@ -45,12 +45,6 @@ std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures) {
     return every;
 }
 
-// Of so many states one is kept, 0: the last alone. With a clock `every` is the time between them.
-std::int64_t states_kept(const Overrides& overrides, const Scene& scene) {
-    if (!overrides.every) return 0;
-    return scene.clock ? 1 : static_cast<std::int64_t>(*overrides.every);
-}
-
 // Whether trajectories of these numbers go side by side in vector registers.
 bool has_ensembles(Precision numbers) {
     return numbers == Precision::double_ || numbers == Precision::single;
@@ -103,7 +97,7 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
         Scene of_setting = starts_->with_settings(scene_, number * starts_->count_of_setting());
         steps_.push_back(steps_of_setting(of_setting).count);
     }
-    rows_ = std::make_unique<SweepRows>(scene_, *starts_, states_kept(options.overrides, scene_), options.measures);
+    rows_ = std::make_unique<SweepRows>(scene_, *starts_, kept_by_sweeps(options.overrides, scene_), options.measures);
     first_ = prepare(0);
     if (options_.device != StudyDevice::cuda) return;
     if (const std::string obstacle = why_not_on_device(scene_); !obstacle.empty())
@@ -211,7 +205,7 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     request.tolerance = scene.method.tolerance;
     request.arrivals = arrivals_of(scene, setting.steps.count);
     request.arrivals.keeps_chain = false;
-    request.every = looked_at(states_kept(options_.overrides, scene), setting.steps.count, options_.measures);
+    request.every = looked_at(kept_by_sweeps(options_.overrides, scene), setting.steps.count, options_.measures);
     request.threads = options_.threads;
     request.stops = !scene.run.stops.empty();
     if (!scene.outputs.kept.empty())  // threads copy it: formulas are not for several at once

@@ -24,9 +24,8 @@ double error_in(const std::string& said) {
 }
 
 const std::string bouncing =
-    "lagrangian = \"y'^2/2 - 10*y\"\n[coordinates]\ny = { position = 5, velocity = 0 }\n[impacts]\nfloor = { when = "
-    "\"y "
-    "= 0 falling\", restitution = 0.5 }\n[run]\nstep = 0.1\nuntil = 10\n";
+    "lagrangian = \"y'^2/2 - 10*y\"\n[coordinates]\ny = { position = 5, velocity = 0 }\n"
+    "[impacts]\nfloor = { when = \"y = 0 falling\", restitution = 0.5 }\n[run]\nstep = 0.1\nuntil = 10\n";
 
 std::string jumping(const std::string& lagrangian) {
     return "lagrangian = \"" + lagrangian +
@@ -37,9 +36,9 @@ std::string jumping(const std::string& lagrangian) {
 
 TEST_CASE("a momentum that constraints hold at 0 tells nothing of the error, in runs and in sweeps") {
     const std::string held =
-        "lagrangian = \"(a' + b')^2/2 + a'^2/2 + 9.81*cos(a)\"\n[coordinates]\na = { position = 1, velocity = 0.3 }\nb "
-        "= "
-        "{ position = -1, velocity = -0.3 }\n[constraints]\nlevel = \"a + b = 0\"\n[run]\nstep = 0.02\nuntil = 5\n";
+        "lagrangian = \"(a' + b')^2/2 + a'^2/2 + 9.81*cos(a)\"\n"
+        "[coordinates]\na = { position = 1, velocity = 0.3 }\nb = { position = -1, velocity = -0.3 }\n"
+        "[constraints]\nlevel = \"a + b = 0\"\n[run]\nstep = 0.02\nuntil = 5\n";
     const test::Finished alone = run(held);
     CHECK_MESSAGE(alone.exit_code == 0, alone.err);
     CHECK(error_in(alone.out) < 1e-10);
@@ -49,11 +48,12 @@ TEST_CASE("a momentum that constraints hold at 0 tells nothing of the error, in 
                                             "a'=0.3,0.4", "--vary", "b'=-0.3,-0.4", "-o", folder / "table.csv"});
     CHECK_MESSAGE(swept.exit_code == 0, swept.err);
     // A plate on two parallel rods does not turn.
-    const test::Finished plate = run(
-        "lagrangian = \"-9.81*b.y\"\n[bodies]\nb = { mass = 1, inertia = 0.3, position = [0.5, -0.5], velocity = "
-        "[0.3, 0] }\n[joints]\ne = { type = \"distance\", bodies = [\"ground\", \"b\"], from = [0, 1], to = [0, -0.5] "
-        "}\nf = { type = \"distance\", bodies = [\"ground\", \"b\"], from = [1, 1], to = [1, -0.5] }\n[run]\nstep = "
-        "0.01\nuntil = 3\nassemble = true\n");
+    const test::Finished plate =
+        run("lagrangian = \"-9.81*b.y\"\n"
+            "[bodies]\nb = { mass = 1, inertia = 0.3, position = [0.5, -0.5], velocity = [0.3, 0] }\n[joints]\n"
+            "e = { type = \"distance\", bodies = [\"ground\", \"b\"], from = [0, 1], to = [0, -0.5] }\n"
+            "f = { type = \"distance\", bodies = [\"ground\", \"b\"], from = [1, 1], to = [1, -0.5] }\n"
+            "[run]\nstep = 0.01\nuntil = 3\nassemble = true\n");
     CHECK_MESSAGE(plate.exit_code == 0, plate.err);
     CHECK(plate.err == "");
     CHECK(error_in(plate.out) < 1e-11);

@@ -53,7 +53,7 @@ std::vector<bool> moving(const std::vector<double>& least, const std::vector<dou
     return moves;
 }
 
-std::vector<double> noise_of(const std::vector<double>& sizes) {
+std::vector<double> noise_levels(const std::vector<double>& sizes) {
     const auto middle = sizes.begin() + std::ssize(sizes) / 2;
     std::vector<double> levels;
     for (const auto& [begin, end] : {std::pair{sizes.begin(), middle}, std::pair{middle, sizes.end()}})
@@ -63,7 +63,7 @@ std::vector<double> noise_of(const std::vector<double>& sizes) {
 
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
-    const std::vector<double> levels = noise_of(amplitudes);
+    const std::vector<double> levels = noise_levels(amplitudes);
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
         if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i])) continue;
         int agree = 0, disagree = 0;

@@ -13,8 +13,7 @@ namespace lobatto {
 
 constexpr double by_chance = 0.1;  // of an amplitude: what is apart by more may meet again, and is no small error then
 constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
-
-constexpr double noise = 1e-10;  // of what moves a number: forces that cancel leave less
+constexpr double noise = 1e-10;      // of what moves a number: where that cancels, rounding leaves less
 
 // Where a companion begins: a few units in the last place beside the start, so that it leaves it where nearby
 // trajectories diverge, also when the motion itself stands still in rounding.
@@ -29,12 +28,12 @@ void widen_to(std::vector<double>& least, std::vector<double>& most, const doubl
 // Of q then p: which move by more than rounding does.
 std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most);
 
-// Of each number the largest of its kind, positions or momenta, times this: forces that cancel, and constraints that
-// hold a momentum at 0, leave less of the others. What moves that little may be rounding alone.
-std::vector<double> noise_of(const std::vector<double>& sizes);
+// For each number `noise` times the largest size of its kind, positions or momenta. A number that moves by less may be
+// moved by rounding alone: forces may cancel, and constraints may hold a momentum at 0.
+std::vector<double> noise_levels(const std::vector<double>& sizes);
 
-// Amplitudes that may be rounding alone, of what a run and its companion do not agree on from the beginning: these
-// become 0. `pair(j, i)`: number i at comparison j, of the run and of the companion.
+// An amplitude below its noise level becomes 0 if the run and its companion do not agree on this number in most of the
+// first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion.
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 

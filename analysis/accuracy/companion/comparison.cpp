@@ -56,7 +56,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const std::size_t count = std::min(run_.size(), companion_.size());
     const std::vector<double> amplitude = amplitudes(count);
     MeasuredError error;
-    // Where a stop ended the run, the companion went on: what it met there is nothing of this motion.
+    // If a stop ended the run, the companion went on. A failure after the time of the stop does not count.
     const bool is_beyond = stopped_ && (*stopped_ - result.time) * request_.step >= 0;
     const std::optional<double> stopped = is_beyond ? std::nullopt : stopped_;
     error.companion_stopped = stopped;
