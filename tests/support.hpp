@@ -78,6 +78,10 @@ inline void write_script(const std::filesystem::path& path, const std::string& b
     std::filesystem::permissions(path, std::filesystem::perms::owner_all);
 }
 
+inline bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
 // What the call throws as an Error, as text; empty when it throws nothing.
 template <class Error, class Call>
 std::string message_of(Call call) {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -12,17 +11,13 @@
 
 #include "analysis/sweep/axis.hpp"
 #include "runtime/build/sha256.hpp"
+#include "runtime/files/cells.hpp"
 #include "runtime/files/npy.hpp"
 #include "runtime/files/partial_file.hpp"
 
 namespace lobatto {
 
 namespace {
-
-std::string without_blanks(std::string_view text) {
-    const std::size_t first = text.find_first_not_of(" \t\r\""), last = text.find_last_not_of(" \t\r\"");
-    return first == std::string_view::npos ? "" : std::string(text.substr(first, last + 1 - first));
-}
 
 class CsvStarts {
 public:
@@ -35,7 +30,7 @@ public:
             const std::size_t end = std::min(text_.find('\n', begin), text_.size());
             const std::string_view line(text_.data() + begin, end - begin);
             begin = end + 1;
-            if (line.starts_with('#') || without_blanks(line).empty()) continue;
+            if (line.starts_with('#') || bare(line).empty()) continue;
             if (table_.names.empty())
                 read_names(line);
             else
@@ -51,36 +46,31 @@ private:
     }
 
     void read_names(std::string_view line) {
-        for (std::size_t at = 0; at <= line.size();) {
-            const std::size_t end = std::min(line.find(',', at), line.size());
-            table_.names.push_back(without_blanks(line.substr(at, end - at)));
-            if (table_.names.back().empty()) fail(at, "a column without a name");
-            at = end + 1;
+        for (const std::string_view cell : cells_of(line)) {
+            table_.names.emplace_back(bare(cell));
+            if (table_.names.back().empty())
+                fail(static_cast<std::size_t>(cell.data() - line.data()), "a column without a name");
         }
-        double number = 0;
         const std::string& first = table_.names.front();
-        if (std::from_chars(first.data(), first.data() + first.size(), number).ec == std::errc())
+        if (number_in(first))
             fail(0, fmt::format("'{}' is a number, but the first line names the columns, such as q,q',omega", first));
         table_.columns.resize(table_.names.size());
     }
 
     void read_row(std::string_view line) {
-        std::size_t at = 0, column = 0;
-        for (; at <= line.size(); ++column) {
-            const std::size_t end = std::min(line.find(',', at), line.size());
+        const std::vector<std::string_view> cells = cells_of(line);
+        for (std::size_t column = 0; column < cells.size(); ++column) {
+            const auto at = static_cast<std::size_t>(cells[column].data() - line.data());
             if (column == table_.names.size())
                 fail(at, fmt::format("more values than the {} columns that were named", table_.names.size()));
-            const std::string value = without_blanks(line.substr(at, end - at));
-            const char* const first = value.data() + (value.starts_with('+') ? 1 : 0);
-            double number = 0;
-            const auto read = std::from_chars(first, value.data() + value.size(), number);
-            if (read.ec != std::errc() || read.ptr != value.data() + value.size() || !std::isfinite(number))
+            const std::string_view value = bare(cells[column]);
+            const std::optional<double> number = number_in(value);
+            if (!number || !std::isfinite(*number))
                 fail(at, fmt::format("'{}' is no finite number, of the column {}", value, table_.names[column]));
-            table_.columns[column].push_back(number);
-            at = end + 1;
+            table_.columns[column].push_back(*number);
         }
-        if (column < table_.names.size())
-            fail(line.size(), fmt::format("no value of the column {}", table_.names[column]));
+        if (cells.size() < table_.names.size())
+            fail(line.size(), fmt::format("no value of the column {}", table_.names[cells.size()]));
     }
 
     const std::string& text_;

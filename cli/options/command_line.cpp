@@ -9,10 +9,10 @@
 #include <iostream>
 #include <limits>
 #include <map>
-#include <sstream>
 #include <system_error>
 
 #include "generator/formula/suggest.hpp"
+#include "runtime/files/cells.hpp"
 
 namespace lobatto {
 
@@ -58,12 +58,10 @@ std::pair<std::string, std::string> value_of(const CLI::Option& option) {
 }
 
 // Of "{plain,clean}".
-std::vector<std::string> words_in(const std::string& limits) {
-    std::vector<std::string> words;
-    if (!limits.starts_with('{') || !limits.ends_with('}')) return words;
-    std::istringstream list(limits.substr(1, limits.size() - 2));
-    for (std::string word; std::getline(list, word, ',');) words.push_back(word);
-    return words;
+std::vector<std::string> words_in(std::string_view limits) {
+    if (!limits.starts_with('{') || !limits.ends_with('}')) return {};
+    const auto words = cells_of(limits.substr(1, limits.size() - 2));
+    return {words.begin(), words.end()};
 }
 
 // ": plain, clean", or " (2 to 12)" of "INT in [2 - 12]".

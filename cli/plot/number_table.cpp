@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "generator/formula/source.hpp"
 #include "generator/formula/suggest.hpp"
 #include "runtime/error.hpp"
+#include "runtime/files/cells.hpp"
 #include "runtime/files/npy.hpp"
 #include "runtime/files/partial_file.hpp"
 
@@ -24,27 +24,6 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
     throw InputError(fmt::format("{}: {}", path, why));
-}
-
-std::vector<std::string_view> cells_of(std::string_view line) {
-    std::vector<std::string_view> cells;
-    for (std::size_t begin = 0; begin <= line.size();) {
-        const std::size_t end = std::min(line.find(',', begin), line.size());
-        cells.push_back(line.substr(begin, end - begin));
-        begin = end + 1;
-    }
-    return cells;
-}
-
-// Empty cells and those of other words ("done") are no numbers, and not drawn.
-double number_of(std::string_view cell) {
-    while (cell.starts_with(' ')) cell.remove_prefix(1);
-    while (cell.ends_with(' ')) cell.remove_suffix(1);
-    if (cell.starts_with('+')) cell.remove_prefix(1);
-    double value = 0;
-    const auto read = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-    return read.ec == std::errc() && read.ptr == cell.data() + cell.size() ? value
-                                                                           : std::numeric_limits<double>::quiet_NaN();
 }
 
 // "# columns: t, x [m]": the units.
@@ -92,7 +71,10 @@ NumberTable from_csv(const std::string& path, const std::string& text) {
             refuse(path, fmt::format("line {} has {} numbers, but there are {} columns", number, cells.size(),
                                      table.columns.size()));
         }
-        for (std::size_t i = 0; i < cells.size(); ++i) table.columns[i].values.push_back(number_of(cells[i]));
+        // Empty cells and words such as "done" are not drawn.
+        for (std::size_t i = 0; i < cells.size(); ++i)
+            table.columns[i].values.push_back(
+                number_in(bare(cells[i])).value_or(std::numeric_limits<double>::quiet_NaN()));
     }
     if (!has_names) refuse(path, "there is no line with the names of columns, as in t,x,y");
     return table;

@@ -277,18 +277,21 @@ private:
     }
 
     // Of constants the arithmetic itself finds what has no value.
-    void require(DomainCondition::Kind kind, const Operand& part, const std::string& operation, const Syntax& formula) {
-        if (names_ != nullptr && names_->records && !part.value)
-            names_->conditions.push_back({kind, part.expression, operation, formula.at.at});
+    void require(DomainCondition::Kind kind, const Operand& part, const std::string& operation, const Syntax& formula,
+                 const GiNaC::ex& exponent = 0) {
+        if (kind != DomainCondition::Kind::any && names_ != nullptr && names_->records && !part.value)
+            names_->conditions.push_back({kind, part.expression, exponent, operation, formula.at.at});
     }
 
+    // Of x^n with a parameter n that is whole, x may be negative; x^q has a logarithm in its derivative.
     void require_power(const Operand& base, const Operand& exponent, const Syntax& formula) {
-        if (!exponent.value) return require(DomainCondition::Kind::positive, base, "a power", formula);
+        using Kind = DomainCondition::Kind;
+        const bool varies = exponent.moves || exponent.velocities || exponent.inputs;
+        if (!exponent.value)
+            return require(varies ? Kind::positive : Kind::power, base, "a power", formula, exponent.expression);
         const bool negative = exponent.value->is_negative(), whole = exponent.value->is_integer();
-        if (whole && negative) require(DomainCondition::Kind::nonzero, base, "a negative power", formula);
-        if (!whole)
-            require(negative ? DomainCondition::Kind::positive : DomainCondition::Kind::nonnegative, base,
-                    "a broken power", formula);
+        require(DomainCondition::of_base(whole, negative), base, whole ? "a negative power" : "a broken power",
+                formula);
     }
 
     void require_call(const std::string& function, const Operand& argument, const Syntax& formula) {

@@ -47,12 +47,19 @@ struct Spelling {
 // What a formula asks of a part of it, as written: a formula may cancel what has no value, as in sqrt(a)^2 or a/a, and
 // still it is an error where it stands.
 struct DomainCondition {
-    enum class Kind : std::uint8_t { nonzero, nonnegative, positive, within_one };
+    enum class Kind : std::uint8_t { any, nonzero, nonnegative, positive, within_one, power };
     Kind kind = Kind::nonzero;
     GiNaC::ex expression;
+    GiNaC::ex exponent;     // of a power: numbers and parameters
     std::string operation;  // "a square root"
     Position at;
     bool of_motion = true;  // else of the step or the end time
+
+    // What the base of a power is asked for.
+    static Kind of_base(bool whole_exponent, bool negative_exponent) {
+        if (whole_exponent) return negative_exponent ? Kind::nonzero : Kind::any;
+        return negative_exponent ? Kind::positive : Kind::nonnegative;
+    }
 };
 
 // Where a formula goes from one smooth piece to another: u = 0. On either side its `side` is constant, 1 or -1.

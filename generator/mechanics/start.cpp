@@ -29,6 +29,15 @@ std::string short_text(const ex& expression) {
     return text.size() <= 120 ? text : fmt::format("a formula of {} characters", text.size());
 }
 
+bool has(DomainCondition::Kind kind, const cln::cl_R& value) {
+    using Kind = DomainCondition::Kind;
+    return kind == Kind::any           ? true
+           : kind == Kind::nonzero     ? !cln::zerop(value)
+           : kind == Kind::nonnegative ? !cln::minusp(value)
+           : kind == Kind::positive    ? cln::plusp(value)
+                                       : cln::abs(value) <= 1;
+}
+
 class StartCheck {
 public:
     StartCheck(const Scene& scene, const System& system)
@@ -133,13 +142,11 @@ private:
         return result;
     }
 
-    static bool holds(const DomainCondition& condition, const Sized& of) {
-        using Kind = DomainCondition::Kind;
+    bool holds(const DomainCondition& condition, const Sized& of) {
         const cln::cl_R value = of.vanishes() ? cln::cl_R(0) : of.value;
-        return condition.kind == Kind::nonzero       ? !cln::zerop(value)
-               : condition.kind == Kind::nonnegative ? !cln::minusp(value)
-               : condition.kind == Kind::positive    ? cln::plusp(value)
-                                                     : cln::abs(value) <= 1;
+        if (condition.kind != DomainCondition::Kind::power) return has(condition.kind, value);
+        const cln::cl_R exponent = start_.evaluate(start_.convert({condition.exponent})).front();
+        return has(DomainCondition::of_base(exponent == cln::round1(exponent), cln::minusp(exponent)), value);
     }
 
     bool all_hold(const std::vector<const DomainCondition*>& conditions, std::size_t begin, std::size_t end) {

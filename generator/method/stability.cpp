@@ -109,12 +109,6 @@ Stability stability(const Quadrature& quadrature) {
     return result;
 }
 
-const StabilityInterval& Stability::interval_of(const numeric& z) const {
-    std::size_t k = 0;
-    while (k < limits.size() && limits[k].high < z) ++k;
-    return intervals[k];
-}
-
 numeric Stability::trace(const numeric& z) const {
     return value(trace_above, z) / value(trace_below, z);
 }

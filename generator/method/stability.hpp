@@ -41,7 +41,6 @@ struct Stability {
     GiNaC::numeric phase_error;
     int phase_order = 0;
 
-    const StabilityInterval& interval_of(const GiNaC::numeric& z) const;  // z > 0
     GiNaC::numeric trace(const GiNaC::numeric& z) const;
 };
 

@@ -17,6 +17,7 @@
 #include "runtime/build/compile.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
+#include "runtime/files/private_file.hpp"
 
 namespace lobatto {
 namespace {
@@ -28,31 +29,6 @@ namespace fs = std::filesystem;
         fmt::format("cannot {} {}: {}; make room or give permission there, or name another folder in the "
                     "environment variable LOBATTO_CACHE_DIR",
                     action, path, std::strerror(error)));
-}
-
-bool only_we_can_write(const struct stat& status) {
-    return status.st_uid == ::geteuid() && (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
-}
-
-// The content of a regular file that only we can write to.
-std::optional<std::string> read_private_file(const std::string& path) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-    if (descriptor < 0) return std::nullopt;
-    std::optional<std::string> content;
-    struct stat status;
-    if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && only_we_can_write(status)) {
-        content.emplace(std::size_t(status.st_size), '\0');
-        std::size_t done = 0;
-        while (done < content->size()) {
-            const ssize_t count = ::read(descriptor, content->data() + done, content->size() - done);
-            if (count < 0 && errno == EINTR) continue;
-            if (count <= 0) break;
-            done += std::size_t(count);
-        }
-        content->resize(done);
-    }
-    ::close(descriptor);
-    return content;
 }
 
 void rename_file(const std::string& from, const std::string& to) {
@@ -182,7 +158,7 @@ std::string cache_folder() {
     const char* reason = nullptr;
     if (link.st_uid != ::geteuid() || status.st_uid != ::geteuid())
         reason = "it belongs to another user";
-    else if (!only_we_can_write(status))
+    else if (!only_we_can_write(status, Writers::owner))
         reason = "other users may write to it";
     if (reason != nullptr) fail_untrusted(folder, reason, "make it yours alone (chmod 700)");
     // Behind links the folder has other parents than those of its name.
@@ -225,10 +201,11 @@ bool CacheEntry::is_valid() const {
 }
 
 std::optional<std::string> CacheEntry::valid_object() const {
-    const auto sealed_key = read_private_file(stem_ + ".key");
-    auto object = read_private_file(object_path());
-    if (!sealed_key || !object || *sealed_key != seal_of(*object) + key_) return std::nullopt;
-    return object;
+    const PrivateFile sealed_key = read_private_file(stem_ + ".key", Writers::owner);
+    PrivateFile object = read_private_file(object_path(), Writers::owner);
+    if (!sealed_key.is_private || !object.is_private || sealed_key.content != seal_of(object.content) + key_)
+        return std::nullopt;
+    return std::move(object.content);
 }
 
 bool CacheEntry::is_there() const {
@@ -240,13 +217,13 @@ bool CacheEntry::is_there() const {
 void CacheEntry::publish(const std::string& file) const {
     const std::string built = building_path() + "/" + file;
     ::chmod(built.c_str(), 0700);  // whatever the umask was
-    const auto object = read_private_file(built);
-    if (!object) fail("read", built, errno);
+    const PrivateFile object = read_private_file(built, Writers::owner);
+    if (!object.is_whole) fail("read", built, object.error);
     const int descriptor = ::open(built.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0 || ::fsync(descriptor) != 0) fail("write", built, errno);
     ::close(descriptor);
     // The key last: until it is there, the object is not valid.
-    write_file(building_path() + "/key", seal_of(*object) + key_);
+    write_file(building_path() + "/key", seal_of(object.content) + key_);
     // A folder in the place of either cannot be replaced by a file.
     std::error_code ignored;
     for (const std::string& path : {object_path(), stem_ + ".key"})

@@ -2,9 +2,9 @@
 // The host's side of a kernel's lanes on a device (runtime/kernel/device_lanes.hpp), loaded and checked.
 #pragma once
 
-#include <memory>
 #include <string>
 
+#include "runtime/build/kernel_object.hpp"
 #include "runtime/kernel/abi.h"
 
 namespace lobatto {
@@ -13,13 +13,13 @@ namespace lobatto {
 class DeviceLibrary {
 public:
     // Throws MachineError.
-    static DeviceLibrary load(const std::string& object, const std::string& expected_digest);
+    static DeviceLibrary load(const std::string& path, const std::string& expected_digest);
 
     bool has_lanes() const { return table_->words > 0; }
     const lobatto_device_lanes* operator->() const { return table_; }
 
 private:
-    std::shared_ptr<void> library_;
+    KernelObject object_;
     const lobatto_device_lanes* table_ = nullptr;
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "runtime/build/library.hpp"
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <cassert>
@@ -12,23 +11,6 @@
 
 namespace lobatto {
 namespace {
-
-[[noreturn]] void fail(const std::string& object, const std::string& reason) {
-    throw MachineError(fmt::format("cannot use the compiled kernel {}: {}; delete this file, and it is compiled again",
-                                   object, reason));
-}
-
-// Whether it can be aligned and what alignment costs is known only at run time, so memory has room for both.
-std::size_t memory_bytes(const lobatto_kernel& table) {
-    return static_cast<std::size_t>(table.stepper_bytes + table.stepper_alignment);
-}
-
-void* aligned(std::byte* memory, const lobatto_kernel& table) {
-    void* place = memory;
-    std::size_t space = memory_bytes(table);
-    return std::align(static_cast<std::size_t>(table.stepper_alignment), static_cast<std::size_t>(table.stepper_bytes),
-                      place, space);
-}
 
 const char* name_of(lobatto_real kind) {
     switch (kind) {
@@ -50,45 +32,26 @@ const char* name_of(lobatto_real kind) {
 
 }  // namespace
 
-Kernel Kernel::load(const std::string& object, const std::string& expected_digest) {
+Kernel Kernel::load(const std::string& path, const std::string& expected_digest) {
     Kernel kernel;
-    void* const library = ::dlopen(object.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library == nullptr) fail(object, ::dlerror());
-    kernel.library_ = std::shared_ptr<void>(library, [](void* handle) { ::dlclose(handle); });
-
-    using Fetch = const lobatto_kernel* (*)();
-    const auto fetch = reinterpret_cast<Fetch>(::dlsym(library, "lobatto_kernel_table"));
-    if (fetch == nullptr) fail(object, "it has no function lobatto_kernel_table, so it is not a kernel");
-    kernel.table_ = fetch();
-    if (kernel.table_->abi_version != LOBATTO_ABI_VERSION) {
-        fail(object, fmt::format("it speaks version {} of the kernel interface, this program version {}",
-                                 kernel.table_->abi_version, LOBATTO_ABI_VERSION));
-    }
-    if (kernel.table_->bytes != sizeof(lobatto_kernel)) {
-        fail(object, fmt::format("its function table has {} bytes instead of {}", kernel.table_->bytes,
-                                 sizeof(lobatto_kernel)));
-    }
-    if (kernel.table_->digest != expected_digest) {
-        fail(object,
-             fmt::format("its formulas have the digest {} instead of {}", kernel.table_->digest, expected_digest));
-    }
+    kernel.object_ = KernelObject(path);
+    kernel.table_ = kernel.object_.table<lobatto_kernel>("lobatto_kernel_table", expected_digest);
     return kernel;
 }
 
 template <class real>
-LoadedStepper<real>::LoadedStepper(Kernel kernel) : kernel_(std::move(kernel)) {
+LoadedStepper<real>::LoadedStepper(Kernel kernel)
+    : kernel_(std::move(kernel)), stepper_(kernel_->stepper_bytes, kernel_->stepper_alignment) {
     const auto kind = static_cast<lobatto_real>(kernel_->real_kind);
     if (kind != real_kind<real>() || kernel_->real_bytes != static_cast<std::int32_t>(sizeof(real))) {
         throw MachineError(fmt::format("the kernel {} computes in {}, but was asked to compute in {}", kernel_->name,
                                        name_of(kind), name_of(real_kind<real>())));
     }
-    memory_ = std::make_unique<std::byte[]>(memory_bytes(kernel_.table()));
-    stepper_ = aligned(memory_.get(), kernel_.table());
 }
 
 template <class real>
 LoadedStepper<real>::LoadedStepper(const LoadedStepper& other) : LoadedStepper(other.kernel_) {
-    std::memcpy(stepper_, other.stepper_, static_cast<std::size_t>(kernel_->stepper_bytes));
+    std::memcpy(stepper_.get(), other.stepper_.get(), static_cast<std::size_t>(kernel_->stepper_bytes));
 }
 
 template <class real>
@@ -98,50 +61,50 @@ LoadedStepper<real>& LoadedStepper<real>::operator=(const LoadedStepper& other) 
 
 template <class real>
 std::string LoadedStepper<real>::memory() const {
-    return {static_cast<const char*>(stepper_), static_cast<std::size_t>(kernel_->stepper_bytes)};
+    return {static_cast<const char*>(stepper_.get()), static_cast<std::size_t>(kernel_->stepper_bytes)};
 }
 
 template <class real>
 void LoadedStepper<real>::restore(const std::string& memory) {
     assert(std::ssize(memory) == kernel_->stepper_bytes);
-    std::memcpy(stepper_, memory.data(), memory.size());
+    std::memcpy(stepper_.get(), memory.data(), memory.size());
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::prepare(const std::vector<real>& parameters, real step) {
     assert(std::ssize(parameters) == kernel_->parameters);
-    return static_cast<lobatto_status>(kernel_->prepare(stepper_, parameters.data(), &step));
+    return static_cast<lobatto_status>(kernel_->prepare(stepper_.get(), parameters.data(), &step));
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::start(real time, const std::vector<real>& q, const std::vector<real>& p) {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
-    return static_cast<lobatto_status>(kernel_->start(stepper_, &time, q.data(), p.data()));
+    return static_cast<lobatto_status>(kernel_->start(stepper_.get(), &time, q.data(), p.data()));
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::go_on(const LoadedStepper& other, real time, const std::vector<real>& q,
                                           const std::vector<real>& p) {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
-    return static_cast<lobatto_status>(kernel_->go_on(stepper_, other.stepper_, &time, q.data(), p.data()));
+    return static_cast<lobatto_status>(kernel_->go_on(stepper_.get(), other.stepper_.get(), &time, q.data(), p.data()));
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::advance(lobatto_advance& call) {
-    return static_cast<lobatto_status>(kernel_->advance(stepper_, &call));
+    return static_cast<lobatto_status>(kernel_->advance(stepper_.get(), &call));
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::set_inputs(const std::vector<real>& parameters) {
     assert(std::ssize(parameters) == kernel_->parameters);
-    return static_cast<lobatto_status>(kernel_->set_inputs(stepper_, parameters.data()));
+    return static_cast<lobatto_status>(kernel_->set_inputs(stepper_.get(), parameters.data()));
 }
 
 template <class real>
 void LoadedStepper<real>::state(real& time, std::vector<real>& q, std::vector<real>& p) const {
     q.resize(kernel_->coordinates);
     p.resize(kernel_->coordinates);
-    kernel_->state(stepper_, &time, q.data(), p.data());
+    kernel_->state(stepper_.get(), &time, q.data(), p.data());
 }
 
 template <class real>
@@ -149,7 +112,7 @@ bool LoadedStepper<real>::two_fold_state(std::vector<real>& q, std::vector<real>
                                          std::vector<real>& velocity_rest) const {
     if (kernel_->two_fold_state == nullptr) return false;
     for (std::vector<real>* values : {&q, &q_rest, &velocity, &velocity_rest}) values->resize(kernel_->coordinates);
-    kernel_->two_fold_state(stepper_, q.data(), q_rest.data(), velocity.data(), velocity_rest.data());
+    kernel_->two_fold_state(stepper_.get(), q.data(), q_rest.data(), velocity.data(), velocity_rest.data());
     return true;
 }
 
@@ -157,14 +120,14 @@ template <class real>
 lobatto_status LoadedStepper<real>::dense(real theta, std::vector<real>& q, std::vector<real>& velocity) const {
     q.resize(kernel_->coordinates);
     velocity.resize(kernel_->coordinates);
-    return static_cast<lobatto_status>(kernel_->dense(stepper_, &theta, q.data(), velocity.data()));
+    return static_cast<lobatto_status>(kernel_->dense(stepper_.get(), &theta, q.data(), velocity.data()));
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::energy(real time, const std::vector<real>& q, const std::vector<real>& p,
                                            real& energy) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
-    return static_cast<lobatto_status>(kernel_->energy(stepper_, &time, q.data(), p.data(), &energy));
+    return static_cast<lobatto_status>(kernel_->energy(stepper_.get(), &time, q.data(), p.data(), &energy));
 }
 
 template <class real>
@@ -172,7 +135,7 @@ std::vector<real> LoadedStepper<real>::momentum(real time, const std::vector<rea
                                                 const std::vector<real>& velocity) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);
     std::vector<real> p(kernel_->coordinates);
-    kernel_->momentum(stepper_, &time, q.data(), velocity.data(), p.data());
+    kernel_->momentum(stepper_.get(), &time, q.data(), velocity.data(), p.data());
     return p;
 }
 
@@ -181,7 +144,7 @@ lobatto_status LoadedStepper<real>::velocity(real time, const std::vector<real>&
                                              std::vector<real>& velocity) const {
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     velocity.resize(kernel_->coordinates);
-    return static_cast<lobatto_status>(kernel_->velocity(stepper_, &time, q.data(), p.data(), velocity.data()));
+    return static_cast<lobatto_status>(kernel_->velocity(stepper_.get(), &time, q.data(), p.data(), velocity.data()));
 }
 
 template <class real>
@@ -191,14 +154,14 @@ void LoadedStepper<real>::constraint(real time, const std::vector<real>& q, std:
     phi.resize(count);
     phi_t.resize(count);
     G.resize(count * q.size());
-    if (count > 0) kernel_->constraint(stepper_, &time, q.data(), phi.data(), phi_t.data(), G.data());
+    if (count > 0) kernel_->constraint(stepper_.get(), &time, q.data(), phi.data(), phi_t.data(), G.data());
 }
 
 template <class real>
 lobatto_status LoadedStepper<real>::multipliers(real time, const std::vector<real>& q, const std::vector<real>& p,
                                                 std::vector<real>& lambda) const {
     lambda.resize(static_cast<std::size_t>(kernel_->constraints));
-    return static_cast<lobatto_status>(kernel_->multipliers(stepper_, &time, q.data(), p.data(), lambda.data()));
+    return static_cast<lobatto_status>(kernel_->multipliers(stepper_.get(), &time, q.data(), p.data(), lambda.data()));
 }
 
 template <class real>
@@ -207,7 +170,7 @@ void LoadedStepper<real>::slopes(real time, const std::vector<real>& q, const st
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(velocity) == kernel_->coordinates);
     Lv.resize(kernel_->coordinates);
     Lq.resize(kernel_->coordinates);
-    kernel_->slopes(stepper_, &time, q.data(), velocity.data(), Lv.data(), Lq.data());
+    kernel_->slopes(stepper_.get(), &time, q.data(), velocity.data(), Lv.data(), Lq.data());
 }
 
 template <class real>
@@ -216,7 +179,8 @@ lobatto_status LoadedStepper<real>::residual(real time, const std::vector<real>&
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     assert(std::ssize(X) == kernel_->unknowns);
     F.resize(kernel_->unknowns);
-    return static_cast<lobatto_status>(kernel_->residual(stepper_, &time, q.data(), p.data(), X.data(), F.data()));
+    return static_cast<lobatto_status>(
+        kernel_->residual(stepper_.get(), &time, q.data(), p.data(), X.data(), F.data()));
 }
 
 template <class real>
@@ -225,7 +189,8 @@ lobatto_status LoadedStepper<real>::jacobian(real time, const std::vector<real>&
     assert(std::ssize(q) == kernel_->coordinates && std::ssize(p) == kernel_->coordinates);
     assert(std::ssize(X) == kernel_->unknowns);
     J.resize(X.size() * X.size());
-    return static_cast<lobatto_status>(kernel_->jacobian(stepper_, &time, q.data(), p.data(), X.data(), J.data()));
+    return static_cast<lobatto_status>(
+        kernel_->jacobian(stepper_.get(), &time, q.data(), p.data(), X.data(), J.data()));
 }
 
 template <class real>
@@ -237,7 +202,7 @@ lobatto_status LoadedStepper<real>::tangent(real time, const std::vector<real>& 
     p1.resize(n);
     T.resize(4 * n * n);
     return static_cast<lobatto_status>(
-        kernel_->tangent(stepper_, &time, q.data(), p.data(), q1.data(), p1.data(), T.data()));
+        kernel_->tangent(stepper_.get(), &time, q.data(), p.data(), q1.data(), p1.data(), T.data()));
 }
 
 template class LoadedStepper<float>;

@@ -2,12 +2,12 @@
 // A compiled kernel, loaded and checked: shared object to function table.
 #pragma once
 
-#include <cstddef>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "runtime/build/aligned_memory.hpp"
 #include "runtime/build/compile.hpp"
+#include "runtime/build/kernel_object.hpp"
 #include "runtime/kernel/abi.h"
 
 namespace lobatto {
@@ -41,14 +41,14 @@ constexpr lobatto_real real_kind<DoubleDouble>() {
 // constant.
 class Kernel {
 public:
-    // dlopen, then the checks: ABI version, structure size, digest as expected. Throws MachineError.
-    static Kernel load(const std::string& object, const std::string& expected_digest);
+    // A kernel of these formulas and of this version of the interface; else throws MachineError.
+    static Kernel load(const std::string& path, const std::string& expected_digest);
 
     const lobatto_kernel& table() const { return *table_; }
     const lobatto_kernel* operator->() const { return table_; }
 
 private:
-    std::shared_ptr<void> library_;
+    KernelObject object_;
     const lobatto_kernel* table_ = nullptr;
 };
 
@@ -106,8 +106,7 @@ public:
 
 private:
     Kernel kernel_;
-    std::unique_ptr<std::byte[]> memory_;  // holds table().stepper_bytes at the alignment asked for
-    void* stepper_ = nullptr;              // aligned, inside memory_
+    AlignedMemory stepper_;
 };
 
 }  // namespace lobatto

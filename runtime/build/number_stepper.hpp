@@ -51,8 +51,7 @@ private:
 
     Kernel kernel_;
     std::size_t parts_, n_, bytes_;
-    Bytes memory_;
-    void* stepper_ = nullptr;
+    AlignedMemory stepper_;
 };
 
 }  // namespace lobatto

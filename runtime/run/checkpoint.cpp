@@ -2,10 +2,7 @@
 // The file: the SHA-256 of the rest and a line end, then an array in CBOR (RFC 8949).
 #include "runtime/run/checkpoint.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -18,6 +15,7 @@
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
+#include "runtime/files/private_file.hpp"
 
 namespace lobatto {
 
@@ -83,20 +81,12 @@ std::vector<Written> files_of(const Json& list) {
 
 // Nothing when there is no such file.
 std::optional<std::string> own_file(const std::string& path) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-    if (descriptor < 0 && errno == ENOENT) return std::nullopt;
-    if (descriptor < 0) fail(path, std::strerror(errno));
-    struct stat status {};
-    const bool is_file = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
-    // A group of one's own is no stranger: with umask 002 what one writes is writable by it.
-    const mode_t strangers = status.st_gid == ::getegid() ? S_IWOTH : S_IWGRP | S_IWOTH;
-    const bool is_ours = is_file && status.st_uid == ::geteuid() && (status.st_mode & strangers) == 0;
-    std::string content(is_ours ? static_cast<std::size_t>(status.st_size) : 0, '\0');
-    const ssize_t count = ::pread(descriptor, content.data(), content.size(), 0);
-    ::close(descriptor);
-    if (!is_ours) fail(path, "it is no file of yours that only you can write");
-    if (count != status.st_size) fail(path, "it cannot be read as a whole");
-    return content;
+    PrivateFile file = read_private_file(path, Writers::owner_and_own_group);
+    if (file.error == ENOENT) return std::nullopt;
+    if (file.error != 0) fail(path, std::strerror(file.error));
+    if (!file.is_private) fail(path, "it is no file of yours that only you can write");
+    if (!file.is_whole) fail(path, "it cannot be read as a whole");
+    return std::move(file.content);
 }
 
 }  // namespace

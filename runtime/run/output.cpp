@@ -127,33 +127,4 @@ void TrajectoryFile::flush() {
     text_.clear();
 }
 
-TrajectoryTable read_trajectory(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw MachineError(fmt::format("cannot read {}: {}", path, std::strerror(errno)));
-    TrajectoryTable table;
-    for (std::string line; std::getline(file, line) && !file.eof();) {
-        if (line.starts_with("# ")) {
-            table.comments.push_back(line.substr(2));
-            continue;
-        }
-        const bool names = table.columns.empty();
-        if (!names) table.rows.emplace_back();
-        for (std::size_t begin = 0; begin <= line.size();) {
-            const std::size_t end = std::min(line.find(',', begin), line.size());
-            if (names) {
-                table.columns.push_back(line.substr(begin, end - begin));
-            } else {
-                double value = 0;
-                const auto read = std::from_chars(line.data() + begin, line.data() + end, value);
-                if (read.ec != std::errc() || read.ptr != line.data() + end)
-                    throw MachineError(fmt::format("{} is not a trajectory file: '{}' is not a number", path,
-                                                   line.substr(begin, end - begin)));
-                table.rows.back().push_back(value);
-            }
-            begin = end + 1;
-        }
-    }
-    return table;
-}
-
 }  // namespace lobatto

@@ -57,14 +57,6 @@ private:
     std::string text_;
 };
 
-// A file read back. The last line of an unfinished file may be torn; it is left out.
-struct TrajectoryTable {
-    std::vector<std::string> comments;  // the lines that begin with '#', without "# "
-    std::vector<std::string> columns;
-    std::vector<std::vector<double>> rows;
-};
-TrajectoryTable read_trajectory(const std::string& path);
-
 // The shortest text that reads back to the same double.
 std::string exact_text(double value);
 void append_number(std::string& text, double value);

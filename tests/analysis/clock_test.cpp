@@ -15,8 +15,8 @@
 #include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/measure/diagnostics.hpp"
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -183,7 +183,7 @@ TEST_CASE("arrivals are at their times, and leave the motion alone") {
     test::write_text(folder / "scene.toml", text + "[output]\nevery = 0.4\n");
     REQUIRE(test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"}).exit_code ==
             0);
-    const auto rows = read_trajectory(folder / "run.csv").rows;
+    const auto rows = test::read_trajectory(folder / "run.csv").rows;
     REQUIRE(rows.size() == 26);
     for (std::size_t i = 0; i < rows.size(); ++i) {
         CHECK(rows[i][0] == doctest::Approx(0.4 * static_cast<double>(i)).epsilon(1e-15));
@@ -202,7 +202,7 @@ TEST_CASE("states at given times are as exact as the ends of steps") {
         REQUIRE(
             test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"}).exit_code ==
             0);
-        const auto rows = read_trajectory(folder / "run.csv").rows;
+        const auto rows = test::read_trajectory(folder / "run.csv").rows;
         REQUIRE(rows.size() == 417);  // of 25 steps
         double worst = 0;
         for (const auto& row : rows) {
@@ -236,7 +236,7 @@ TEST_CASE("events of a motion with a clock happen at their physical times") {
                                                 "[output]\nevents = [\"x*x' + y*y' = 0 rising\"]\n");
     REQUIRE(test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"}).exit_code ==
             0);
-    const auto rows = read_trajectory(folder / "run.events.csv").rows;
+    const auto rows = test::read_trajectory(folder / "run.events.csv").rows;
     REQUIRE(rows.size() == 6);  // pericentres after the start
     for (std::size_t i = 0; i < rows.size(); ++i)
         CHECK(std::fabs(rows[i][1] - 2 * std::acos(-1) * static_cast<double>(i + 1)) < 1e-8);
@@ -269,7 +269,7 @@ TEST_CASE("a row of a sweep with a clock is the end of a run, for any number of 
         REQUIRE(test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "--set", "e=" + e, "-o", folder / "run.csv",
                            "--quiet"})
                     .exit_code == 0);
-        const std::vector<double> end = read_trajectory(folder / "run.csv").rows.back();
+        const std::vector<double> end = test::read_trajectory(folder / "run.csv").rows.back();
         std::istringstream lines(table);
         for (std::string line; std::getline(lines, line);) {
             std::istringstream fields(line);
@@ -293,7 +293,7 @@ TEST_CASE("a clock that does not stay positive ends the run, and says so") {
         test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
     INFO(finished.err);
     CHECK(finished.exit_code == 3);
-    const auto rows = read_trajectory(folder / "run.csv").rows;
+    const auto rows = test::read_trajectory(folder / "run.csv").rows;
     REQUIRE(!rows.empty());
     for (const auto& row : rows) CHECK(std::fabs(row[1] - std::cos(row[0])) < 1e-6);  // what was computed is right
 }
@@ -320,7 +320,7 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
             CHECK(ended.err.find("the clock comes to 0 along the step, or so near to it that time stands still or the "
                                  "energy is lost") != std::string::npos);
             double worst = 0;  // what was computed is right
-            for (const auto& row : read_trajectory(folder / "run.csv").rows)
+            for (const auto& row : test::read_trajectory(folder / "run.csv").rows)
                 worst = std::fmax(worst, std::fabs(row[1] - std::cos(row[0])));
             CHECK(worst < 1e-4);
         }
@@ -328,7 +328,7 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
     for (const std::string clock : {"x^2 + 1e-6", "x + 1.001"}) {
         INFO(clock);
         CHECK(finished(clock, 0.1).exit_code == 0);
-        CHECK(std::fabs(read_trajectory(folder / "run.csv").rows.back()[1] - std::cos(20)) < 1e-4);
+        CHECK(std::fabs(test::read_trajectory(folder / "run.csv").rows.back()[1] - std::cos(20)) < 1e-4);
     }
     test::write_text(folder / "scene.toml", text("x + b", 0.1));
     const test::Finished swept = test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary",
@@ -345,7 +345,7 @@ TEST_CASE("a motion with a clock that fails tells the last state of its file") {
         const test::Finished done = test::run(
             {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet", "--unmeasured"});
         CHECK(done.exit_code == 3);
-        const std::vector<double> last = read_trajectory(folder / "run.csv").rows.back();
+        const std::vector<double> last = test::read_trajectory(folder / "run.csv").rows.back();
         INFO(done.err);
         CHECK(done.err.find(fmt::format("after t = {:.6g}, from q = ({:.6g}, {:.6g})", last[0], last[1], last[2])) !=
               std::string::npos);

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -32,7 +32,7 @@ public:
         options.insert(options.begin(), {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv"});
         return test::run(options);
     }
-    std::vector<double> end() const { return read_trajectory(folder / "run.csv").rows.back(); }
+    std::vector<double> end() const { return test::read_trajectory(folder / "run.csv").rows.back(); }
 
     test::TemporaryFolder folder;
 };

@@ -16,9 +16,9 @@
 #include "runtime/measure/frequency.hpp"
 #include "runtime/measure/manifold.hpp"
 #include "runtime/measure/symmetry.hpp"
-#include "runtime/run/output.hpp"
 #include "runtime/run/trajectory.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -26,10 +26,6 @@ namespace {
 
 Scene scene_of(const std::string& text) {
     return read_scene(Source("mechanism.toml", text));
-}
-
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
 }
 
 // [method] and [run] of a scene.
@@ -190,7 +186,7 @@ TEST_CASE("a momentum has a velocity where the equations of a fixed coordinate h
 TEST_CASE("a coordinate that a constraint holds at 0 stops no run") {
     std::string text = kept_rod_loop();
     const auto replace = [&](const std::string& from, const std::string& to) {
-        REQUIRE(contains(text, from));
+        REQUIRE(test::contains(text, from));
         text.replace(text.find(from), from.size(), to);
     };
     replace("9.80665", "9.80665003");
@@ -367,7 +363,7 @@ TEST_CASE("the multiplier of a rod is its tension, with the order of the steps" 
         const std::string scene = folder / "rod.toml", file = folder / "rod.csv";
         test::write_text(scene, rod + method(points, step, 2) + "[output]\nmultipliers = true\n");
         REQUIRE(test::run({LOBATTO_PROGRAM, "run", scene, "--quiet", "-o", file}).exit_code == 0);
-        const TrajectoryTable table = read_trajectory(file);
+        const test::TrajectoryTable table = test::read_trajectory(file);
         REQUIRE(table.columns[5] == "lambda_rod");
         const std::vector<double>& row = table.rows.back();
         // Of the exact motion: the energy gives v^2 at its height.
@@ -448,13 +444,13 @@ TEST_CASE("starts off the constraints are errors that tell the nearest start") {
         return text;
     };
     const std::string off = refusal(with("1.1", "0", "0") + method(3, 0.1, 1));
-    CHECK(contains(off, "does not keep the constraint rod (x^2 + y^2 = 1)"));
-    CHECK(contains(off, "0.21"));
-    CHECK(contains(off, "x = 1"));
-    CHECK(contains(off, "assemble = true"));
+    CHECK(test::contains(off, "does not keep the constraint rod (x^2 + y^2 = 1)"));
+    CHECK(test::contains(off, "0.21"));
+    CHECK(test::contains(off, "x = 1"));
+    CHECK(test::contains(off, "assemble = true"));
     const std::string moving = refusal(with("0.6", "0.8", "1") + method(3, 0.1, 1));
-    CHECK(contains(moving, "at the rate 1.2"));
-    CHECK(contains(moving, "x' = "));
+    CHECK(test::contains(moving, "at the rate 1.2"));
+    CHECK(test::contains(moving, "x' = "));
     CHECK(refusal(with("0.6", "0.8", "0") + method(3, 0.1, 1)) == "");
 
     // The nearest in the metric of the mass: M (q - q0) along the slope of the constraint.
@@ -473,7 +469,7 @@ TEST_CASE("momenta at the start must be those of a velocity that keeps the const
     const std::string by_momentum =
         "lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\nx = { position = 1, momentum = 0.5 }\n"
         "y = { position = 0, momentum = 2 }\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n";
-    CHECK(contains(refusal(by_momentum + method(3, 0.1, 1)), "those of no velocity that keeps it"));
+    CHECK(test::contains(refusal(by_momentum + method(3, 0.1, 1)), "those of no velocity that keeps it"));
     const Ended ended = run(scene_of(by_momentum + method(3, 0.1, 0.1, "assemble = true\n")));
     CHECK(apart(ended.request.p, {0, 2}) < 1e-15);
 }
@@ -485,31 +481,32 @@ TEST_CASE("what cannot be constrained so is one clear error") {
     const auto constrained = [&](const std::string& lines) {
         return refusal(two + "[constraints]\n" + lines + method(3, 0.1, 1));
     };
-    CHECK(contains(constrained("a = \"x^2 + y^2 = 1\"\nb = \"2*x^2 = 2 - 2*y^2\"\n"),
-                   "the constraints a, b depend on one another"));
-    CHECK(contains(constrained("a = \"y^2 = 0\"\n"), "has no slope"));
-    CHECK(contains(constrained("a = \"x'^2 + y^2 = 1\"\n"), "holds a velocity"));
-    CHECK(contains(constrained("a = \"1 = 1\"\n"), "holds no coordinate"));
-    CHECK(contains(constrained("a = \"x = 1 rising\"\n"), "leave out 'rising'"));
-    CHECK(contains(constrained("a = \"x = 1\"\nb = \"y = 0\"\nc = \"z = 0\"\n"), "nothing is left that could move"));
-    CHECK(contains(constrained("\"a[i]\" = \"x = 1\"\n"), "has a count"));
-    CHECK(contains(constrained("a = { equation = \"x = 1\", count = 2 }\n"), "a count makes an array"));
-    CHECK(contains(constrained("a = 3\n"), "must be an equation in quotes"));
-    CHECK(contains(constrained("x = \"x = 1\"\n"), "both a coordinate and a constraint"));
-    CHECK(contains(constrained("a = \"x^2 + y^2 = -1\"\n"), "cannot close"));
-    CHECK(contains(refusal(two + method(3, 0.1, 1, "assemble = true\n")), "nothing to assemble"));
+    CHECK(test::contains(constrained("a = \"x^2 + y^2 = 1\"\nb = \"2*x^2 = 2 - 2*y^2\"\n"),
+                         "the constraints a, b depend on one another"));
+    CHECK(test::contains(constrained("a = \"y^2 = 0\"\n"), "has no slope"));
+    CHECK(test::contains(constrained("a = \"x'^2 + y^2 = 1\"\n"), "holds a velocity"));
+    CHECK(test::contains(constrained("a = \"1 = 1\"\n"), "holds no coordinate"));
+    CHECK(test::contains(constrained("a = \"x = 1 rising\"\n"), "leave out 'rising'"));
+    CHECK(test::contains(constrained("a = \"x = 1\"\nb = \"y = 0\"\nc = \"z = 0\"\n"),
+                         "nothing is left that could move"));
+    CHECK(test::contains(constrained("\"a[i]\" = \"x = 1\"\n"), "has a count"));
+    CHECK(test::contains(constrained("a = { equation = \"x = 1\", count = 2 }\n"), "a count makes an array"));
+    CHECK(test::contains(constrained("a = 3\n"), "must be an equation in quotes"));
+    CHECK(test::contains(constrained("x = \"x = 1\"\n"), "both a coordinate and a constraint"));
+    CHECK(test::contains(constrained("a = \"x^2 + y^2 = -1\"\n"), "cannot close"));
+    CHECK(test::contains(refusal(two + method(3, 0.1, 1, "assemble = true\n")), "nothing to assemble"));
     for (const char* const other :
          {"family = \"gauss\"\n", "family = \"splitting\"\n", "arithmetic = \"clean\"\n", "clock = \"x\"\n"})
-        CHECK(contains(refusal(two + "[constraints]\na = \"x^2 + y^2 = 1\"\n[method]\n" + other +
-                               "[run]\nstep = 0.1\nuntil = 1\n"),
-                       "constraints need"));
+        CHECK(test::contains(refusal(two + "[constraints]\na = \"x^2 + y^2 = 1\"\n[method]\n" + other +
+                                     "[run]\nstep = 0.1\nuntil = 1\n"),
+                             "constraints need"));
 }
 
 TEST_CASE("a mass that is missing along the constraints is told, one that is missing across them is none") {
-    CHECK(contains(refusal("lagrangian = \"(x' + y')^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
-                           "y = { position = 1, velocity = 0 }\n[constraints]\nboth = \"x + y = 2\"\n" +
-                           method(3, 0.1, 1)),
-                   "No kinetic energy opposes the direction"));
+    CHECK(test::contains(refusal("lagrangian = \"(x' + y')^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                                 "y = { position = 1, velocity = 0 }\n[constraints]\nboth = \"x + y = 2\"\n" +
+                                 method(3, 0.1, 1)),
+                         "No kinetic energy opposes the direction"));
     // x moves with the mass of both: q'' = 0.
     const Ended ended =
         run(scene_of("lagrangian = \"(x' + y')^2/2\"\n[coordinates]\nx = { position = 1, velocity = 2 }\n"
@@ -532,9 +529,9 @@ TEST_CASE("a sweep refuses the trajectories that start off the constraints, and 
     };
     const auto [refused, off] = rows("");
     CHECK(refused == 3);
-    CHECK(contains(off, "9 start off the constraints"));
-    CHECK(contains(off, ",9,"));
+    CHECK(test::contains(off, "9 start off the constraints"));
+    CHECK(test::contains(off, ",9,"));
     const auto [taken, assembled] = rows("assemble = true\n");
     CHECK(taken == 0);
-    CHECK(!contains(assembled, ",9,"));
+    CHECK(!test::contains(assembled, ",9,"));
 }

@@ -65,10 +65,6 @@ std::string refusal(const std::string& text) {
     }
     return "";
 }
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 }  // namespace
 
 TEST_CASE("a ball bounces at the exact times, by every method, also where a step holds several impacts" *
@@ -275,7 +271,7 @@ TEST_CASE("impacts that accumulate end the run, with the state before that step"
         CHECK(ended.result.status == LOBATTO_IMPACTS_ACCUMULATE);
         CHECK(std::fabs(ended.result.time - (e == 0.5 ? 2.85 : 0.9)) < 1e-14);
         CHECK(std::fabs(ended.events.back()[1] - (e == 0.5 ? 3 : 1)) < 1e-6);
-        CHECK(contains(explain_stop(ended.result, TrajectoryRequest()), "impacts accumulate"));
+        CHECK(test::contains(explain_stop(ended.result, TrajectoryRequest()), "impacts accumulate"));
     }
     // At rest on the floor from the start.
     const Ended rests =
@@ -468,19 +464,20 @@ TEST_CASE("formulas of pieces are written with their operands") {
         return refusal("lagrangian = \"x'^2/2 - " + formula +
                        "\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n" + method("points = 4", 0.1, 1));
     };
-    CHECK(contains(wrong("max(x)"), "1:29: max is written max(a, b)"));
-    CHECK(contains(wrong("if(x, 1, 2)"), "a condition is written if(a > b, c, d)"));
-    CHECK(contains(wrong("abs x"), "abs needs parentheses: write abs(a)"));
-    CHECK(contains(wrong("x^2*sig(x)"), "unknown function 'sig'"));
-    CHECK(contains(
+    CHECK(test::contains(wrong("max(x)"), "1:29: max is written max(a, b)"));
+    CHECK(test::contains(wrong("if(x, 1, 2)"), "a condition is written if(a > b, c, d)"));
+    CHECK(test::contains(wrong("abs x"), "abs needs parentheses: write abs(a)"));
+    CHECK(test::contains(wrong("x^2*sig(x)"), "unknown function 'sig'"));
+    CHECK(test::contains(
         refusal("lagrangian = \"x'^2/2\"\n[parameters]\nabs = 1\n[coordinates]\nx = { position = 1, velocity = "
                 "0 }\n" +
                 method("points = 4", 0.1, 1)),
         "abs"));
-    CHECK(contains(refusal("lagrangian = \"x'^2/2\"\n[parameters]\na = 1\n[coordinates]\nx = { position = \"abs(a)\", "
-                           "velocity = 0 }\n" +
-                           method("points = 4", 0.1, 1)),
-                   "abs needs a number here"));
+    CHECK(test::contains(
+        refusal("lagrangian = \"x'^2/2\"\n[parameters]\na = 1\n[coordinates]\nx = { position = \"abs(a)\", "
+                "velocity = 0 }\n" +
+                method("points = 4", 0.1, 1)),
+        "abs needs a number here"));
 }
 
 TEST_CASE("the emitted impacts are what the scene says, to 50 digits") {
@@ -504,21 +501,21 @@ TEST_CASE("what is wrong with a wall is said with its place") {
     const std::string head = "lagrangian = \"y'^2/2 - y\"\n[coordinates]\ny = { position = 1, velocity = 0 }\n",
                       tail = method("points = 4", 0.1, 1);
     const auto wall = [&](const std::string& line) { return refusal(head + "[impacts]\n" + line + "\n" + tail); };
-    CHECK(contains(wall("a = { when = \"y = 0\" }"), "5:14: from which side does the motion meet a?"));
-    CHECK(contains(wall("a = { when = \"y' = 0 falling\" }"), "the wall a holds a velocity"));
-    CHECK(contains(wall("a = { when = \"1 = 0 falling\" }"), "the wall a holds no coordinate"));
-    CHECK(contains(wall("a = { when = \"y = 0 falling\", restitution = 1.5 }"), "5:45: the restitution is 1.5"));
-    CHECK(contains(wall("a = { when = \"y = 2 falling\" }"), "the start is behind the wall a"));
-    CHECK(contains(wall("a = { restitution = 1 }"), "when = \"y = 0 falling\""));
-    CHECK(contains(wall("\"a[i]\" = { when = \"y = 0 falling\" }"), "how many impacts a[i] are there?"));
-    CHECK(contains(wall("a = { when = \"y = 0 falling\", reset = { z = 1 } }"), "there is no coordinate 'z'"));
-    CHECK(contains(wall("y = { when = \"y = 0 falling\" }"), "y"));
-    CHECK(contains(refusal("lagrangian = \"y'^4 + y'^2 - y\"\n[coordinates]\ny = { position = 1, velocity = 1 }\n"
-                           "[impacts]\na = { when = \"y = 0 falling\" }\n" +
-                           tail),
-                   "quadratic"));
-    CHECK(contains(refusal(head + "[impacts]\na = { when = \"y = 0 falling\" }\n" + tail + "[output]\ndense = 3\n"),
-                   "dense = 0"));
+    CHECK(test::contains(wall("a = { when = \"y = 0\" }"), "5:14: from which side does the motion meet a?"));
+    CHECK(test::contains(wall("a = { when = \"y' = 0 falling\" }"), "the wall a holds a velocity"));
+    CHECK(test::contains(wall("a = { when = \"1 = 0 falling\" }"), "the wall a holds no coordinate"));
+    CHECK(test::contains(wall("a = { when = \"y = 0 falling\", restitution = 1.5 }"), "5:45: the restitution is 1.5"));
+    CHECK(test::contains(wall("a = { when = \"y = 2 falling\" }"), "the start is behind the wall a"));
+    CHECK(test::contains(wall("a = { restitution = 1 }"), "when = \"y = 0 falling\""));
+    CHECK(test::contains(wall("\"a[i]\" = { when = \"y = 0 falling\" }"), "how many impacts a[i] are there?"));
+    CHECK(test::contains(wall("a = { when = \"y = 0 falling\", reset = { z = 1 } }"), "there is no coordinate 'z'"));
+    CHECK(test::contains(wall("y = { when = \"y = 0 falling\" }"), "y"));
+    CHECK(test::contains(refusal("lagrangian = \"y'^4 + y'^2 - y\"\n[coordinates]\ny = { position = 1, velocity = 1 }\n"
+                                 "[impacts]\na = { when = \"y = 0 falling\" }\n" +
+                                 tail),
+                         "quadratic"));
+    CHECK(test::contains(
+        refusal(head + "[impacts]\na = { when = \"y = 0 falling\" }\n" + tail + "[output]\ndense = 3\n"), "dense = 0"));
 }
 
 TEST_CASE("formulas with sides may start at numbers that are not rational") {

@@ -65,14 +65,9 @@ std::string scene_with(const std::string& force, const std::string& until = "1.9
            "[parameters]\nm = 2\n[forces]\nq = '''" +
            force + "'''\n[run]\nstep = 0.1\nuntil = " + until + "\n";
 }
-std::string message_of(const std::string& path) {
-    try {
-        static_cast<void>(run(read_scene(path)));
-    } catch (const InputError& error) {
-        const std::string text = error.what();
-        return text.substr(0, text.find('\n'));
-    }
-    return "nothing was thrown";
+std::string refusal_of(const std::string& path) {
+    const std::string text = test::message_of<InputError>([&] { static_cast<void>(run(read_scene(path))); });
+    return text.substr(0, text.find('\n'));
 }
 
 }  // namespace
@@ -198,7 +193,7 @@ TEST_CASE("a motion that leaves a table ends with exit code 3 and its name, one 
     CHECK(late.exit_code == 3);
     CHECK(late.err.find("torque.csv") != std::string::npos);
     test::write_text(folder / "early.toml", scene_with("table(\"torque.csv\", t - 0.05)"));
-    CHECK(message_of(folder / "early.toml").find("the table torque.csv, which goes from 0 to 2,") != std::string::npos);
+    CHECK(refusal_of(folder / "early.toml").find("the table torque.csv, which goes from 0 to 2,") != std::string::npos);
     // Up to its very end it serves.
     test::write_text(folder / "whole.toml", scene_with("table(\"torque.csv\", t)", "2"));
     CHECK(run(read_scene(folder / "whole.toml")).status == LOBATTO_OK);

@@ -50,10 +50,6 @@ struct Place {
     }
 };
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 double number_after(const std::string& text, const std::string& pattern) {
     std::smatch match;
     return std::regex_search(text, match, std::regex(pattern + "\\s*([-+.0-9e]+)")) ? std::stod(match[1])
@@ -173,9 +169,9 @@ TEST_CASE("a choice written into a scene leaves everything else, and reads back"
     CHECK(scene.evaluate(scene.run.step, "step").to_double() == 0.12);
     CHECK(scene.evaluate(scene.run.until, "until").to_double() == 120);
     CHECK(scene.run.error == 1e-8);
-    CHECK(contains(changed, "# lobatto tune --error 1e-08: 5e-09 to t = 120"));
-    CHECK(contains(changed, "until = 120 # s: about 100 swings"));  // its own comment
-    CHECK(contains(changed, "[output]\nevery = 1     # keep every step\n"));
+    CHECK(test::contains(changed, "# lobatto tune --error 1e-08: 5e-09 to t = 120"));
+    CHECK(test::contains(changed, "until = 120 # s: about 100 swings"));  // its own comment
+    CHECK(test::contains(changed, "[output]\nevery = 1     # keep every step\n"));
     CHECK(with_choice(changed, choice, 1e-8, false) == changed);  // once is enough
     // Without [method], with a step from a period, and what looks like a table inside a text.
     const std::string other =
@@ -187,7 +183,7 @@ TEST_CASE("a choice written into a scene leaves everything else, and reads back"
     CHECK(second.method.points == 7);
     CHECK(second.evaluate(second.run.step, "step").to_double() == 0.5);
     CHECK(second.evaluate(second.run.until, "until").to_double() == 20);
-    CHECK(contains(second.source.content(), "# [method]\n  - x^2/2\"\"\""));
+    CHECK(test::contains(second.source.content(), "# [method]\n  - x^2/2\"\"\""));
     // In numbers of more digits the step is an exact part of the end.
     Choice wide = choice_of({Family::lobatto, 12, 1e-23}, 24, 20);
     wide.measurement.candidate.member.precision = Precision::double_double;
@@ -280,8 +276,8 @@ TEST_CASE("a budget is a time with a unit") {
     CHECK(seconds("45") == 45);
     CHECK(test::message_of<InputError>([&] { seconds("soon"); }) ==
           "--budget: 'soon' is not a time; write 30s, 5min or 1h");
-    CHECK(contains(test::message_of<InputError>([&] { seconds("10ms"); }), "is not a time"));
-    CHECK(contains(test::message_of<InputError>([&] { seconds("0.1s"); }), "too little for one measurement"));
+    CHECK(test::contains(test::message_of<InputError>([&] { seconds("10ms"); }), "is not a time"));
+    CHECK(test::contains(test::message_of<InputError>([&] { seconds("0.1s"); }), "too little for one measurement"));
 }
 
 TEST_CASE("what cannot be promised or measured is refused with the reason") {
@@ -290,7 +286,7 @@ TEST_CASE("what cannot be promised or measured is refused with the reason") {
         const test::Finished finished = place.run(arguments);
         CAPTURE(finished.err);
         CHECK(finished.exit_code == code);
-        CHECK(contains(finished.err, reason));
+        CHECK(test::contains(finished.err, reason));
     };
     refused({"tune", pendulum, "--error", "1e-30"}, 2, "at most 0.1 and at least 1e-28");
     refused({"tune", pendulum, "--error", "small"}, 2, "'small' is not a number");
@@ -318,11 +314,11 @@ TEST_CASE("tune proposes no step that is unstable for an oscillation at rest, an
     CAPTURE(moving.out);
     CAPTURE(moving.err);
     REQUIRE(moving.exit_code == 0);
-    CHECK(contains(moving.out, "h omega"));
-    CHECK_FALSE(contains(moving.out, "only for moments"));
+    CHECK(test::contains(moving.out, "h omega"));
+    CHECK_FALSE(test::contains(moving.out, "only for moments"));
     const test::Finished resting = tuned("0");
     CHECK(resting.exit_code == 3);
-    CHECK(contains(resting.err, "nothing moves to t = 10: every step is exact, and there is nothing to choose"));
+    CHECK(test::contains(resting.err, "nothing moves to t = 10: every step is exact, and there is nothing to choose"));
 }
 
 TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic solution" * doctest::test_suite("slow")) {
@@ -334,9 +330,9 @@ TEST_CASE("tune keeps its promise on the pendulum, against the exact elliptic so
     CAPTURE(tuned.out);
     CAPTURE(tuned.err);
     REQUIRE(tuned.exit_code == 0);
-    CHECK(contains(tuned.out, "error at most 1e-06 to t = 20"));
+    CHECK(test::contains(tuned.out, "error at most 1e-06 to t = 20"));
     CHECK(number_after(tuned.out, "predicted error") <= 1e-6);
-    CHECK(contains(tuned.out, "stability"));
+    CHECK(test::contains(tuned.out, "stability"));
     const test::Finished ran = place.run({"run", scene, "-o", place.folder / "run.csv"});
     CAPTURE(ran.out);
     REQUIRE(ran.exit_code == 0);
@@ -357,8 +353,8 @@ TEST_CASE("tradeoff writes a table, CSV, JSON, pictures and a page that needs no
     CAPTURE(first.out);
     CAPTURE(first.err);
     REQUIRE(first.exit_code == 0);
-    CHECK(contains(first.out, "ns/unit"));
-    CHECK(contains(first.out, "explicit extrapolation in quadruple differs from it by"));
+    CHECK(test::contains(first.out, "ns/unit"));
+    CHECK(test::contains(first.out, "explicit extrapolation in quadruple differs from it by"));
     const auto json = nlohmann::json::parse(test::read_file(out + "/tradeoff.json"));
     REQUIRE(json.at("front").size() > 2);
     CHECK(json.at("chaotic") == false);
@@ -373,15 +369,15 @@ TEST_CASE("tradeoff writes a table, CSV, JSON, pictures and a page that needs no
     const std::string csv = test::read_file(out + "/tradeoff.csv");
     CHECK(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')) == json.at("measurements").size() + 1);
     const std::string page = test::read_file(out + "/report.html");
-    CHECK(contains(page, "<script type=\"application/json\" id=\"data\">"));
-    CHECK(contains(page, "data:image/svg+xml"));
-    CHECK(contains(page, "lagrangian = "));
+    CHECK(test::contains(page, "<script type=\"application/json\" id=\"data\">"));
+    CHECK(test::contains(page, "data:image/svg+xml"));
+    CHECK(test::contains(page, "lagrangian = "));
     CHECK_FALSE(std::regex_search(page, std::regex("(src|href)=\"(?!data:)")));
     const std::size_t begin = page.find("id=\"data\">") + 10, end = page.find("</script>", begin);
     CHECK(nlohmann::json::parse(page.substr(begin, end - begin)) == json);
-    CHECK(contains(test::read_file(out + "/work_precision.svg"), "</svg>"));
+    CHECK(test::contains(test::read_file(out + "/work_precision.svg"), "</svg>"));
     const test::Finished second = place.run(command);
-    CHECK(contains(second.out, "of an earlier run)"));
+    CHECK(test::contains(second.out, "of an earlier run)"));
 }
 
 TEST_CASE("Ctrl-C leaves the measurements of a tradeoff, and the next call measures only the rest") {
@@ -395,13 +391,13 @@ TEST_CASE("Ctrl-C leaves the measurements of a tradeoff, and the next call measu
         CHECK(interrupted_when(command, log, has_more) == 130);
         const std::string said = test::read_file(log);
         CAPTURE(said);
-        CHECK(contains(said, "interrupted; the measurements are kept, and the same command goes on from them."));
-        if (!before.empty()) CHECK(contains(said, fmt::format("({} of an earlier run)", before.size() - 1)));
+        CHECK(test::contains(said, "interrupted; the measurements are kept, and the same command goes on from them."));
+        if (!before.empty()) CHECK(test::contains(said, fmt::format("({} of an earlier run)", before.size() - 1)));
         const std::vector<std::string> now = lines_of(store);
         REQUIRE(now.size() >= before.size() + more);
         CHECK(std::equal(before.begin(), before.end(), now.begin()));
         before = now;
-        CHECK(contains(test::read_file(out + "/tradeoff.csv"), "lobatto,8,double,"));
+        CHECK(test::contains(test::read_file(out + "/tradeoff.csv"), "lobatto,8,double,"));
     }
     std::set<std::string> candidates;  // each once
     for (std::size_t i = 1; i < before.size(); ++i)
@@ -415,7 +411,7 @@ TEST_CASE("run warns beyond the linear stability limit") {
     const Place place;
     const test::Finished ran =
         place.run({"run", pendulum, "--points", "2", "--step", "0.4", "--until", "4", "-o", place.folder / "run.csv"});
-    CHECK(contains(ran.err, "beyond the linear stability limit: h omega = 2.51 is more than 2"));
+    CHECK(test::contains(ran.err, "beyond the linear stability limit: h omega = 2.51 is more than 2"));
     CHECK(
         place.run({"run", pendulum, "--points", "2", "--step", "0.01", "--until", "4", "-o", place.folder / "run.csv"})
             .err == "");
@@ -427,11 +423,11 @@ TEST_SUITE("slow") {
         test::Finished refused;
         for (const char* const budget : {"15s", "60s", "4min"}) {  // a busy machine needs more for the reference
             refused = place.run({"tune", duffing, "--error", "1e-9", "--budget", budget});
-            if (!contains(refused.err, "the budget leaves")) break;
+            if (!test::contains(refused.err, "the budget leaves")) break;
         }
         CAPTURE(refused.err);
         CHECK(refused.exit_code == 3);
-        CHECK(contains(refused.err, "cannot be promised to t = 1256.64"));
-        CHECK(contains(refused.err, "try --until"));
+        CHECK(test::contains(refused.err, "cannot be promised to t = 1256.64"));
+        CHECK(test::contains(refused.err, "try --until"));
     }
 }

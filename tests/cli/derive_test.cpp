@@ -21,10 +21,6 @@ test::Finished lobatto_program(std::vector<std::string> arguments) {
     return test::run(arguments);
 }
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 std::string scene_with(const std::string& lagrangian, const std::string& coordinates, const std::string& parameters) {
     return "lagrangian = \"" + lagrangian + "\"\n[coordinates]\n" + coordinates + "[parameters]\n" + parameters +
            "[method]\nfamily = \"lobatto\"\npoints = 4\n[run]\nstep = 0.1\nuntil = 1\n";
@@ -51,23 +47,23 @@ TEST_CASE("derive shows the paper's K, its four polynomials and its system for t
              "    yes solution in closed form: q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2",
          }) {
         INFO(line);
-        CHECK(contains(shown.out, line));
+        CHECK(test::contains(shown.out, line));
     }
     for (const char* number : {"(D1)", "(D2)", "(D3)", "(D4)", "(D5)", "(D6)", "(D7)", "(D8)", "(D9)", "(D10)", "(D11)",
                                "(D12)", "(D13)", "(D16)", "(D17)", "(D19)", "(D22)"}) {
         INFO(number);
-        CHECK(contains(shown.out, number));
+        CHECK(test::contains(shown.out, number));
     }
 }
 
 TEST_CASE("derive shows the closed form of the harmonic oscillator: the paper's Phi in z") {
     const test::Finished shown = lobatto_program({"derive", tree + "/scenes/harmonic_oscillator.toml"});
-    CHECK(contains(shown.out,
-                   "    delta = z/30 + z^2/1800 + 1\n"
-                   "    a = 23*z^2/900 - 7*z/15 - z^3/3600 + 1\n"
-                   "    b = 2*z^2/15 - z - z^3/300 + z^4/43200\n"
-                   "    c = z^2/300 - 2*z/15 + 1\n"));
-    CHECK(contains(shown.out, "    z = h^2*omega^2\n"));
+    CHECK(test::contains(shown.out,
+                         "    delta = z/30 + z^2/1800 + 1\n"
+                         "    a = 23*z^2/900 - 7*z/15 - z^3/3600 + 1\n"
+                         "    b = 2*z^2/15 - z - z^3/300 + z^4/43200\n"
+                         "    c = z^2/300 - 2*z/15 + 1\n"));
+    CHECK(test::contains(shown.out, "    z = h^2*omega^2\n"));
 }
 
 TEST_CASE("derive prints the same bytes in every process, in every notation" * doctest::test_suite("slow")) {
@@ -134,11 +130,12 @@ TEST_CASE("--latex is a whole document in which nothing of the scene is markup")
     const std::string text = latex_of(describe(derivation));
     CHECK(text.rfind("\\documentclass", 0) == 0);
     CHECK(text.substr(text.size() - 15) == "\\end{document}\n");
-    CHECK(contains(text,
-                   "\\title{50 \\% of \\$x\\_1 \\& \\textbackslash{}input\\{secret\\} \\{\\#\\} \\textasciitilde{} "
-                   "\\textasciicircum{} U+03A9}\n"));
-    CHECK(contains(text, "p_{\\mathrm{left}}"));
-    CHECK(contains(text, "\\begin{bmatrix}"));
+    CHECK(
+        test::contains(text,
+                       "\\title{50 \\% of \\$x\\_1 \\& \\textbackslash{}input\\{secret\\} \\{\\#\\} \\textasciitilde{} "
+                       "\\textasciicircum{} U+03A9}\n"));
+    CHECK(test::contains(text, "p_{\\mathrm{left}}"));
+    CHECK(test::contains(text, "\\begin{bmatrix}"));
     long depth = 0;
     for (std::size_t i = 0; i < text.size(); ++i) {
         if (i > 0 && text[i - 1] == '\\') continue;
@@ -163,7 +160,7 @@ TEST_CASE("any other Lagrangian shows its momenta, forces, second derivatives an
              "(D30) R = 0",
          }) {
         INFO(line);
-        CHECK(contains(text, line));
+        CHECK(test::contains(text, line));
     }
 }
 
@@ -173,12 +170,12 @@ TEST_CASE("a large system is derived without the equations of all nodes, and say
         "x = { count = 40, position = \"sin(i)\", velocity = 0 }\n[method]\npoints = 4\n[run]\nstep = 0.1\nuntil = "
         "1\n");
     const std::string text = text_of(chain);
-    CHECK(
-        contains(text,
-                 "Equations    not written out: 40 coordinates at 4 points of a step are 160 positions, more than 60; "
-                 "the kernel assembles them from the formulas of one node\n"));
-    CHECK(contains(text, "    S_1_2 = -3*(x_1 - x_2)^2\n"));
-    CHECK(!contains(text, "L_d"));
+    CHECK(test::contains(
+        text,
+        "Equations    not written out: 40 coordinates at 4 points of a step are 160 positions, more than 60; "
+        "the kernel assembles them from the formulas of one node\n"));
+    CHECK(test::contains(text, "    S_1_2 = -3*(x_1 - x_2)^2\n"));
+    CHECK(!test::contains(text, "L_d"));
     CHECK(nlohmann::json::parse(json_of(chain))["formulas"].size() == 12);
 }
 
@@ -187,8 +184,8 @@ TEST_CASE("names of the scene that the derivation uses too stay apart") {
     const std::string text =
         text_of(description_of(scene_with("q'^2/2 - q_2*cos(q) - v*q^4 - p_left*q",
                                           "q = { position = 1, velocity = 0 }\n", "q_2 = 4\nv = 2\np_left = 1\n")));
-    CHECK(contains(text, "q_1, q_2_, q_3, q_4 at the nodes of one step"));
-    CHECK(contains(text, "    v_ = p_left_ - h*(p_left + 4*q_1^3*v - q_2*sin(q_1))/12"));
+    CHECK(test::contains(text, "q_1, q_2_, q_3, q_4 at the nodes of one step"));
+    CHECK(test::contains(text, "    v_ = p_left_ - h*(p_left + 4*q_1^3*v - q_2*sin(q_1))/12"));
 }
 
 TEST_CASE("long sums are cut before their signs, and only there") {
@@ -207,15 +204,15 @@ TEST_CASE("emit writes the header and its support, says what each pass saved and
     const std::string path = (folder / "new" / "folder").string();
     CHECK(test::read_file(path + "/kernel.hpp") == support_text());
     CHECK(test::read_file(path + "/pendulum.hpp") == test::read_file(tree + "/generated/pendulum.hpp"));
-    CHECK(contains(emitted.out, "\nWrote " + path + "/pendulum.hpp and " + path + "/kernel.hpp\n"));
+    CHECK(test::contains(emitted.out, "\nWrote " + path + "/pendulum.hpp and " + path + "/kernel.hpp\n"));
     for (const char* pass : {"as derived ", "fold constants ", "factor sums (Horner) ", "powers by multiplication ",
                              "group by phase ", "share common parts ", "sums of angles ", "pair sines and cosines "})
-        CHECK(contains(emitted.out, pass));
-    CHECK(contains(emitted.out, "  lobatto::Stepper<lobatto::kernels::pendulum> stepper;\n"));
-    CHECK(contains(emitted.out, " -I " + path + " program.cpp\n"));
+        CHECK(test::contains(emitted.out, pass));
+    CHECK(test::contains(emitted.out, "  lobatto::Stepper<lobatto::kernels::pendulum> stepper;\n"));
+    CHECK(test::contains(emitted.out, " -I " + path + " program.cpp\n"));
     const std::string spaced = folder / "it's new";
-    CHECK(contains(lobatto_program({"emit", tree + "/scenes/pendulum.toml", "-o", spaced}).out,
-                   " -I '" + (folder / "it'\\''s new").string() + "' program.cpp\n"));
+    CHECK(test::contains(lobatto_program({"emit", tree + "/scenes/pendulum.toml", "-o", spaced}).out,
+                         " -I '" + (folder / "it'\\''s new").string() + "' program.cpp\n"));
     int files = 0;
     for (const auto& entry : std::filesystem::directory_iterator(path)) files += entry.is_regular_file() ? 1 : 0;
     CHECK(files == 2);  // no temporary file is left
@@ -233,8 +230,8 @@ TEST_CASE("emit prints one file where it is asked to") {
     }
     const test::Finished two = lobatto_program({"emit", scene, "-o", "-"});
     CHECK(two.exit_code == 2);
-    CHECK(contains(two.err, "standard output takes one file"));
-    CHECK(contains(lobatto_program({"gallery", tree + "/scenes", "-o", "-"}).err, "name a folder for them"));
+    CHECK(test::contains(two.err, "standard output takes one file"));
+    CHECK(test::contains(lobatto_program({"gallery", tree + "/scenes", "-o", "-"}).err, "name a folder for them"));
 }
 
 TEST_CASE("emit that cannot write says where and why, with exit code 4, and leaves the old file") {

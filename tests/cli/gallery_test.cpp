@@ -19,10 +19,6 @@ test::Finished gallery(const std::string& folder, const std::vector<std::string>
     return test::run(arguments);
 }
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 }  // namespace
 
 TEST_CASE("a gallery drawn twice has the same bytes, and its drawings are small and whole") {
@@ -32,20 +28,21 @@ TEST_CASE("a gallery drawn twice has the same bytes, and its drawings are small 
     const test::Finished first = gallery(one.string(), scenes);
     CHECK(first.exit_code == 0);
     CHECK(first.err == "");
-    CHECK(contains(first.out, "2 of 2 scenes drawn; " + one.string() + "/README.md shows them.\n"));
+    CHECK(test::contains(first.out, "2 of 2 scenes drawn; " + one.string() + "/README.md shows them.\n"));
     CHECK(gallery(two.string(), scenes).exit_code == 0);
     for (const char* name : {"pendulum.svg", "figure_eight.svg"}) {
         const std::string svg = test::read_file(one / name);
         CHECK(svg == test::read_file(two / name));
         CHECK(svg.starts_with("<?xml "));
-        CHECK(contains(svg, "</svg>"));
-        CHECK(contains(svg, name == std::string("pendulum.svg") ? ">A plane pendulum<" : ">The figure of eight<"));
+        CHECK(test::contains(svg, "</svg>"));
+        CHECK(
+            test::contains(svg, name == std::string("pendulum.svg") ? ">A plane pendulum<" : ">The figure of eight<"));
         CHECK(svg.size() > 8000);
         CHECK(svg.size() < 150000);
     }
     const std::string page = test::read_file(one / "README.md");
-    CHECK(contains(page, "![A plane pendulum](pendulum.svg)"));
-    CHECK(contains(page, "![The figure of eight](figure_eight.svg)"));
+    CHECK(test::contains(page, "![A plane pendulum](pendulum.svg)"));
+    CHECK(test::contains(page, "![The figure of eight](figure_eight.svg)"));
     // Nothing else is left behind.
     CHECK(std::distance(std::filesystem::directory_iterator(one / ""), std::filesystem::directory_iterator()) == 3);
 }
@@ -59,12 +56,12 @@ TEST_CASE("a scene that fails is reported without stopping the others") {
     test::write_text(wrong, "title = \"Wrong\"\nlagrangian = \"x'^2/2 - y\"\n" + rest);
     const test::Finished done = gallery(folder / "out", {escape, wrong, scene_path("pendulum")});
     CHECK(done.exit_code == 3);
-    CHECK(contains(done.err, escape + ": the run stopped in step "));
-    CHECK(contains(done.err, wrong + ":2:24: unknown name 'y'"));
-    CHECK(contains(done.out, "1 of 3 scenes drawn; "));
+    CHECK(test::contains(done.err, escape + ": the run stopped in step "));
+    CHECK(test::contains(done.err, wrong + ":2:24: unknown name 'y'"));
+    CHECK(test::contains(done.out, "1 of 3 scenes drawn; "));
     CHECK(std::filesystem::exists(folder / "out/pendulum.svg"));
     CHECK(!std::filesystem::exists(folder / "out/escape.svg"));
-    CHECK(!contains(test::read_file(folder / "out/README.md"), "Escape"));
+    CHECK(!test::contains(test::read_file(folder / "out/README.md"), "Escape"));
 }
 
 TEST_CASE("what is drawn is told by the shape of the scene") {

@@ -30,10 +30,6 @@ nlohmann::json report_of(std::vector<std::string> arguments) {
     return nlohmann::json::parse(done.out);
 }
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 std::string scene_in(const test::TemporaryFolder& folder, const std::string& lagrangian, const std::string& coordinates,
                      const std::string& more = "") {
     const std::string path = folder / "scene.toml";
@@ -47,9 +43,9 @@ std::string scene_in(const test::TemporaryFolder& folder, const std::string& lag
 TEST_CASE("without a scene every member is listed, for people and for machines") {
     const test::Finished done = stability({});
     CHECK(done.exit_code == 0);
-    CHECK(contains(done.out, "Lobatto, 4 points  6      1/604800*(h*omega)^6"));
-    CHECK(contains(done.out, "3.11271764816421725708492043465"));
-    CHECK(contains(done.out, "Gauss, 10 stages   20"));
+    CHECK(test::contains(done.out, "Lobatto, 4 points  6      1/604800*(h*omega)^6"));
+    CHECK(test::contains(done.out, "3.11271764816421725708492043465"));
+    CHECK(test::contains(done.out, "Gauss, 10 stages   20"));
     const auto members = report_of({})["members"];
     REQUIRE(members.size() == 21);
     CHECK(members[1]["intervals"][0]["to"]["exact_angle"] == "sqrt(8)");
@@ -60,14 +56,14 @@ TEST_CASE("without a scene every member is listed, for people and for machines")
 
 TEST_CASE("one member alone is shown in full, Gauss's with its proof") {
     const test::Finished lobatto = stability({"--points", "3"});
-    CHECK(contains(lobatto.out, "  trace = 2*a/delta = (48 - 22*z + z^2)/(24 + z)\n"));
-    CHECK(contains(lobatto.out, "  stable   to 2.82842712474619009760337744842 = sqrt(8)\n"));
-    CHECK(contains(lobatto.out, "(1 + (h*omega)^4/2880 + ...), so the motion runs ahead"));
+    CHECK(test::contains(lobatto.out, "  trace = 2*a/delta = (48 - 22*z + z^2)/(24 + z)\n"));
+    CHECK(test::contains(lobatto.out, "  stable   to 2.82842712474619009760337744842 = sqrt(8)\n"));
+    CHECK(test::contains(lobatto.out, "(1 + (h*omega)^4/2880 + ...), so the motion runs ahead"));
     const test::Finished gauss = stability({"--stages", "2"});
-    CHECK(contains(gauss.out, "  stable   without end\n"));
-    CHECK(contains(gauss.out, "4 - trace^2 = z*(2*c/delta)^2"));
-    CHECK(contains(gauss.out, "No step size is unstable."));
-    CHECK(contains(gauss.out, "so the motion runs late"));
+    CHECK(test::contains(gauss.out, "  stable   without end\n"));
+    CHECK(test::contains(gauss.out, "4 - trace^2 = z*(2*c/delta)^2"));
+    CHECK(test::contains(gauss.out, "No step size is unstable."));
+    CHECK(test::contains(gauss.out, "so the motion runs late"));
 }
 
 TEST_CASE("a linear scene in a gap of stability is called unstable, at the rate its kernel shows") {
@@ -81,7 +77,7 @@ TEST_CASE("a linear scene in a gap of stability is called unstable, at the rate 
     CHECK(report_of({scene_path("harmonic_oscillator"), "--step", "4/omega"})["points"][0]["modes"][0]["stable"] ==
           true);
     const test::Finished text = stability({scene_path("harmonic_oscillator"), "--step", "3.1375/omega"});
-    CHECK(contains(text.out, "UNSTABLE: grows by 1.0253 a step"));
+    CHECK(test::contains(text.out, "UNSTABLE: grows by 1.0253 a step"));
 }
 
 TEST_CASE("several coordinates are judged by their eigenfrequencies, and the kernel agrees") {
@@ -130,63 +126,63 @@ TEST_CASE("a step beyond the first limit somewhere along a motion is named") {
     const std::string path = scene_in(folder, "q'^2/2 - 450*(1 - cos(q))", "q = { position = 0.05, velocity = 0 }");
     const test::Finished done = stability({path, "--points", "2"});
     CHECK(done.exit_code == 0);
-    CHECK(contains(done.out, "UNSTABLE: grows by"));
-    CHECK(contains(done.out, "BEYOND the first limit, 1.06 times"));
+    CHECK(test::contains(done.out, "UNSTABLE: grows by"));
+    CHECK(test::contains(done.out, "BEYOND the first limit, 1.06 times"));
 }
 
 TEST_CASE("velocities that couple, time, singular places and no equilibrium are each said in words") {
     const test::TemporaryFolder folder;
     const std::string two = "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }";
-    CHECK(contains(
+    CHECK(test::contains(
         stability({scene_in(folder, "(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + y^2)/2", two)}).out,
         "no independent oscillations: its velocities couple the coordinates; the motion itself grows by 1 in a "
         "time h\n"
         "  measured on the kernel: growth a step 1, to within 0.0005\n"));
-    CHECK(contains(
+    CHECK(test::contains(
         stability({scene_in(folder, "q'^2/2 + cos(q)*sin(t)", "q = { position = 1, velocity = 0 }", "time = \"t\"\n")})
             .out,
         "its forces change with time; no equilibria are sought\n"));
-    CHECK(contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", two)}).out,
-                   "no equilibrium was found from its start and along its motion\n"));
+    CHECK(test::contains(stability({scene_in(folder, "(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", two)}).out,
+                         "no equilibrium was found from its start and along its motion\n"));
     // Friction: both decay by exp(-h/10).
     const test::Finished damped = stability({scene_in(folder, "q'^2/2 - q^2/2",
                                                       "q = { position = 1, velocity = 0 }\n"
                                                       "[forces]\nq = \"-0.2*q'\"")});
-    CHECK(contains(damped.out,
-                   "its forces depend on the velocities; the motion itself grows by 0.99005 in a time h\n"
-                   "  measured on the kernel: growth a step 0.99005\n"));
+    CHECK(test::contains(damped.out,
+                         "its forces depend on the velocities; the motion itself grows by 0.99005 in a time h\n"
+                         "  measured on the kernel: growth a step 0.99005\n"));
     // Both signs changed: the same oscillator.
-    CHECK(contains(stability({scene_in(folder, "q^2/2 - q'^2/2", "q = { position = 1, velocity = 0 }")}).out,
-                   "omega = 1 "));
+    CHECK(test::contains(stability({scene_in(folder, "q^2/2 - q'^2/2", "q = { position = 1, velocity = 0 }")}).out,
+                         "omega = 1 "));
     const test::Finished free = stability({scene_in(folder, "q'^2/2 - 3*q", "q = { position = 1, velocity = 0 }")});
-    CHECK(contains(free.out, "omega = 0              free: moves on steadily\n"));
+    CHECK(test::contains(free.out, "omega = 0              free: moves on steadily\n"));
     const test::Finished saddle = stability({scene_in(folder, "q'^2/2 + q^2/2", "q = { position = 1, velocity = 0 }")});
-    CHECK(contains(saddle.out, "unstable motion: grows by 1.1052 in a time h, in a step by 1.1052\n"));
-    CHECK(contains(saddle.out, "measured on the kernel: growth a step 1.1052\n"));
+    CHECK(test::contains(saddle.out, "unstable motion: grows by 1.1052 in a time h, in a step by 1.1052\n"));
+    CHECK(test::contains(saddle.out, "measured on the kernel: growth a step 1.1052\n"));
 }
 
 TEST_CASE("what the linear part, the limit or a measurement cannot tell is said") {
     const test::TemporaryFolder folder;
     const std::string q = "q = { position = 1, velocity = 0 }";
     const test::Finished quartic = stability({scene_in(folder, "q'^2/2 - q^4/4", q)});
-    CHECK(contains(quartic.out, "omega = 0              the linear part says nothing here\n"));
+    CHECK(test::contains(quartic.out, "omega = 0              the linear part says nothing here\n"));
     // Nothing holds both together: their centre moves on.
     const test::Finished pair =
         stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y)",
                             "x = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }")});
-    CHECK(contains(pair.out, "omega = 0              free: moves on steadily\n  omega = 1.41421 "));
+    CHECK(test::contains(pair.out, "omega = 0              free: moves on steadily\n  omega = 1.41421 "));
     const test::Finished held =
         stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y) - (x + y)^4",
                             "x = { position = 1, velocity = 0 }\ny = { position = 0.5, velocity = 0 }")});
-    CHECK(contains(held.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
+    CHECK(test::contains(held.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
     const test::Finished trapped =
         stability({scene_in(folder, "(x'^2 + y'^2)/2 - cosh(x - y) - (x + y)^4*exp(-1e5*(x + y)^2)",
                             "x = { position = 0.001, velocity = 0 }\ny = { position = 0, velocity = 0 }")});
-    CHECK(contains(trapped.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
+    CHECK(test::contains(trapped.out, "omega = 0              the linear part says nothing here\n  omega = 1.41421 "));
     // On the limit itself states grow in proportion to the number of steps.
     const std::string oscillator = scene_in(folder, "q'^2/2 - q^2/2", q);
-    CHECK(contains(stability({oscillator, "--points", "2", "--step", "2"}).out,
-                   "AT a limit, to rounding: grows in proportion to the number of steps\n"));
+    CHECK(test::contains(stability({oscillator, "--points", "2", "--step", "2"}).out,
+                         "AT a limit, to rounding: grows in proportion to the number of steps\n"));
     CHECK(report_of({oscillator, "--points", "2", "--step", "2"})["points"][0]["modes"][0]["stable"] == false);
     // A slow growth is measured for as long as it takes.
     const auto slow = report_of({oscillator, "--points", "5", "--step", "3.14146"})["points"][0];
@@ -196,11 +192,11 @@ TEST_CASE("what the linear part, the limit or a measurement cannot tell is said"
     CHECK(slow["measured_rate"].get<double>() == doctest::Approx(rate).epsilon(0.05));
     CHECK(slow["measured_floor"].get<double>() < rate);
     // However slow, it is no free motion.
-    CHECK(contains(stability({scene_in(folder, "q'^2/2 - 1e-300*q^2/2", q)}).out, "omega = 1e-150 "));
+    CHECK(test::contains(stability({scene_in(folder, "q'^2/2 - 1e-300*q^2/2", q)}).out, "omega = 1e-150 "));
     // Eigenvalues of steps bound no motion whose forces change with time.
     const test::Finished parametric =
         stability({scene_in(folder, "q'^2/2 - (1 + 0.5*cos(2*t))*q^2/2", q, "time = \"t\"\n")});
-    CHECK(contains(parametric.out, "steps looked at); as forces change with time it may grow all the same\n"));
+    CHECK(test::contains(parametric.out, "steps looked at); as forces change with time it may grow all the same\n"));
 }
 
 TEST_CASE("frequencies are met along a motion whose velocities couple the coordinates, and their absence is said") {
@@ -213,7 +209,7 @@ TEST_CASE("frequencies are met along a motion whose velocities couple the coordi
     CHECK(turning["trajectory"]["frequencies_at"] == turning["trajectory"]["states"]);
     const test::Finished falling =
         stability({scene_in(folder, "q'^2/2 + q^2/2 + q^4/4", "q = { position = 0.0001, velocity = 0 }")});
-    CHECK(contains(falling.out, "  nothing oscillates: no frequency was met\n"));
+    CHECK(test::contains(falling.out, "  nothing oscillates: no frequency was met\n"));
 }
 
 TEST_CASE("the work has bounds: a run of too many steps is cut, a formula too long is left out" *
@@ -230,7 +226,7 @@ TEST_CASE("the work has bounds: a run of too many steps is cut, a formula too lo
                             "x = { position = 1, velocity = 0 }\ny = { position = 0.2, velocity = 1 }\n"
                             "z = { position = 0.1, velocity = 0.3 }"),
                    "--points", "5"});
-    CHECK(contains(lengthy.out, "Energy: the formula of H_8 (D37) is too long to be written down here\n"));
+    CHECK(test::contains(lengthy.out, "Energy: the formula of H_8 (D37) is too long to be written down here\n"));
 }
 
 TEST_CASE("the chart is an SVG file, the same bytes on every run, with theory and measurement") {
@@ -242,8 +238,8 @@ TEST_CASE("the chart is an SVG file, the same bytes on every run, with theory an
         text = test::read_file(folder / "chart.svg");
     }
     CHECK(bytes[0] == bytes[1]);
-    CHECK(contains(bytes[0], "kernel, measured"));
-    CHECK(contains(bytes[0], "Lobatto, 4 points"));
+    CHECK(test::contains(bytes[0], "kernel, measured"));
+    CHECK(test::contains(bytes[0], "Lobatto, 4 points"));
     CHECK(!std::filesystem::exists(folder / "chart.gnuplot"));
     // Without an equilibrium the member is drawn, with the stiffest moment of the motion.
     CHECK(stability({scene_path("kepler"), "--chart", folder / "orbit.svg"}).exit_code == 0);
@@ -269,10 +265,10 @@ TEST_CASE("mistakes on the command line are refused before anything is computed"
                                {"--clock", "auto"}})
         CHECK(refusal(option) == "--tolerance, --arithmetic, --numbers and --clock belong to a scene; name one\n");
     CHECK(refusal({"--step", "0.1"}) == "--chart, --step and --set belong to a scene; name one\n");
-    CHECK(contains(refusal({"missing.toml"}), "missing.toml"));
-    CHECK(contains(refusal({oscillator, "--step", "-1"}), "the step must be positive"));
-    CHECK(contains(refusal({oscillator, "--points", "13"}), "--points"));
-    CHECK(contains(refusal({oscillator, "--splitting", "11"}), "lobatto stability --splitting 11"));
+    CHECK(test::contains(refusal({"missing.toml"}), "missing.toml"));
+    CHECK(test::contains(refusal({oscillator, "--step", "-1"}), "the step must be positive"));
+    CHECK(test::contains(refusal({oscillator, "--points", "13"}), "--points"));
+    CHECK(test::contains(refusal({oscillator, "--splitting", "11"}), "lobatto stability --splitting 11"));
     CHECK(refusal({"--splitting", "11", "--json"}) ==
           "--json is of Lobatto and Gauss, whose limits are exact; leave it out\n");
 }

@@ -22,10 +22,6 @@ std::string scene_text(const std::string& lagrangian, const std::string& coordin
            "\n[method]\nfamily = \"lobatto\"\npoints = 4\n[run]\nstep = " + step + "\nuntil = " + until + "\n";
 }
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 }  // namespace
 
 TEST_CASE("both scenes of the paper verify, with any number of points") {

@@ -3,8 +3,8 @@
 // code 3.
 #include <regex>
 
-#include "runtime/run/output.hpp"
 #include "tests/extremes/extremes.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 using namespace lobatto::test;

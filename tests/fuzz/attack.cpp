@@ -26,8 +26,8 @@
 #include <random>
 #include <thread>
 
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -587,7 +587,7 @@ Report look_at(const Case& problem) {
     if (!is_told && (done.exit_code != 0 || !printed)) return report;
     report.outcome = is_told ? Outcome::told : Outcome::no_truth;
     report.printed = printed.value_or(1);
-    const auto rows = read_trajectory(folder / "run.csv").rows;
+    const auto rows = test::read_trajectory(folder / "run.csv").rows;
     if (std::fabs(rows.back()[0] - problem.step * problem.steps) > problem.step / 2) return report;  // it stopped
     const auto truth = truth_of(problem, 1e-17L, problem.longest),
                rough = truth_of(problem, 1e-14L, 2 * problem.longest);

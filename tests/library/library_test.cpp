@@ -33,16 +33,6 @@ std::vector<std::vector<double>> rows_of(const std::string& path) {
     return rows;
 }
 
-template <class Error, class Work>
-std::string message_of(const Work& work) {
-    try {
-        work();
-    } catch (const Error& error) {
-        return error.what();
-    }
-    return "nothing was thrown";
-}
-
 }  // namespace
 
 TEST_CASE("a run of the library is that of the command line, bit for bit, with its error") {
@@ -88,8 +78,9 @@ TEST_CASE("a stepper takes the same steps as a run, and looks inside the last on
     CHECK(std::fabs(q[0] - before.q()[0]) < 1e-5);
     CHECK(std::fabs(v[0] - before.velocity()[0]) < 1e-3);
     CHECK(q[0] != run.q[20]);
-    CHECK(
-        message_of<lob::InputError>([&] { static_cast<void>(stepper.at(5)); }).starts_with("at: t = 5 is not inside"));
+    CHECK(lobatto::test::message_of<lob::InputError>([&] {
+              static_cast<void>(stepper.at(5));
+          }).starts_with("at: t = 5 is not inside"));
 }
 
 TEST_CASE("between the rows of a run its states are those of steps from the row before") {
@@ -113,10 +104,10 @@ TEST_CASE("between the rows of a run its states are those of steps from the row 
     between.advance_to(0.42);
     CHECK(q[2] == between.q()[0]);
     CHECK(v[2] == between.velocity()[0]);
-    CHECK(message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(stepper, run, {1.5})); }) ==
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(stepper, run, {1.5})); }) ==
           "t = 1.5 is outside the trajectory, which leads from 0 to 1");
     const lob::Stepper other(lob::compile(lob::Scene(scenes + "double_pendulum.toml")));
-    CHECK(message_of<lob::InputError>([&] {
+    CHECK(lobatto::test::message_of<lob::InputError>([&] {
               static_cast<void>(lob::states_at(other, run, {0}));
           }).starts_with("states_at: the trajectory is of another scene"));
 }
@@ -135,7 +126,8 @@ TEST_CASE("advance_to ends at its time exactly, also between steps, and goes on 
     }()));
     other.advance(10);
     CHECK(std::fabs(other.q()[0] - q) < 1e-7);  // both of order 6
-    CHECK(message_of<lob::InputError>([&] { stepper.advance_to(0.1); }).find("is at t = 0.38") != std::string::npos);
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { stepper.advance_to(0.1); }).find("is at t = 0.38") !=
+          std::string::npos);
 }
 
 TEST_CASE("advance_to is at its time to the last bit, however many steps lead there") {
@@ -185,7 +177,7 @@ TEST_CASE("a parameter set between steps acts from the next step on, as a fresh 
     fresh.advance(3);
     CHECK(stepper.q()[0] == doctest::Approx(fresh.q()[0]).epsilon(1e-14));
     CHECK(stepper.parameter("omega") == 5);
-    CHECK(message_of<lob::InputError>([&] { stepper.set("omga", 1); }) ==
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { stepper.set("omga", 1); }) ==
           "unknown parameter 'omga'; declared: m, omega. Did you mean 'omega'?");
 }
 
@@ -199,10 +191,12 @@ TEST_CASE("the tangent of a step is symplectic") {
 TEST_CASE("errors of the library have the command line's texts and exit codes") {
     const std::string wrong =
         "lagrangian = \"m*q'^2/2 - k*q\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[parameters]\nm = 1\n";
-    const std::string text = message_of<lob::InputError>([&] { lob::Scene::from_text(wrong, "wrong.toml"); });
+    const std::string text =
+        lobatto::test::message_of<lob::InputError>([&] { lob::Scene::from_text(wrong, "wrong.toml"); });
     CHECK(text.starts_with("wrong.toml:1:"));
     CHECK(text.find("unknown name 'k'") != std::string::npos);
-    CHECK(message_of<lob::InputError>([] { lob::Scene("/nowhere.toml"); }).find("/nowhere.toml") != std::string::npos);
+    CHECK(lobatto::test::message_of<lob::InputError>([] { lob::Scene("/nowhere.toml"); }).find("/nowhere.toml") !=
+          std::string::npos);
     lob::RunOptions options;
     options.step = "2.9";
     options.until = "100";
@@ -221,7 +215,7 @@ TEST_CASE("a stepper whose step fails stays where it was") {
     settings.step = "2.9";
     lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml"), settings));
     double q = 0, t = 0;
-    const std::string text = message_of<lob::ComputationError>([&] {
+    const std::string text = lobatto::test::message_of<lob::ComputationError>([&] {
         for (int i = 0; i < 50; ++i) {
             q = stepper.q()[0];
             t = stepper.t();
@@ -273,8 +267,9 @@ TEST_CASE("a sweep of the library gives the states that runs give, whatever the 
     stepper.advance(one.steps[5]);
     CHECK(one.q[10] == doctest::Approx(stepper.q()[0]).epsilon(1e-11));
     starts.columns["tetha"] = starts.columns[name];
-    CHECK(
-        message_of<lob::InputError>([&] { lob::sweep(scene, starts, options); }).starts_with("unknown column 'tetha'"));
+    CHECK(lobatto::test::message_of<lob::InputError>([&] {
+              lob::sweep(scene, starts, options);
+          }).starts_with("unknown column 'tetha'"));
 }
 
 TEST_CASE("a sweep keeps what it is asked for in place of states") {
@@ -330,7 +325,7 @@ TEST_CASE("a sweep that keeps states on the way has those of the command line, a
     lob::SweepOptions options;
     options.every = 0;
     const lob::Scene pendulum(scenes + "pendulum.toml");
-    CHECK(message_of<lob::InputError>([&] {
+    CHECK(lobatto::test::message_of<lob::InputError>([&] {
               lob::sweep(pendulum, {1, {{"q", {1}}}}, options);
           }).find("0 is not a number of states") != std::string::npos);
     options.every.reset();
@@ -406,10 +401,11 @@ TEST_CASE("a clock is a setting: the same steps as with the scene's own, and equ
     CHECK(kept.t == as_written.t);
     CHECK(kept.q == as_written.q);
     equal.every = 0.25;
-    CHECK(
-        message_of<lob::InputError>([&] { lob::run(without, equal); }).starts_with("--every: 0.25 is not a number of"));
+    CHECK(lobatto::test::message_of<lob::InputError>([&] {
+              lob::run(without, equal);
+          }).starts_with("--every: 0.25 is not a number of"));
     automatic.every = 0;
-    CHECK(message_of<lob::InputError>([&] { lob::run(without, automatic); }) ==
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { lob::run(without, automatic); }) ==
           "--every: with a clock it is the time from one kept state to the next, above 0, not 0");
 }
 
@@ -432,7 +428,8 @@ TEST_CASE("with a clock advance_to goes to any times, and steps go on to those o
     CHECK(stepper.t() == 3);
     stepper.advance(2);
     CHECK(std::tuple(stepper.t(), stepper.q()[0], stepper.q()[1], stepper.p()[0]) == fresh(4));
-    CHECK(message_of<lob::InputError>([&] { stepper.advance_to(3); }).find("is at t = 4 already") != std::string::npos);
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { stepper.advance_to(3); }).find("is at t = 4 already") !=
+          std::string::npos);
 }
 
 TEST_CASE("with a clock no stop and no event is lost between the times that are asked for, and none comes early") {

@@ -18,6 +18,7 @@
 #include "runtime/run/trajectory.hpp"
 #include "tests/scenes/references.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -59,7 +60,7 @@ public:
         arguments.insert(arguments.end(), options.begin(), options.end());
         const test::Finished done = test::run(arguments);
         REQUIRE_MESSAGE(done.exit_code == 0, done.err);
-        table_ = read_trajectory(file);
+        table_ = test::read_trajectory(file);
         REQUIRE(table_.rows.size() > 1);
     }
 
@@ -88,7 +89,7 @@ public:
     }
 
 private:
-    TrajectoryTable table_;
+    test::TrajectoryTable table_;
 };
 
 std::string element(const std::string& name, int index) {
@@ -489,7 +490,7 @@ TEST_CASE("the flipping pendulum stops where a rod turns over, and mirrored at t
     const test::Finished done = test::run({LOBATTO_PROGRAM, "sweep", Trajectory::scene_file("flips"), "--vary",
                                            "a=-2.5", "--vary", "b=-1", "--quiet", "-o", file});
     REQUIRE_MESSAGE(done.exit_code == 0, done.err);
-    const TrajectoryTable table = read_trajectory(file);
+    const test::TrajectoryTable table = test::read_trajectory(file);
     CHECK(table.columns[6] == "t");
     CHECK(std::fabs(table.rows[0][6] - t) < 1e-12);
 }

@@ -64,14 +64,23 @@ Domains::Domains(const Scene& scene, const SystemOutline& system)
         const bool of_way = written.kind != Kind::nonzero && !has_velocity && holds_any(written.expression, moving) &&
                             !kept.contains(written.expression);
         watches_ = watches_ || of_way;
-        conditions_.push_back({written, std::move(*tape), has_velocity, of_way});
+        std::optional<Tape> exponent;
+        if (written.kind == Kind::power && !(exponent = Tape::of(written.exponent, numbered))) continue;
+        conditions_.push_back({written, std::move(*tape), std::move(exponent), has_velocity, of_way});
     }
 }
 
 bool Domains::holds(const Condition& condition, const std::vector<double>& variables) const {
     const auto [value, size] = condition.tape.sized(variables);
     const double zero = rounding * size;
-    switch (condition.written.kind) {
+    Kind kind = condition.written.kind;
+    if (kind == Kind::power) {
+        const double exponent = (*condition.exponent)(variables);
+        kind = DomainCondition::of_base(exponent == std::round(exponent), exponent < 0);
+    }
+    switch (kind) {
+        case Kind::any:
+            return true;
         case Kind::nonzero:
             return std::fabs(value) > (size > std::fabs(value) ? zero : 0);
         case Kind::nonnegative:
@@ -79,6 +88,7 @@ bool Domains::holds(const Condition& condition, const std::vector<double>& varia
         case Kind::positive:
             return value > (size > value ? zero : 0);
         case Kind::within_one:
+        case Kind::power:  // is one of the others by now
             break;
     }
     return std::fabs(value) <= 1 + rounding;

@@ -32,7 +32,8 @@ private:
     struct Condition {
         DomainCondition written;
         Tape tape;
-        bool has_velocity, of_way;  // of_way: kernels pass where it does not hold
+        std::optional<Tape> exponent;  // of a power
+        bool has_velocity, of_way;     // of_way: kernels pass where it does not hold
     };
     bool holds(const Condition& condition, const std::vector<double>& variables) const;
     std::vector<double> variables_of(const std::vector<double>& parameters, const double* row) const;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
-#include <memory>
 
 #include "runtime/run/ensemble/ended.hpp"
 
@@ -22,14 +21,6 @@ constexpr std::int64_t most_workers = 8, most_that_look = 16;  // look: at steps
 constexpr std::int64_t launches_together = 4;
 constexpr std::int64_t steps_of_call = 256, steps_between_looks = 64;  // at least, else launching takes longer
 constexpr double seconds_of_call = 0.03, seconds_between_looks = 0.01;
-
-// Memory may begin anywhere.
-void* aligned(std::vector<std::byte>& room, std::int32_t bytes, std::int32_t alignment) {
-    if (room.empty()) room.resize(static_cast<std::size_t>(bytes + alignment));
-    void* place = room.data();
-    std::size_t space = room.size();
-    return std::align(static_cast<std::size_t>(alignment), static_cast<std::size_t>(bytes), place, space);
-}
 
 }  // namespace
 
@@ -74,7 +65,9 @@ DeviceTrajectories::DeviceTrajectories(const Kernel& kernel, const EnsembleReque
       halted_(halted),
       queue_(device_->alike->device()),
       words_(static_cast<std::size_t>(device_->host->words * room)),
-      progress_(bytes_of_words(3)) {
+      progress_(bytes_of_words(3)),
+      host_(device_->host->host_bytes, device_->host->host_alignment),
+      shared_(device_->host->shared_bytes, device_->host->shared_alignment) {
     const auto lanes = static_cast<std::size_t>(room);
     steps_ = {reinterpret_cast<std::int64_t*>(progress_.data()), lanes};
     iterations_ = {reinterpret_cast<std::int64_t*>(progress_.data() + bytes_of_words(1)), lanes};
@@ -100,10 +93,6 @@ DeviceTrajectories::DeviceTrajectories(const Kernel& kernel, const EnsembleReque
     there_.status = reinterpret_cast<std::int32_t*>(there_.steps + 2 * room);
     there_order_ = memory + words + 3 * room;
     there_packed_ = memory + words + 4 * room;
-}
-
-void* DeviceTrajectories::host() {
-    return aligned(host_, device_->host->host_bytes, device_->host->host_alignment);
 }
 
 // As the kernel has them.
@@ -140,14 +129,13 @@ void DeviceTrajectories::start(double time, const std::vector<double>& q, const 
     const Bytes begin = numbers(parts), positions = numbers(q), momenta = numbers(p);
     std::memcpy(here_.start_time, begin.data(), begin.size());
     here_.target = 0;
-    device_->host->place(host(), &here_, 0, room_, parameters_.data(), positions.data(), momenta.data(), tolerance_,
-                         energy_.data());
+    device_->host->place(host_.get(), &here_, 0, room_, parameters_.data(), positions.data(), momenta.data(),
+                         tolerance_, energy_.data());
     const auto good = std::find(status_.begin(), status_.end(), LOBATTO_OK);
     is_own_.assign(static_cast<std::size_t>(device_->host->words), 1);
     if (good != status_.end()) {
-        void* const shared = aligned(shared_, device_->host->shared_bytes, device_->host->shared_alignment);
-        device_->host->shared(&here_, good - status_.begin(), shared);
-        if (here_.alike != 0) device_->host->own(shared, is_own_.data());
+        device_->host->shared(&here_, good - status_.begin(), shared_.get());
+        if (here_.alike != 0) device_->host->own(shared_.get(), is_own_.data());
     }
     std::copy(status_.begin(), status_.end(), status);
     if (!kept_.empty()) {  // of trajectories without a step
@@ -179,7 +167,7 @@ void DeviceTrajectories::launch(std::int64_t begin) {
     }
     std::copy(std::begin(here_.step), std::end(here_.step), call.step);
     std::copy(std::begin(here_.start_time), std::end(here_.start_time), call.start_time);
-    void* arguments[] = {&call, aligned(shared_, device_->host->shared_bytes, device_->host->shared_alignment)};
+    void* arguments[] = {&call, shared_.get()};
     const std::int64_t steps = here_.target - begin, launches = is_watched() ? 1 : std::min(launches_together, steps);
     for (std::int64_t i = 1; i <= launches; ++i) {
         call.target = begin + steps * i / launches;
@@ -261,7 +249,7 @@ void DeviceTrajectories::retake(const std::int32_t* waiting, std::int64_t count)
     packed.steps = steps.data();
     packed.iterations = iterations.data();
     packed.status = status.data();
-    device_->host->retake(host(), &packed, count, parameters.data(), tolerance_, rows.data());
+    device_->host->retake(host_.get(), &packed, count, parameters.data(), tolerance_, rows.data());
     for (std::int64_t i = 0; i < count; ++i) {
         const std::int32_t lane = waiting[i];
         here_.steps[lane] = packed.steps[i];
@@ -291,7 +279,7 @@ void DeviceTrajectories::move(std::int64_t count, bool back) {
 void DeviceTrajectories::read(std::vector<double>& q, std::vector<double>& p) {
     const std::int64_t count = room_ * kernel_->coordinates;
     Bytes positions(static_cast<std::size_t>(count * kernel_->real_bytes)), momenta(positions.size());
-    device_->host->state(host(), &here_, 0, room_, positions.data(), momenta.data(), energy_.data(), kept_.data());
+    device_->host->state(host_.get(), &here_, 0, room_, positions.data(), momenta.data(), energy_.data(), kept_.data());
     kernel_->to_parts(positions.data(), count, q.data());
     kernel_->to_parts(momenta.data(), count, p.data());
 }

@@ -60,7 +60,6 @@ public:
 
 private:
     using Bytes = std::vector<std::byte>;
-    void* host();  // room of the host's side
     Bytes numbers(const std::vector<double>& values) const;
     template <class Move>
     void move_own(std::int64_t first, std::int64_t last, const Move& move);
@@ -87,7 +86,8 @@ private:
     std::span<std::int64_t> steps_, iterations_;
     std::span<std::int32_t> status_;
     lobatto_device_call here_{}, there_{};  // the same, with addresses of the host and of the device
-    Bytes parameters_, shared_, energy_, host_;
+    Bytes parameters_, energy_;
+    AlignedMemory host_, shared_;       // of the host's side, and of what lanes share
     std::vector<std::uint8_t> is_own_;  // of each word; those that lanes share are not on the device
     void *there_order_, *there_packed_;
     std::int64_t batch_;                 // lanes that the host takes at a time,

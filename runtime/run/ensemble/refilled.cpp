@@ -23,9 +23,7 @@ RefilledLanes::RefilledLanes(const Kernel& kernel, const EnsembleRequest& reques
       columns_(1 + 2 * kernel->coordinates),
       capacity_(rows_of_call),
       event_capacity_(std::max<std::int64_t>(events_of_call, kernel->events_of_step)),
-      memory_(::operator new (static_cast<std::size_t>(kernel->ensemble_bytes),
-                              std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)}),
-              Deleter{std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)}}) {
+      memory_(kernel->ensemble_bytes, kernel->ensemble_alignment) {
     const auto width = static_cast<std::size_t>(kernel->lanes);
     for (std::size_t lane = 0; lane < width; ++lane)
         lanes_.push_back({-1, LoadedStepper<double>(kernel), request.reducer ? request.reducer() : nullptr, {}});

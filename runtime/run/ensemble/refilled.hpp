@@ -4,7 +4,6 @@
 #pragma once
 
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "runtime/build/library.hpp"
@@ -27,10 +26,6 @@ private:
         std::unique_ptr<Reducer> reducer;
         std::vector<double> last;  // the last good state: t, q, p
     };
-    struct Deleter {
-        std::align_val_t alignment;
-        void operator()(void* memory) const { ::operator delete(memory, alignment); }
-    };
 
     bool fill(std::size_t lane, std::int64_t number, Ended& ended);
     void advance(std::vector<Ended>& group);
@@ -45,7 +40,7 @@ private:
     Shared& shared_;
     std::size_t n_;
     std::int64_t columns_, capacity_, event_capacity_;  // of rows
-    std::unique_ptr<void, Deleter> memory_;
+    AlignedMemory memory_;
     std::vector<Lane> lanes_;
     EnsembleStart start_;
     std::vector<double> records_, events_;

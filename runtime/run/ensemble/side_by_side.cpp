@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 
 #include "runtime/run/parts.hpp"
 
@@ -160,14 +159,7 @@ void NumberTrajectory::energy(const std::vector<double>& q, const std::vector<do
 }
 
 LaneTrajectories::LaneTrajectories(const Kernel& kernel)
-    : kernel_(kernel),
-      memory_(::operator new (static_cast<std::size_t>(kernel->ensemble_bytes),
-                              std::align_val_t{static_cast<std::size_t>(kernel->ensemble_alignment)}),
-              Deleter{static_cast<std::size_t>(kernel->ensemble_alignment)}) {}
-
-void LaneTrajectories::Deleter::operator()(void* memory) const {
-    ::operator delete (memory, std::align_val_t{alignment});
-}
+    : kernel_(kernel), memory_(kernel->ensemble_bytes, kernel->ensemble_alignment) {}
 
 const void* LaneTrajectories::numbers(const std::vector<double>& values, std::vector<std::byte>& room) const {
     if (kernel_->real_kind == LOBATTO_DOUBLE) return values.data();

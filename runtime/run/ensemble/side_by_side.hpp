@@ -99,17 +99,13 @@ public:
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
 
 private:
-    struct Deleter {
-        std::size_t alignment;
-        void operator()(void* memory) const;
-    };
     // The numbers of the kernel, and back: doubles are those themselves.
     const void* numbers(const std::vector<double>& values, std::vector<std::byte>& room) const;
     template <class Read>
     void read(std::vector<double>& values, std::vector<std::byte>& room, const Read& read) const;
 
     Kernel kernel_;
-    std::unique_ptr<void, Deleter> memory_;
+    AlignedMemory memory_;
     mutable std::vector<std::byte> room_, more_room_;
 };
 

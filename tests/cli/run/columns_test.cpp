@@ -7,8 +7,8 @@
 #include <sstream>
 #include <string>
 
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -18,7 +18,7 @@ using Columns = std::vector<std::string>;
 
 // The table of a run, and the texts of its last row.
 struct TableOfRun {
-    TrajectoryTable table;
+    test::TrajectoryTable table;
     Columns last;
 };
 
@@ -30,7 +30,7 @@ TableOfRun table_of_run(const std::string& text, const std::vector<std::string>&
     const test::Finished finished = test::run(arguments);
     CAPTURE(finished.err);
     REQUIRE(finished.exit_code == 0);
-    TableOfRun result{read_trajectory(folder / "run.csv"), {}};
+    TableOfRun result{test::read_trajectory(folder / "run.csv"), {}};
     std::istringstream lines(test::read_file(folder / "run.csv"));
     std::string line, last, number;
     while (std::getline(lines, line)) last = line;

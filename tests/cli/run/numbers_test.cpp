@@ -9,9 +9,9 @@
 #include <sstream>
 
 #include "runtime/files/decimal.hpp"
-#include "runtime/run/output.hpp"
 #include "runtime/run/parts.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -19,10 +19,6 @@ namespace {
 
 const std::string oscillators = LOBATTO_SOURCE_DIR "/scenes/henon_heiles.toml";
 const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
-
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
 
 struct Place {
     test::TemporaryFolder folder;
@@ -66,8 +62,8 @@ TEST_CASE("runs in double-double and quadruple agree to 30 digits, and each file
             place.run({"run", oscillators, "--points", "12", "--until", "2", "--numbers", numbers, "-o", file});
         INFO(finished.err);
         REQUIRE(finished.exit_code == 0);
-        CHECK(contains(test::read_file(file), ", in " + numbers + "\n"));
-        CHECK(contains(finished.out, "measured error"));
+        CHECK(test::contains(test::read_file(file), ", in " + numbers + "\n"));
+        CHECK(test::contains(finished.out, "measured error"));
         return last_row(file);
     };
     const auto pair = end_in("double-double"), quadruple = end_in("quadruple");
@@ -89,25 +85,26 @@ TEST_CASE("numbers stand in the scene, and --numbers takes their place") {
     const std::string scene = place.file("scene.toml"), csv = place.file("run.csv");
     test::write_text(scene, text);
     REQUIRE(place.run({"run", scene, "--until", "1", "-o", csv}).exit_code == 0);
-    CHECK(contains(test::read_file(csv), ", in double-double\n"));
+    CHECK(test::contains(test::read_file(csv), ", in double-double\n"));
     REQUIRE(place.run({"run", scene, "--until", "1", "--numbers", "double", "-o", csv}).exit_code == 0);
-    CHECK_FALSE(contains(test::read_file(csv), ", in double"));
+    CHECK_FALSE(test::contains(test::read_file(csv), ", in double"));
     for (const std::string command : {"roundoff", "stability"}) {
         CAPTURE(command);
         std::vector<std::string> words = {command, scene};
         const test::Finished refused = place.run(words);
         CHECK(refused.exit_code == 2);
-        CHECK(contains(refused.err, fmt::format("{}: `lobatto {}` computes in double, but numbers are "
-                                                "\"double-double\"; give --numbers double, or leave `numbers` out "
-                                                "under [method]",
-                                                scene, command)));
+        CHECK(
+            test::contains(refused.err, fmt::format("{}: `lobatto {}` computes in double, but numbers are "
+                                                    "\"double-double\"; give --numbers double, or leave `numbers` out "
+                                                    "under [method]",
+                                                    scene, command)));
     }
     test::write_text(scene, text.replace(text.find("double-double"), 13, "half"));
     const test::Finished unknown = place.run({"run", scene, "-o", csv});
     CHECK(unknown.exit_code == 2);
-    CHECK(contains(unknown.err,
-                   "unknown numbers; there are \"float\", \"double\", \"long double\", \"double-double\", "
-                   "\"quadruple\" and \"20 digits\" to \"140 digits\""));
+    CHECK(test::contains(unknown.err,
+                         "unknown numbers; there are \"float\", \"double\", \"long double\", \"double-double\", "
+                         "\"quadruple\" and \"20 digits\" to \"140 digits\""));
 }
 
 TEST_CASE("what other numbers cannot do is refused") {
@@ -116,18 +113,18 @@ TEST_CASE("what other numbers cannot do is refused") {
     const test::Finished clean =
         place.run({"run", pendulum, "--arithmetic", "clean", "--numbers", "double-double", "-o", csv});
     CHECK(clean.exit_code == 2);
-    CHECK(contains(clean.err, "clean arithmetic is for numbers of one machine word"));
+    CHECK(test::contains(clean.err, "clean arithmetic is for numbers of one machine word"));
     test::write_text(comet,
                      "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
                      "x = { position = 0.1, velocity = 0 }\ny = { position = 0, velocity = \"sqrt(19)\" }\n"
                      "[method]\npoints = 8\nclock = \"(x^2 + y^2)^(3/4)\"\n[run]\nstep = 0.5\nuntil = 6\n");
     const test::Finished clocked = place.run({"run", comet, "--numbers", "double-double", "-o", csv});
     CHECK(clocked.exit_code == 2);
-    CHECK(contains(clocked.err, comet + ":7:9: with a clock `lobatto run` computes in double, but numbers are "
-                                        "\"double-double\"; remove the clock, or give --numbers double"));
+    CHECK(test::contains(clocked.err, comet + ":7:9: with a clock `lobatto run` computes in double, but numbers are "
+                                              "\"double-double\"; remove the clock, or give --numbers double"));
     const test::Finished asked = place.run({"run", comet, "--clock", "auto", "--numbers", "double-double", "-o", csv});
     CHECK(asked.exit_code == 2);
-    CHECK(contains(asked.err, comet + ": clock = \"auto\", from an option: with a clock `lobatto run` computes"));
+    CHECK(test::contains(asked.err, comet + ": clock = \"auto\", from an option: with a clock `lobatto run` computes"));
 }
 
 TEST_CASE("a sweep computes in the numbers that are asked for, with the digits of a run") {
@@ -139,13 +136,13 @@ TEST_CASE("a sweep computes in the numbers that are asked for, with the digits o
         words.insert(words.end(), {"-o", csv});
         const test::Finished done = place.run(words);
         REQUIRE_MESSAGE(done.exit_code == 0, done.err);
-        return read_trajectory(csv);
+        return test::read_trajectory(csv);
     };
     const std::vector<std::vector<double>> in_double = sweep({}).rows;
     for (const std::string numbers : {"double-double", "quadruple", "long double"}) {
         CAPTURE(numbers);
-        const TrajectoryTable table = sweep({"--numbers", numbers});
-        CHECK(contains(test::read_file(csv), ", in " + numbers + "\n"));
+        const test::TrajectoryTable table = sweep({"--numbers", numbers});
+        CHECK(test::contains(test::read_file(csv), ", in " + numbers + "\n"));
         const std::size_t parts = numbers == "quadruple" ? 3 : 2;
         const auto x = static_cast<std::size_t>(std::find(table.columns.begin(), table.columns.end(), "x") -
                                                 table.columns.begin());
@@ -188,14 +185,14 @@ TEST_CASE("sweeps in other numbers go on where they were stopped, and refuse wha
     again.push_back("--resume");
     const test::Finished resumed = place.run(again);
     REQUIRE_MESSAGE(resumed.exit_code == 0, resumed.err);
-    CHECK(contains(resumed.out, "resumed"));
+    CHECK(test::contains(resumed.out, "resumed"));
     CHECK(test::read_file(csv) == whole);
     const test::Finished kept =
         place.run({"sweep", pendulum, "--vary", "q=0.1,1", "--keep", "max(q)", "--numbers", "float", "-o", csv});
     CHECK(kept.exit_code == 2);
-    CHECK(contains(kept.err,
-                   "what sweeps keep of a trajectory is computed in double, but numbers are \"float\"; leave "
-                   "out --keep, or give --numbers double"));
+    CHECK(test::contains(kept.err,
+                         "what sweeps keep of a trajectory is computed in double, but numbers are \"float\"; leave "
+                         "out --keep, or give --numbers double"));
 }
 
 TEST_CASE("verify proves the steps of a scene in its own numbers beside those in double and quadruple" *
@@ -206,7 +203,7 @@ TEST_CASE("verify proves the steps of a scene in its own numbers beside those in
         const test::Finished done = place.run({"verify", oscillators, "--points", "6", "--numbers", numbers});
         CHECK_MESSAGE(done.exit_code == 0, done.out);
         for (const std::string claim : {"20 steps against quadruple, ", "20 steps and back, ", "symplectic defect, "})
-            CHECK(contains(done.out, claim + numbers));
-        CHECK_FALSE(contains(done.out, "FAILED"));
+            CHECK(test::contains(done.out, claim + numbers));
+        CHECK_FALSE(test::contains(done.out, "FAILED"));
     }
 }

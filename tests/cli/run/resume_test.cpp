@@ -14,8 +14,8 @@
 #include "runtime/error.hpp"
 #include "runtime/files/checksum.hpp"
 #include "runtime/run/checkpoint.hpp"
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 using namespace lobatto::test;
@@ -206,10 +206,6 @@ struct Interrupted {
         return run(words);
     }
 };
-
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
 
 }  // namespace
 

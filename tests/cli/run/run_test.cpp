@@ -12,8 +12,8 @@
 #include <thread>
 
 #include "runtime/measure/reference.hpp"
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -58,10 +58,6 @@ Signalled signal_long_run(const Place& place, int signal) {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), test::read_file(err)};
 }
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 // Runs into infinity at t = 1.717, the integral of dy / sqrt(2 (y^3 - 1)) from 1 on, y = -x.
 const char* const escape =
     "title = \"Escape\"\n"
@@ -90,14 +86,14 @@ TEST_CASE("a run says how good it is and where its trajectory is") {
         "  trajectory              \\S+/run.csv, 2401 states\n");
     CHECK_MESSAGE(std::regex_match(first.out, table), first.out);
     const test::Finished second = place.run({pendulum, "-o", place.file("again.csv")});
-    CHECK(contains(second.out, ", found derived and compiled in the cache\n"));
+    CHECK(test::contains(second.out, ", found derived and compiled in the cache\n"));
     CHECK(test::read_file(place.file()) == test::read_file(place.file("again.csv")));
 }
 
 TEST_CASE("the trajectory file follows the exact solution and names its columns") {
     const Place place;
     REQUIRE(place.run({pendulum, "-o", place.file(), "--quiet"}).out == "");
-    const TrajectoryTable table = read_trajectory(place.file());
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     REQUIRE(table.comments.size() == 6);
     CHECK(table.comments[0] == "lobatto trajectory");
     CHECK(table.comments[1] == "scene: A plane pendulum");
@@ -120,7 +116,7 @@ TEST_CASE("the trajectory file follows the exact solution and names its columns"
 TEST_CASE("--tolerance takes the place of the scene's, and a loose one costs digits and saves evaluations") {
     const Place place;
     const auto energy_error = [](const Place& in, const std::string& name) {
-        const TrajectoryTable table = read_trajectory(in.file(name));
+        const test::TrajectoryTable table = test::read_trajectory(in.file(name));
         double largest = 0;
         for (const std::vector<double>& row : table.rows)
             largest = std::fmax(largest, std::fabs(row[3] / table.rows[0][3] - 1));
@@ -135,8 +131,8 @@ TEST_CASE("--tolerance takes the place of the scene's, and a loose one costs dig
     const std::string option = place.run({pendulum, "--tolerance", "1e-6", "-o", place.file("option.csv")}).out;
     const std::string in_scene = place.run({scene, "-o", place.file("scene.csv")}).out;
     place.run({scene, "--tolerance", "1e-15", "-o", place.file("over.csv")});
-    CHECK(contains(option, "1.00 per step"));
-    CHECK(contains(in_scene, "1.00 per step"));
+    CHECK(test::contains(option, "1.00 per step"));
+    CHECK(test::contains(in_scene, "1.00 per step"));
     const double rounding = energy_error(place, "rounding.csv"), loose = energy_error(place, "option.csv");
     CHECK(rounding < 1e-7);        // 6.4e-8, the method's own error
     CHECK(loose > 10 * rounding);  // 7.9e-6
@@ -148,8 +144,8 @@ TEST_CASE("a linear system needs no iteration and conserves its discrete energy"
     const Place place;
     const test::Finished done = place.run({oscillator, "--until", "50", "-o", place.file()});
     CHECK(done.exit_code == 0);
-    CHECK(contains(done.out, "  iterations              none: the step is a linear map\n"));
-    CHECK(contains(done.out, " at most, against the exact solution\n"));
+    CHECK(test::contains(done.out, "  iterations              none: the step is a linear map\n"));
+    CHECK(test::contains(done.out, " at most, against the exact solution\n"));
     std::smatch found;
     REQUIRE(std::regex_search(done.out, found, std::regex("discrete energy error   relative (\\S+) at most\n")));
     CHECK(std::stod(found[1]) < 1e-12);  // rounding of 1000 steps; measured 1.7e-13
@@ -163,38 +159,39 @@ TEST_CASE("the command line replaces values of the scene, with one kernel for al
     const test::Finished done = place.run({pendulum, "-o", place.file(), "--set", "omega=2", "--set", "m=1/4", "--step",
                                            "pi/omega/8", "--until", "2*pi", "--every", "4"});
     CHECK(done.exit_code == 0);
-    CHECK(contains(done.out, "in the cache\n  steps                   32, h = 0.19635, to t = 6.28319\n"));
-    const TrajectoryTable table = read_trajectory(place.file());
+    CHECK(test::contains(done.out, "in the cache\n  steps                   32, h = 0.19635, to t = 6.28319\n"));
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     CHECK(table.comments[4] == "parameters: m = 0.25, omega = 2");
     CHECK(table.rows.size() == 9);
     CHECK(table.rows.front()[3] == doctest::Approx(0.25 * 4));  // H = m omega^2 (1 - cos(pi/2))
     const test::Finished explicit_one = place.run({pendulum, "-o", place.file(), "--points", "2", "--until", "1"});
-    CHECK(contains(explicit_one.out, "  iterations              none: the step is explicit\n"));
-    CHECK(read_trajectory(place.file()).comments[2] == "method: Lobatto, 2 points, h = 0.05");
+    CHECK(test::contains(explicit_one.out, "  iterations              none: the step is explicit\n"));
+    CHECK(test::read_trajectory(place.file()).comments[2] == "method: Lobatto, 2 points, h = 0.05");
     const test::Finished split = place.run({pendulum, "-o", place.file(), "--splitting", "14", "--until", "1"});
-    CHECK(contains(split.out, "  iterations              none: the step is explicit\n"));
-    CHECK(read_trajectory(place.file()).comments[2] == "method: splitting, 14 stages, h = 0.05");
+    CHECK(test::contains(split.out, "  iterations              none: the step is explicit\n"));
+    CHECK(test::read_trajectory(place.file()).comments[2] == "method: splitting, 14 stages, h = 0.05");
 }
 
 TEST_CASE("an end that is no multiple of the step is said, not overrun") {
     const Place place;
     const test::Finished done = place.run({pendulum, "-o", place.file(), "--step", "0.3", "--until", "1"});
     CHECK(done.exit_code == 0);
-    CHECK(contains(done.out, "  steps                   3, h = 0.3, to t = 0.9\n"));
-    CHECK(contains(done.out,
-                   "\nThe end time is not a multiple of the step: the run ends at the last multiple before it.\n"));
-    CHECK(!contains(place.run({pendulum, "-o", place.file(), "--step", "0.1", "--until", "0.3"}).out, "multiple"));
+    CHECK(test::contains(done.out, "  steps                   3, h = 0.3, to t = 0.9\n"));
+    CHECK(test::contains(
+        done.out, "\nThe end time is not a multiple of the step: the run ends at the last multiple before it.\n"));
+    CHECK(
+        !test::contains(place.run({pendulum, "-o", place.file(), "--step", "0.1", "--until", "0.3"}).out, "multiple"));
     const test::Finished none = place.run({pendulum, "-o", place.file(), "--until", "0"});
-    CHECK(contains(none.out, "  steps                   0, h = 0.05, to t = 0\n"));
-    CHECK(contains(none.out, ", 1 state\n"));
+    CHECK(test::contains(none.out, "  steps                   0, h = 0.05, to t = 0\n"));
+    CHECK(test::contains(none.out, ", 1 state\n"));
 }
 
 TEST_CASE("without -o the trajectory goes to the folder out under the current one") {
     const Place place;
     const std::string command = "cd '" + place.folder.string() + "' && '" LOBATTO_PROGRAM "' run '" + pendulum + "'";
     const test::Finished done = test::run({"sh", "-c", command});
-    CHECK(contains(done.out, "  trajectory              out/pendulum.csv, 2401 states\n"));
-    CHECK(read_trajectory(place.folder / "out/pendulum.csv").rows.size() == 2401);
+    CHECK(test::contains(done.out, "  trajectory              out/pendulum.csv, 2401 states\n"));
+    CHECK(test::read_trajectory(place.folder / "out/pendulum.csv").rows.size() == 2401);
 }
 
 TEST_CASE("wrong values on the command line are refused with exit code 2") {
@@ -216,18 +213,18 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
           "`lobatto run --help` shows what can be given.\n");
     CHECK(refusal({"--set", "m"}) == "--set:1:1: expected name=value, such as --set m=2\n  1 | m\n    | ^\n");
     for (const std::string value : {"0", "-1e-6", "0.002", "nan"})
-        CHECK(contains(refusal({"--tolerance", value}), "--tolerance: the tolerance is " + value +
-                                                            "; it must be above 0 and at most 0.001; leave it "
-                                                            "out to iterate to rounding\n"));
-    CHECK(contains(refusal({"--tolerance", "small"}),
-                   "--tolerance: a number is wanted, such as 0.25 or 1e-6, not small"));
-    CHECK(contains(refusal({"--set", "m=2*omega"}), "--set:1:5: unknown name 'omega' in the value of m"));
-    CHECK(contains(refusal({"--step", "2*"}), "--step:1:3: "));
+        CHECK(test::contains(refusal({"--tolerance", value}), "--tolerance: the tolerance is " + value +
+                                                                  "; it must be above 0 and at most 0.001; leave it "
+                                                                  "out to iterate to rounding\n"));
+    CHECK(test::contains(refusal({"--tolerance", "small"}),
+                         "--tolerance: a number is wanted, such as 0.25 or 1e-6, not small"));
+    CHECK(test::contains(refusal({"--set", "m=2*omega"}), "--set:1:5: unknown name 'omega' in the value of m"));
+    CHECK(test::contains(refusal({"--step", "2*"}), "--step:1:3: "));
     const std::string range = " must be 0, or of a size between 1e-300 and 1e300\n";
     CHECK(refusal({"--set", "m=1e400"}) == "--set:1:3: the value of m" + range + "  1 | m=1e400\n    |   ^\n");
-    CHECK(contains(refusal({"--set", "omega=1e-400"}), "--set:1:7: the value of omega" + range));
-    CHECK(contains(refusal({"--step", "1e400"}), "--step:1:1: the step" + range));
-    CHECK(contains(refusal({"--until", "m*1e400"}), "--until:1:1: the end time" + range));
+    CHECK(test::contains(refusal({"--set", "omega=1e-400"}), "--set:1:7: the value of omega" + range));
+    CHECK(test::contains(refusal({"--step", "1e400"}), "--step:1:1: the step" + range));
+    CHECK(test::contains(refusal({"--until", "m*1e400"}), "--until:1:1: the end time" + range));
     CHECK(refusal({"--step", "-0.1"}) == "--step: the step must be positive, but is -0.1\n");
     CHECK(refusal({"--until", "-1"}) == "--until: the end time must not be negative, but is -1\n");
     CHECK(refusal({"--until", "1e30"}) ==
@@ -235,15 +232,17 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
     CHECK(refusal({"--every", "0"}) ==
           "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
     for (const std::string number : {"-3", "2.5", "nan"})
-        CHECK(contains(refusal({"--every", number}), "--every: " + number + " is not a number of states; give 1"));
+        CHECK(
+            test::contains(refusal({"--every", number}), "--every: " + number + " is not a number of states; give 1"));
     for (const std::string number : {"1e16", "1e400"})
-        CHECK(contains(refusal({"--every", number}), "more than a run has steps; at most 9e15"));
-    CHECK(contains(refusal({"--every", "many"}), "--every: a number is wanted, such as 0.25 or 1e-6, not many"));
-    CHECK(contains(refusal({"--points", "3.0"}), "--points: a whole number in digits is wanted, at most 2147483647"));
-    CHECK(contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
-    CHECK(contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
-    CHECK(contains(refusal({"--splitting", "12"}), "lobatto: --splitting: 12 not in {6,11,14,17,35}"));
-    CHECK(contains(refusal({"--splitting", "11", "--points", "4"}), "excludes"));
+        CHECK(test::contains(refusal({"--every", number}), "more than a run has steps; at most 9e15"));
+    CHECK(test::contains(refusal({"--every", "many"}), "--every: a number is wanted, such as 0.25 or 1e-6, not many"));
+    CHECK(test::contains(refusal({"--points", "3.0"}),
+                         "--points: a whole number in digits is wanted, at most 2147483647"));
+    CHECK(test::contains(refusal({"--points", "13"}), "lobatto: --points: Value 13 not in range"));
+    CHECK(test::contains(refusal({"--stages", "11"}), "lobatto: --stages: Value 11 not in range"));
+    CHECK(test::contains(refusal({"--splitting", "12"}), "lobatto: --splitting: 12 not in {6,11,14,17,35}"));
+    CHECK(test::contains(refusal({"--splitting", "11", "--points", "4"}), "excludes"));
     CHECK(refusal({"--splitting", "11", "--tolerance", "1e-9"}) ==
           pendulum + ": splitting methods iterate nothing; leave out --tolerance\n");
     CHECK(refusal({"--splitting", "11", "--arithmetic", "clean"}) ==
@@ -260,18 +259,19 @@ TEST_CASE("a splitting method refuses masses that vary, and number types with mo
     const std::string folded = std::string(LOBATTO_SOURCE_DIR) + "/scenes/double_pendulum.toml";
     const test::Finished refused = place.run({folded, "-o", place.file(), "--splitting", "11"});
     CHECK(refused.exit_code == 2);
-    CHECK(contains(refused.err, "double_pendulum.toml:"));
-    CHECK(contains(refused.err, "splitting methods need a constant mass matrix and forces without velocities, but "));
-    CHECK(contains(refused.err, "; choose Lobatto (--points 4) or Gauss (--stages 3)"));
+    CHECK(test::contains(refused.err, "double_pendulum.toml:"));
+    CHECK(test::contains(refused.err,
+                         "splitting methods need a constant mass matrix and forces without velocities, but "));
+    CHECK(test::contains(refused.err, "; choose Lobatto (--points 4) or Gauss (--stages 3)"));
     const auto emitted = [&](const char* stages, const char* precision) {
         return test::run({LOBATTO_PROGRAM, "emit", pendulum, "--splitting", stages, "--numbers", precision, "-o",
                           place.file("emitted"), "--no-support"});
     };
     const test::Finished wide = emitted("11", "long double");
     CHECK(wide.exit_code == 2);
-    CHECK(contains(wide.err,
-                   "the coefficients of splitting, 11 stages are known to 15 digits, too few for numbers in long "
-                   "double; choose double, or Lobatto"));
+    CHECK(test::contains(wide.err,
+                         "the coefficients of splitting, 11 stages are known to 15 digits, too few for numbers in long "
+                         "double; choose double, or Lobatto"));
     CHECK(emitted("17", "long double").exit_code == 0);
     CHECK(emitted("35", "quadruple").exit_code == 0);
 }
@@ -282,12 +282,12 @@ TEST_CASE("a run that stops keeps what was computed, explains itself and returns
     test::write_text(scene, escape);
     const test::Finished done = place.run({scene, "-o", place.file()});
     CHECK(done.exit_code == 3);
-    const TrajectoryTable table = read_trajectory(place.file());
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     REQUIRE(table.rows.size() > 10);
     CHECK(table.rows.back()[0] == doctest::Approx(1.6));
     CHECK(table.rows.back()[1] < -10);
-    CHECK(contains(done.out, " of 100, h = 0.1, to t = "));
-    CHECK(contains(done.out, "run.csv, " + std::to_string(table.rows.size()) + " states\n"));
+    CHECK(test::contains(done.out, " of 100, h = 0.1, to t = "));
+    CHECK(test::contains(done.out, "run.csv, " + std::to_string(table.rows.size()) + " states\n"));
     CHECK(done.err.starts_with("lobatto: " + scene + ": the run stopped in step " + std::to_string(table.rows.size()) +
                                ", after t = "));
     CHECK(done.err.ends_with(" What was computed is in " + place.file() + ".\n"));
@@ -298,7 +298,7 @@ TEST_CASE("a start that is impossible returns 3 and leaves the file of before") 
     test::write_text(place.file(), "of before\n");
     const test::Finished done = place.run({pendulum, "--set", "m=0", "-o", place.file()});
     CHECK(done.exit_code == 3);
-    CHECK(contains(done.err, "the mass matrix has no inverse for these parameters"));
+    CHECK(test::contains(done.err, "the mass matrix has no inverse for these parameters"));
     CHECK(test::read_file(place.file()) == "of before\n");
 }
 
@@ -310,7 +310,7 @@ TEST_CASE("an interrupted run keeps what was computed, says so and returns 130")
         CHECK(run.err.starts_with("lobatto: interrupted at t = "));
         CHECK(run.err.ends_with("; what was computed is in " + place.file() +
                                 ". The same command with --resume continues from there.\n"));
-        const TrajectoryTable table = read_trajectory(place.file());
+        const test::TrajectoryTable table = test::read_trajectory(place.file());
         CHECK(table.rows.size() > 100);
         CHECK(!std::filesystem::exists(place.file() + ".partial"));
     }
@@ -321,12 +321,12 @@ TEST_CASE("kill -9 leaves readable rows beside the file of before") {
     test::write_text(place.file(), "# lobatto, of before\n");
     CHECK(signal_long_run(place, SIGKILL).exit_code == 128 + SIGKILL);
     CHECK(test::read_file(place.file()) == "# lobatto, of before\n");
-    const TrajectoryTable table = read_trajectory(place.file() + ".partial");
+    const test::TrajectoryTable table = test::read_trajectory(place.file() + ".partial");
     REQUIRE(table.rows.size() > 100);
     for (const std::vector<double>& row : table.rows) REQUIRE(row.size() == 4);
     CHECK(table.rows[7][0] == doctest::Approx(7 * 1000 * 0.05).epsilon(1e-14));
     CHECK(place.run({pendulum, "-o", place.file()}).exit_code == 0);  // what is left does not stand in the way
-    CHECK(read_trajectory(place.file()).rows.size() == 2401);
+    CHECK(test::read_trajectory(place.file()).rows.size() == 2401);
 }
 
 TEST_CASE("a machine that refuses to write is an error of exit code 4") {
@@ -347,7 +347,7 @@ TEST_CASE("a reader that goes away does not cost the trajectory") {
     const test::Finished done =
         test::run({"sh", "-c", "'" LOBATTO_PROGRAM "' run '" + pendulum + "' -o '" + place.file() + "' | true"});
     CHECK(done.err == "");
-    CHECK(read_trajectory(place.file()).rows.size() == 2401);
+    CHECK(test::read_trajectory(place.file()).rows.size() == 2401);
     // Rows to a pipe that closes.
     const test::Finished head = test::run(
         {"sh", "-c",
@@ -377,15 +377,15 @@ TEST_CASE("a run keeps only what the scene asks for") {
     const test::Finished bare =
         place.run({scene_with("momenta = false\nenergy = false\ntangent = false\n"), "-o", place.file()});
     CHECK(bare.err == "");
-    CHECK(read_trajectory(place.file()).columns == std::vector<std::string>{"t", "a", "b"});
-    CHECK(!contains(bare.out, "energy"));
-    CHECK(!contains(bare.out, "symplectic"));
-    const TrajectoryTable kept = read_trajectory(place.file());
+    CHECK(test::read_trajectory(place.file()).columns == std::vector<std::string>{"t", "a", "b"});
+    CHECK(!test::contains(bare.out, "energy"));
+    CHECK(!test::contains(bare.out, "symplectic"));
+    const test::TrajectoryTable kept = test::read_trajectory(place.file());
     const test::Finished full = place.run({scene_with(""), "-o", place.file()});
-    const TrajectoryTable all = read_trajectory(place.file());
+    const test::TrajectoryTable all = test::read_trajectory(place.file());
     CHECK(all.columns == std::vector<std::string>{"t", "a", "b", "p_a", "p_b", "H"});
-    CHECK(contains(full.out, "  energy error "));
-    CHECK(contains(full.out, "  symplectic defect "));
+    CHECK(test::contains(full.out, "  energy error "));
+    CHECK(test::contains(full.out, "  symplectic defect "));
     REQUIRE(kept.rows.size() == all.rows.size());
     for (std::size_t i = 0; i < kept.rows.size(); ++i)
         for (std::size_t k = 0; k < 3; ++k) CHECK(kept.rows[i][k] == all.rows[i][k]);
@@ -400,8 +400,9 @@ TEST_CASE("states between steps lie on the motion, and those at steps are unchan
     test::write_text(scene, std::regex_replace(text, std::regex("every = 1"), "dense = 3"));
     const test::Finished done = place.run({scene, "--until", "2", "-o", place.file()});
     CHECK(done.err == "");
-    CHECK(contains(done.out, ", 161 states\n"));
-    const TrajectoryTable steps = read_trajectory(place.file("steps.csv")), dense = read_trajectory(place.file());
+    CHECK(test::contains(done.out, ", 161 states\n"));
+    const test::TrajectoryTable steps = test::read_trajectory(place.file("steps.csv")),
+                                dense = test::read_trajectory(place.file());
     REQUIRE(steps.rows.size() == 41);
     REQUIRE(dense.rows.size() == 161);
     const long double pi = std::acos(-1.0L);
@@ -423,9 +424,10 @@ TEST_CASE("events go to a file beside the trajectory, each on the exact motion")
     test::write_text(scene, test::read_file(pendulum) + "events = [\"q = 0 rising\", \"q\' = 0\"]\n");
     const test::Finished done = place.run({scene, "--until", "11.9", "-o", place.file()});
     CHECK(done.err == "");
-    CHECK(contains(done.out, "  events                  10 of 'q = 0 rising'\n"));
-    CHECK(contains(done.out, "                          20 of 'q' = 0', in " + place.file("run.events.csv") + "\n"));
-    const TrajectoryTable table = read_trajectory(place.file("run.events.csv"));
+    CHECK(test::contains(done.out, "  events                  10 of 'q = 0 rising'\n"));
+    CHECK(test::contains(done.out,
+                         "                          20 of 'q' = 0', in " + place.file("run.events.csv") + "\n"));
+    const test::TrajectoryTable table = test::read_trajectory(place.file("run.events.csv"));
     CHECK(table.comments[0] == "lobatto events");
     CHECK(table.comments[5] == "event 1: q = 0 rising");
     CHECK(table.comments[6] == "event 2: q' = 0");
@@ -452,8 +454,8 @@ TEST_CASE("impacts and stops are told, and have their rows beside the trajectory
     CHECK(stopped.exit_code == 0);
     CHECK(stopped.out.find("stopped                 by 'y' = 0 falling' at t = 1.5\n") != std::string::npos);
     CHECK(stopped.out.find("impacts                 1 of 'floor: y = 0 falling', in ") != std::string::npos);
-    const TrajectoryTable states = read_trajectory(place.file()),
-                          events = read_trajectory(place.file("run.events.csv"));
+    const test::TrajectoryTable states = test::read_trajectory(place.file()),
+                                events = test::read_trajectory(place.file("run.events.csv"));
     CHECK(std::fabs(states.rows.back()[0] - 1.5) < 1e-14);
     CHECK(std::fabs(states.rows.back()[1] - 0.25) < 1e-14);
     REQUIRE(events.rows.size() == 2);
@@ -467,7 +469,7 @@ TEST_CASE("impacts and stops are told, and have their rows beside the trajectory
     CHECK(failed.exit_code == 3);
     CHECK(failed.err.find("after t = 2.7") != std::string::npos);
     CHECK(failed.err.find("impacts accumulate") != std::string::npos);
-    CHECK(read_trajectory(place.file()).rows.size() == 10);
+    CHECK(test::read_trajectory(place.file()).rows.size() == 10);
 }
 
 TEST_CASE("what a drive or friction does to the energy is called a change, and no symplecticity is promised") {
@@ -480,14 +482,14 @@ TEST_CASE("what a drive or friction does to the energy is called a change, and n
     const test::Finished damped = place.run({scene, "-o", place.file()});
     CHECK(damped.err == "");
     CHECK(std::regex_search(damped.out, std::regex("\n  energy change           0\\.\\d+ at most\n")));
-    CHECK(!contains(damped.out, "symplectic"));
+    CHECK(!test::contains(damped.out, "symplectic"));
     test::write_text(scene,
                      "title = \"Driven\"\ntime = \"t\"\nlagrangian = \"x'^2/2 - x^4/4 + x*sin(t)\"\n"
                      "[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 10\n");
     const test::Finished driven = place.run({scene, "-o", place.file()});
     CHECK(driven.err == "");
-    CHECK(contains(driven.out, "\n  energy change "));
-    CHECK(contains(driven.out, "\n  symplectic defect "));  // a step is still symplectic
+    CHECK(test::contains(driven.out, "\n  energy change "));
+    CHECK(test::contains(driven.out, "\n  symplectic defect "));  // a step is still symplectic
 }
 
 TEST_CASE("a motion where rest is impossible has an energy") {
@@ -501,8 +503,8 @@ TEST_CASE("a motion where rest is impossible has an energy") {
     const test::Finished finished = place.run({scene, "-o", place.file()});
     CHECK(finished.exit_code == 0);
     CHECK(finished.err == "");
-    CHECK(!contains(finished.out, "nan"));
-    const std::vector<double> last = read_trajectory(place.file()).rows.back();
+    CHECK(!test::contains(finished.out, "nan"));
+    const std::vector<double> last = test::read_trajectory(place.file()).rows.back();
     CHECK(last[1] * last[1] + last[2] * last[2] == doctest::Approx(13).epsilon(1e-9));
 }
 
@@ -513,8 +515,8 @@ TEST_CASE("the stability limit is the same in any unit of mass") {
         test::write_text(scene, fmt::format("lagrangian = \"m*({})\"\n[coordinates]\nq = {{ position = 1, velocity = 0 "
                                             "}}\n[parameters]\nm = 1\n[run]\nstep = 0.1\nuntil = 2\n",
                                             formula));
-        return contains(place.run({scene, "--set", std::string("m=") + mass, "-o", place.file()}).err,
-                        "beyond the linear stability limit");
+        return test::contains(place.run({scene, "--set", std::string("m=") + mass, "-o", place.file()}).err,
+                              "beyond the linear stability limit");
     };
     for (const char* mass : {"1", "1e9", "1e-9"}) {
         CHECK(!warns("q'^2/2 - q^2/2 - q^4/40", mass));
@@ -531,7 +533,8 @@ TEST_CASE("clean steps have the events and the states between steps of plain one
                      "[run]\nstep = 0.05\nuntil = 20\n[output]\ndense = 3\nevents = [\"x = 0\", \"y = 0 rising\"]\n");
     const auto tables = [&](const std::string& arithmetic) {
         CHECK(place.run({scene, "--arithmetic", arithmetic, "-o", place.file(), "--quiet"}).err == "");
-        return std::pair(read_trajectory(place.file()).rows, read_trajectory(place.file("run.events.csv")).rows);
+        return std::pair(test::read_trajectory(place.file()).rows,
+                         test::read_trajectory(place.file("run.events.csv")).rows);
     };
     const auto plain = tables("plain"), clean = tables("clean");
     REQUIRE(clean.first.size() == 1601);
@@ -555,7 +558,7 @@ TEST_CASE("a run without shortcuts gives the same motion to rounding") {
         std::vector<std::string> arguments{pendulum, "--until", "5", "-o", place.file(), "--quiet"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         CHECK(place.run(arguments).err == "");
-        return read_trajectory(place.file()).rows.back();
+        return test::read_trajectory(place.file()).rows.back();
     };
     const std::vector<double> with = last({}), without = last({"--general"});
     for (std::size_t k = 0; k < with.size(); ++k) CHECK(with[k] == doctest::Approx(without[k]).epsilon(1e-11));
@@ -569,7 +572,7 @@ TEST_CASE("files that Lobatto did not write are never touched") {
         const test::Finished done = place.run({pendulum, "-o", out, "--until", "1"});
         CAPTURE(neighbour);
         CHECK(done.exit_code == code);
-        CHECK(contains(done.err, neighbour + " is there, and Lobatto did not write it"));
+        CHECK(test::contains(done.err, neighbour + " is there, and Lobatto did not write it"));
         CHECK(test::read_file(place.file(neighbour)) == content);
         std::filesystem::remove(place.file(neighbour));
     };
@@ -583,7 +586,7 @@ TEST_CASE("files that Lobatto did not write are never touched") {
         test::write_text(scene, text);
         const test::Finished done = place.run({scene, "-o", out, "--until", "1"});
         CHECK(done.exit_code == 2);
-        CHECK(contains(done.err, "the result would overwrite the scene"));
+        CHECK(test::contains(done.err, "the result would overwrite the scene"));
         CHECK(test::read_file(scene) == text);
         std::filesystem::remove(scene);
     }
@@ -597,7 +600,7 @@ TEST_CASE("files that Lobatto did not write are never touched") {
     test::write_text(place.file("kernel.hpp"), "mine");
     const test::Finished events = place.run({scene, "-o", out, "--until", "1"});
     CHECK(events.exit_code == 2);
-    CHECK(contains(events.err, "w.events.csv is there, and Lobatto did not write it"));
+    CHECK(test::contains(events.err, "w.events.csv is there, and Lobatto did not write it"));
     CHECK(test::read_file(place.file("w.events.csv")) == "mine");
     const test::Finished emitted = test::run({LOBATTO_PROGRAM, "emit", pendulum, "-o", place.file(".")});
     CHECK(emitted.exit_code == 2);
@@ -625,7 +628,7 @@ TEST_CASE("what cannot be told on standard error changes neither the run nor its
     }
     // What is told does not end up in the trajectory.
     CHECK(shell(warned, "2>&-") != 134);
-    CHECK(!contains(test::read_file(place.file()), "warning"));
+    CHECK(!test::contains(test::read_file(place.file()), "warning"));
 }
 
 TEST_CASE("a momentum without an inverse at rest has a velocity where it has one") {
@@ -641,7 +644,7 @@ TEST_CASE("a momentum without an inverse at rest has a velocity where it has one
         CAPTURE(done.err);
         CHECK(done.exit_code == 0);
         // It moves with nearly its velocity at first.
-        const TrajectoryTable table = read_trajectory(place.file());
+        const test::TrajectoryTable table = test::read_trajectory(place.file());
         CHECK(table.rows[10][1] == doctest::Approx(0.001).epsilon(0.05));
     }
 }
@@ -662,9 +665,9 @@ TEST_CASE("a step too long for a contact is told as that, with a length that wou
         REQUIRE(done.exit_code == 3);
         const std::string told = "Try a smaller step, such as h = ";
         const std::size_t at = done.err.find(told);
-        if (contains(done.err, "the run left its motion")) continue;  // it went on, but elsewhere
+        if (test::contains(done.err, "the run left its motion")) continue;  // it went on, but elsewhere
         ++stopped;
-        CHECK(contains(done.err, ", with which the motion goes on there"));
+        CHECK(test::contains(done.err, ", with which the motion goes on there"));
         const std::size_t begin = at + told.size();
         const std::string step = done.err.substr(begin, done.err.find(',', begin) - begin);
         CHECK(place.run({scene, "-o", place.file(), "--quiet", "--unmeasured", "--step", step, "--until", "0.5"})
@@ -690,7 +693,7 @@ TEST_CASE("a value that is set is refused where the formula as written has no va
         CHECK(with("m=2.5").exit_code == 0);
         const test::Finished refused = with("m=1");
         CHECK(refused.exit_code == 2);
-        CHECK(contains(refused.err, "a square root has no value at the start: it is of m - 2 = -1"));
+        CHECK(test::contains(refused.err, "a square root has no value at the start: it is of m - 2 = -1"));
     }
 }
 
@@ -708,7 +711,7 @@ TEST_CASE("a run that leaves the domain of a formula is told, though the formula
         const bool has_value = std::string(term) == "q*(q - 3)/(q - 3)";  // on both sides of one place
         CHECK(done.exit_code == (has_value ? 0 : 3));
         if (std::string(term) == "exp(log(q - 3))")
-            CHECK(contains(
+            CHECK(test::contains(
                 done.err,
                 "the run left its Lagrangian by t = 1.5, q = (2.875), p = (-1.5): a logarithm, line 1 column 28, "
                 "is of q - 3 = -0.125, and has no value there"));
@@ -724,7 +727,7 @@ TEST_CASE("energies beyond all numbers are told, and are no crash") {
     const test::Finished done = test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "out.csv"});
     INFO(done.err);
     CHECK(done.exit_code == 3);
-    CHECK(contains(done.err, "the run is wrong from step 1 on"));
+    CHECK(test::contains(done.err, "the run is wrong from step 1 on"));
 }
 
 TEST_CASE("an error above a hundredth of the amplitude is warned of, also with --quiet") {
@@ -736,6 +739,6 @@ TEST_CASE("an error above a hundredth of the amplitude is warned of, also with -
                      "step = 0.02\nuntil = 60\n");
     const test::Finished done = place.run({scene, "-o", place.file("kepler.csv"), "--quiet"});
     CHECK(done.out == "");
-    CHECK(contains(done.err, "lobatto: warning: "));
-    CHECK(contains(done.err, "of the amplitude"));
+    CHECK(test::contains(done.err, "lobatto: warning: "));
+    CHECK(test::contains(done.err, "of the amplitude"));
 }

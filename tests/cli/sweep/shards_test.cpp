@@ -293,7 +293,7 @@ TEST_CASE("a sweep with stops and with what is kept has the same bytes by thread
             return test::read_file(place.file(name));
         };
         const std::string whole = bytes("whole.csv", {"--threads", "1"});
-        const std::vector<double> stops = test::column_of(read_trajectory(place.file("whole.csv")), "stop");
+        const std::vector<double> stops = test::column_of(test::read_trajectory(place.file("whole.csv")), "stop");
         CHECK(std::count(stops.begin(), stops.end(), 0) > 200);
         CHECK(std::count(stops.begin(), stops.end(), 0) < 1000);
         for (const char* threads : {"2", "5"}) CHECK(bytes("more.csv", {"--threads", threads}) == whole);

@@ -41,12 +41,12 @@ std::string bytes_of(const std::vector<T>& values) {
 TEST_CASE("starts come from the columns of a CSV, of NumPy's records and of its arrays, and all give the same rows") {
     const test::SweepFolder place;
     test::write_text(place.file("starts.csv"), "# a comment\nq,q',omega\n1,0.5,6\n -2 , 0,7.5\n0.25,1e-3,5\n");
-    const TrajectoryTable table = place.table(with({"--starts", place.file("starts.csv")}));
+    const test::TrajectoryTable table = place.table(with({"--starts", place.file("starts.csv")}));
     CHECK(column_of(table, "q(0)") == std::vector<double>{1, -2, 0.25});
     CHECK(column_of(table, "q'(0)") == std::vector<double>{0.5, 0, 1e-3});
     CHECK(column_of(table, "omega") == std::vector<double>{6, 7.5, 5});
     // What lists that run together give.
-    const TrajectoryTable zipped =
+    const test::TrajectoryTable zipped =
         place.table(with({"--zip", "--vary", "q=1,-2,0.25", "--vary", "q'=0.5,0,1e-3", "--vary", "omega=6,7.5,5"}));
     CHECK(zipped.rows == table.rows);
     CHECK(zipped.columns == table.columns);
@@ -63,16 +63,16 @@ TEST_CASE("starts come from the columns of a CSV, of NumPy's records and of its 
     test::write_text(place.file("states.npy"),
                      npy_of("'<f8'", "(3, 2)", bytes_of<double>({1, 0.5, -2, 0, 0.25, 1e-3})));
     test::write_text(place.file("states.csv"), "q(0),q'(0)\n1,0.5\n-2,0\n0.25,1e-3\n");
-    const TrajectoryTable states = place.table(with({"--starts", place.file("states.npy")}));
+    const test::TrajectoryTable states = place.table(with({"--starts", place.file("states.npy")}));
     CHECK(states.rows == place.table(with({"--starts", place.file("states.csv")})).rows);
     test::write_text(place.file("whole.npy"), npy_of("[('q', '<i4'), (\"q'\", '|b1')]", "(2,)",
                                                      std::string("\xfe\xff\xff\xff\x01\x03\x00\x00\x00\x00", 10)));
-    const TrajectoryTable whole = place.table(with({"--starts", place.file("whole.npy")}));
+    const test::TrajectoryTable whole = place.table(with({"--starts", place.file("whole.npy")}));
     CHECK(column_of(whole, "q(0)") == std::vector<double>{-2, 3});
     CHECK(column_of(whole, "q'(0)") == std::vector<double>{1, 0});
 
     // Each start with each value; the values run fastest.
-    const TrajectoryTable both = place.table(with({"--starts", place.file("starts.csv"), "--vary", "m=1,2"}));
+    const test::TrajectoryTable both = place.table(with({"--starts", place.file("starts.csv"), "--vary", "m=1,2"}));
     CHECK(column_of(both, "q(0)") == std::vector<double>{1, 1, -2, -2, 0.25, 0.25});
     CHECK(column_of(both, "m") == std::vector<double>{1, 2, 1, 2, 1, 2});
 }
@@ -122,7 +122,7 @@ TEST_CASE("random rows are the same for the same seed, for each setting, and oth
     const test::SweepFolder place;
     const std::vector<std::string> drawn = {"--random",           "20",     "--draw",
                                             "q ~ normal(1, 0.1)", "--draw", "omega ~ uniform(5, 7)"};
-    const TrajectoryTable one = place.table(with(drawn, {"--until", "1", "--seed", "5"}));
+    const test::TrajectoryTable one = place.table(with(drawn, {"--until", "1", "--seed", "5"}));
     REQUIRE(one.rows.size() == 20);
     CHECK(place.table(with(drawn, {"--until", "1", "--seed", "5", "--threads", "1"})).rows == one.rows);
     CHECK(column_of(place.table(with(drawn, {"--until", "1", "--seed", "6"})), "q(0)")[3] != column_of(one, "q(0)")[3]);
@@ -131,7 +131,7 @@ TEST_CASE("random rows are the same for the same seed, for each setting, and oth
     std::sort(q.begin(), q.end());
     CHECK(std::adjacent_find(q.begin(), q.end()) == q.end());
     // Twice as many begin with the same; settings have the same starts, combinations have their own.
-    const TrajectoryTable settings =
+    const test::TrajectoryTable settings =
         place.table(with(drawn, {"--until", "1", "--seed", "5", "--vary", "step=0.1,0.05"}));
     const std::vector<double> all = column_of(settings, "q(0)"), first = column_of(one, "q(0)");
     REQUIRE(all.size() == 40);
@@ -158,7 +158,7 @@ TEST_CASE("a study of convergence is one command: errors fall as the order says,
           doctest::test_suite("slow")) {
     const test::SweepFolder place;
     const auto errors = [&](const std::vector<std::string>& words) {
-        const TrajectoryTable table = place.table(words);
+        const test::TrajectoryTable table = place.table(words);
         std::vector<double> error;  // of q, against the last, which is the most accurate
         const std::vector<double> q = column_of(table, "q");
         for (const double value : q) error.push_back(std::fabs(value - q.back()));
@@ -178,16 +178,18 @@ TEST_CASE("a study of convergence is one command: errors fall as the order says,
         errors({"--vary", "stages=1,2,3,8", "--vary", "q=1", "--until", "2", "--step", "0.02"});
     for (std::size_t i = 0; i < 2; ++i) CHECK(of_stages[i] > 20 * of_stages[i + 1]);
     // Each row is that of a sweep with this setting alone.
-    const TrajectoryTable both = place.table(
+    const test::TrajectoryTable both = place.table(
         {"--zip", "--vary", "points=4,6,4", "--vary", "step=0.05,0.1,0.1", "--vary", "q=1,2,1.5", "--until", "2"});
     const char* const alone[][3] = {{"4", "0.05", "q=1"}, {"6", "0.1", "q=2"}, {"4", "0.1", "q=1.5"}};
     for (std::size_t i = 0; i < 3; ++i) {
         const auto& [points, step, q] = alone[i];
-        const TrajectoryTable one = place.table({"--points", points, "--step", step, "--vary", q, "--until", "2"});
+        const test::TrajectoryTable one =
+            place.table({"--points", points, "--step", step, "--vary", q, "--until", "2"});
         for (const char* name : {"q", "p_q", "steps", "error", "energy_error"})
             CHECK(column_of(one, name)[0] == column_of(both, name)[i]);
     }
-    const TrajectoryTable tolerances = place.table({"--vary", "tolerance=1e-3,1e-14", "--vary", "q=1", "--until", "2"});
+    const test::TrajectoryTable tolerances =
+        place.table({"--vary", "tolerance=1e-3,1e-14", "--vary", "q=1", "--until", "2"});
     CHECK(column_of(tolerances, "q")[0] != column_of(tolerances, "q")[1]);
     CHECK(column_of(tolerances, "q")[0] == doctest::Approx(column_of(tolerances, "q")[1]).epsilon(1e-3));
 

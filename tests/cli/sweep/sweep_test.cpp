@@ -41,22 +41,18 @@ struct Place {
         return lobatto(arguments);
     }
     // The table of a sweep that succeeds.
-    TrajectoryTable table(std::vector<std::string> arguments) const {
+    test::TrajectoryTable table(std::vector<std::string> arguments) const {
         const test::Finished done = sweep(std::move(arguments));
         CHECK(done.err == "");
         CHECK(done.exit_code == 0);
-        return read_trajectory(file());
+        return test::read_trajectory(file());
     }
 };
 
 using Strings = std::vector<std::string>;
 
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
-
 // A .npy of one-dimensional records, read by the rules of its format.
-TrajectoryTable read_npy(const std::string& path) {
+test::TrajectoryTable read_npy(const std::string& path) {
     const std::string bytes = test::read_file(path);
     REQUIRE(bytes.size() > 128);
     REQUIRE(bytes.substr(0, 8) == std::string("\x93NUMPY\x01\x00", 8));
@@ -67,7 +63,7 @@ TrajectoryTable read_npy(const std::string& path) {
     std::smatch found;
     REQUIRE(std::regex_match(
         head, found, std::regex("\\{'descr': \\[(.*)\\], 'fortran_order': False, 'shape': \\((\\d+),\\), \\} *\n")));
-    TrajectoryTable table;
+    test::TrajectoryTable table;
     std::vector<bool> whole;
     const std::string fields = found[1];
     const std::regex field("\\((['\"])(.*?)\\1, '<(i8|f8)'\\), ");
@@ -95,7 +91,7 @@ TrajectoryTable read_npy(const std::string& path) {
 // How far a trajectory may be from that of `lobatto run`: 0 when it runs alone in the kernel. Lanes round in another
 // order, which a pendulum of 200 steps carries on to less than this.
 double tolerance(const std::string& summary) {
-    return contains(summary, "one trajectory at a time each") ? 0 : 1e-12;
+    return test::contains(summary, "one trajectory at a time each") ? 0 : 1e-12;
 }
 
 // Not a number is the same as itself: the error of a state on the way.
@@ -115,7 +111,7 @@ TEST_CASE("what is kept of a trajectory is one row of numbers") {
     test::write_text(scene,
                      "lagrangian = \"q'^2/2 - 2*q^2\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n[method]\n"
                      "points = 8\n[run]\nstep = \"pi/40\"\nuntil = \"2*pi\"\n");
-    const TrajectoryTable table =
+    const test::TrajectoryTable table =
         place.table({scene, "--vary", "q=1:3:3", "--keep",
                      "first(q = 0), first(q = 5), count(q' = 0 rising), max(q), min(q + 1), mean(q^2)", "--keep",
                      "last(p_q), max(H), mean(p_q*q')"});
@@ -138,10 +134,10 @@ TEST_CASE("what is kept of a trajectory is one row of numbers") {
         CHECK(done.exit_code == 2);
         return done.err;
     };
-    CHECK(contains(refusal("mode(q)"), "--keep:1:1: what is kept of a trajectory is first(x = 0)"));
-    CHECK(contains(refusal("max(q), max(r)"), "--keep:1:13: unknown name 'r'"));
-    CHECK(contains(refusal("first(H = 1)"), "not of H and momenta"));
-    CHECK(contains(refusal("max(q"), "--keep:1:1"));
+    CHECK(test::contains(refusal("mode(q)"), "--keep:1:1: what is kept of a trajectory is first(x = 0)"));
+    CHECK(test::contains(refusal("max(q), max(r)"), "--keep:1:13: unknown name 'r'"));
+    CHECK(test::contains(refusal("first(H = 1)"), "not of H and momenta"));
+    CHECK(test::contains(refusal("max(q"), "--keep:1:1"));
 }
 
 TEST_CASE("a trajectory that meets a stop ends there, alone, and the others go on") {
@@ -150,7 +146,7 @@ TEST_CASE("a trajectory that meets a stop ends there, alone, and the others go o
     test::write_text(scene,
                      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 0, velocity = 1 }\n[method]\n"
                      "points = 8\n[run]\nstep = 0.1\nuntil = 5\nstop = [\"q = pi\", \"q = -pi\"]\n");
-    const TrajectoryTable table =
+    const test::TrajectoryTable table =
         place.table({scene, "--vary", "q'=1,-2.5,3", "--keep", "first(q = 1)", "--threads", "2"});
     CHECK(test::column_of(table, "stop") == std::vector<double>{0, 2, 1});
     CHECK(test::column_of(table, "status") == std::vector<double>{0, 0, 0});
@@ -160,7 +156,7 @@ TEST_CASE("a trajectory that meets a stop ends there, alone, and the others go o
     CHECK(std::fabs(test::column_of(table, "t")[2] - 2.0 / 3 * std::comp_ellint_1(2.0 / 3)) < 1e-12);
     for (const double error : test::column_of(table, "error")) CHECK(error < 1e-9);
     // The states at the ends, without --keep.
-    const TrajectoryTable states = place.table({scene, "--vary", "q'=1,-2.5,3"});
+    const test::TrajectoryTable states = place.table({scene, "--vary", "q'=1,-2.5,3"});
     CHECK(std::fabs(test::column_of(states, "q")[1] + std::numbers::pi) < 1e-13);
     CHECK(std::fabs(test::column_of(states, "p_q")[2] - std::sqrt(5.0)) < 1e-12);
     CHECK(test::column_of(states, "stop") == std::vector<double>{0, 2, 1});
@@ -191,7 +187,7 @@ TEST_CASE("a sweep says what it did and where its table is") {
 
 TEST_CASE("the grid has all combinations, the last name fastest, both ends exactly") {
     const Place place;
-    const TrajectoryTable table = place.table(
+    const test::TrajectoryTable table = place.table(
         {pendulum, "--vary", "q'=-1:2:4", "--vary", "omega=0.1,pi,sqrt(4)", "--vary", "q=1:100:3:log", "--steps", "1"});
     CHECK(table.columns ==
           Strings{"index", "q'(0)", "omega", "q(0)", "status", "steps", "t", "q", "p_q", "energy_error", "error"});
@@ -203,12 +199,14 @@ TEST_CASE("the grid has all combinations, the last name fastest, both ends exact
         CHECK(table.rows[i][2] == omega[i / 3 % 3]);
         CHECK(table.rows[i][3] == q[i % 3]);
     }
-    CHECK(contains(test::read_file(place.file()),
-                   "# lobatto sweep\n# scene: A plane pendulum\n# method: Lobatto, 4 points, h = 0.05\n# kernel: "));
-    CHECK(contains(test::read_file(place.file()),
-                   "\n# parameters: m = 1\n# vary: q' = -1:2:4\n# vary: omega = 0.1,pi,sqrt(4)\n# vary: q = "
-                   "1:100:3:log\n# status: 0 reached the end, 1 not converged, "));
-    CHECK(contains(test::read_file(place.file()), "\n# columns: index, q'(0), omega [rad/s], q(0) [rad], status, "));
+    CHECK(test::contains(
+        test::read_file(place.file()),
+        "# lobatto sweep\n# scene: A plane pendulum\n# method: Lobatto, 4 points, h = 0.05\n# kernel: "));
+    CHECK(test::contains(test::read_file(place.file()),
+                         "\n# parameters: m = 1\n# vary: q' = -1:2:4\n# vary: omega = 0.1,pi,sqrt(4)\n# vary: q = "
+                         "1:100:3:log\n# status: 0 reached the end, 1 not converged, "));
+    CHECK(test::contains(test::read_file(place.file()),
+                         "\n# columns: index, q'(0), omega [rad/s], q(0) [rad], status, "));
     // Values are exact before they are rounded: 0.1 + 0.2 is no double sum.
     CHECK(test::column_of(place.table({pendulum, "--vary", "q=0:0.5:6", "--steps", "0"}), "q(0)") ==
           std::vector<double>{0, 0.1, 0.2, 0.3, 0.4, 0.5});
@@ -231,7 +229,7 @@ TEST_CASE("each trajectory of a sweep is that of a run, with momenta of its own 
                      "[run]\nstep = 0.05\nuntil = 10\n");
     const test::Finished done = place.sweep({scene, "--vary", "m=0.3:2.1:9", "--every", "70"});
     CHECK(done.err == "");
-    const TrajectoryTable table = read_trajectory(place.file());
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     REQUIRE(table.rows.size() == 9 * 4);
     const std::vector<double> m = test::column_of(table, "m");
     for (std::size_t i = 0; i < 9; ++i) {
@@ -239,7 +237,7 @@ TEST_CASE("each trajectory of a sweep is that of a run, with momenta of its own 
         REQUIRE(
             place.lobatto({"run", scene, "--quiet", "--set", "m=" + exact_text(m[4 * i]), "--every", "70", "-o", path})
                 .err == "");
-        const TrajectoryTable run = read_trajectory(path);
+        const test::TrajectoryTable run = test::read_trajectory(path);
         REQUIRE(run.rows.size() == 4);
         for (std::size_t row = 0; row < 4; ++row) {
             const std::vector<double>&swept = table.rows[4 * i + row], alone = run.rows[row];
@@ -265,10 +263,10 @@ TEST_CASE("a table is the same file for any number of threads, in CSV and in Num
         const std::string csv = content("1", "csv", every);
         CHECK(content("2", "csv", every) == csv);
         CHECK(content("3", "csv", every) == csv);
-        const TrajectoryTable text = read_trajectory(place.file());
+        const test::TrajectoryTable text = test::read_trajectory(place.file());
         const std::string binary = content("1", "binary", every);
         CHECK(content("3", "binary", every) == binary);
-        const TrajectoryTable array = read_npy(place.file());
+        const test::TrajectoryTable array = read_npy(place.file());
         CHECK(array.columns == text.columns);
         CHECK(same_rows(array.rows, text.rows));
         CHECK(text.rows.size() >= 2 * 17 * 31);
@@ -282,9 +280,10 @@ TEST_CASE("the name of the table tells its format, and without one it goes to th
                           "cd '" + place.folder.string() + "' && '" LOBATTO_PROGRAM "' sweep '" + pendulum +
                               "' --vary \"q'=0:1:3\" --steps 2 " + arguments});
     };
-    CHECK(contains(in_folder("").out, "  table                   out/pendulum.sweep.csv, 3 rows\n"));
-    CHECK(read_trajectory(place.file("out/pendulum.sweep.csv")).rows.size() == 3);
-    CHECK(contains(in_folder("--format binary").out, "  table                   out/pendulum.sweep.npy, 3 rows\n"));
+    CHECK(test::contains(in_folder("").out, "  table                   out/pendulum.sweep.csv, 3 rows\n"));
+    CHECK(test::read_trajectory(place.file("out/pendulum.sweep.csv")).rows.size() == 3);
+    CHECK(
+        test::contains(in_folder("--format binary").out, "  table                   out/pendulum.sweep.npy, 3 rows\n"));
     CHECK(read_npy(place.file("out/pendulum.sweep.npy")).columns[1] == "q'(0)");
     CHECK(in_folder("-o a.npy").err == "");
     CHECK(read_npy(place.file("a.npy")).rows == read_npy(place.file("out/pendulum.sweep.npy")).rows);
@@ -299,8 +298,8 @@ TEST_CASE("names of a scene are varied as it writes them, and columns never shar
                      "index*steps\"\n[coordinates]\nx = { count = 2, position = 1, momentum = 0 }\n"
                      "index = { position = 0, momentum = 0 }\n[parameters]\nm = [1, 2]\nsteps = 3\n"
                      "[run]\nstep = 0.1\nuntil = 1\n[output]\nmomenta = false\nenergy = false\n");
-    const TrajectoryTable table = place.table({scene, "--vary", "x[2]=0.5,0.6", "--vary", "p_x_1=1", "--vary",
-                                               "m[1]=3,4", "--vary", "index=7", "--steps", "3"});
+    const test::TrajectoryTable table = place.table({scene, "--vary", "x[2]=0.5,0.6", "--vary", "p_x_1=1", "--vary",
+                                                     "m[1]=3,4", "--vary", "index=7", "--steps", "3"});
     CHECK(table.columns == Strings{"index_", "x[2](0)", "p_x_1(0)", "m[1]", "index(0)", "status", "steps_", "t", "x_1",
                                    "x_2", "index", "error"});
     REQUIRE(table.rows.size() == 4);
@@ -309,8 +308,8 @@ TEST_CASE("names of a scene are varied as it writes them, and columns never shar
     CHECK(table.rows[3][10] == doctest::Approx(7 - 3 * 0.3 * 0.3 / 2));
     CHECK(table.rows[2][8] != table.rows[3][8]);  // m[1] moves x[1] alone
     CHECK(table.rows[2][9] == table.rows[3][9]);
-    CHECK(contains(place.sweep({scene, "--vary", "x[2]'=1"}).err,
-                   "--vary:1:1: " + scene + " gives initial momenta, not velocities; vary p_x_2 instead\n"));
+    CHECK(test::contains(place.sweep({scene, "--vary", "x[2]'=1"}).err,
+                         "--vary:1:1: " + scene + " gives initial momenta, not velocities; vary p_x_2 instead\n"));
 }
 
 TEST_CASE("wrong values to vary are refused with exit code 2, and no table is made" * doctest::test_suite("slow")) {
@@ -343,38 +342,40 @@ TEST_CASE("wrong values to vary are refused with exit code 2, and no table is ma
           "--vary:1:9: 'lin' is no spacing; there is log, or none for equal distances\n  1 | q=1:2:3:lin\n    |        "
           " ^\n");
     const std::string count = "it must be a whole number from 1 to 10000000\n";
-    CHECK(contains(vary("q=0:1:0"), "--vary:1:7: the number of values is 0; " + count));
-    CHECK(contains(vary("q=0:1:-3"), "--vary:1:7: the number of values is -3; " + count));
-    CHECK(contains(vary("q=0:1:2.5"), "--vary:1:7: the number of values is 2.5; " + count));
-    CHECK(contains(vary("q=0:1:1e8"), "--vary:1:7: the number of values is 100000000; " + count));
-    CHECK(contains(vary("q=-1:2:3:log"),
-                   "--vary:1:3: equal ratios lead from -1 to 2 only when both have the same sign and neither is 0; "
-                   "leave :log out\n"));
-    CHECK(contains(vary("q=0:2:3:log"), "--vary:1:3: equal ratios lead from 0 to 2 only"));
-    CHECK(contains(vary("q=1,,2"), "--vary:1:5: "));
-    CHECK(contains(vary("q="), "--vary:1:3: "));
-    CHECK(contains(vary("q=1,2*omega"), "--vary:1:7: unknown name 'omega' in the value of q"));
-    CHECK(contains(vary("q=1:2*m:3"), "--vary:1:7: unknown name 'm' in the last value of q"));
-    CHECK(contains(vary("m=1e400,1"), "--vary:1:3: the value of m must be 0, or of a size between 1e-300 and 1e300\n"));
-    CHECK(contains(refusal({"--vary", "q=1", "--vary", "q=2"}),
-                   "--vary:1:1: 'q' is varied twice; give all its values at once\n"));
+    CHECK(test::contains(vary("q=0:1:0"), "--vary:1:7: the number of values is 0; " + count));
+    CHECK(test::contains(vary("q=0:1:-3"), "--vary:1:7: the number of values is -3; " + count));
+    CHECK(test::contains(vary("q=0:1:2.5"), "--vary:1:7: the number of values is 2.5; " + count));
+    CHECK(test::contains(vary("q=0:1:1e8"), "--vary:1:7: the number of values is 100000000; " + count));
+    CHECK(
+        test::contains(vary("q=-1:2:3:log"),
+                       "--vary:1:3: equal ratios lead from -1 to 2 only when both have the same sign and neither is 0; "
+                       "leave :log out\n"));
+    CHECK(test::contains(vary("q=0:2:3:log"), "--vary:1:3: equal ratios lead from 0 to 2 only"));
+    CHECK(test::contains(vary("q=1,,2"), "--vary:1:5: "));
+    CHECK(test::contains(vary("q="), "--vary:1:3: "));
+    CHECK(test::contains(vary("q=1,2*omega"), "--vary:1:7: unknown name 'omega' in the value of q"));
+    CHECK(test::contains(vary("q=1:2*m:3"), "--vary:1:7: unknown name 'm' in the last value of q"));
+    CHECK(test::contains(vary("m=1e400,1"),
+                         "--vary:1:3: the value of m must be 0, or of a size between 1e-300 and 1e300\n"));
+    CHECK(test::contains(refusal({"--vary", "q=1", "--vary", "q=2"}),
+                         "--vary:1:1: 'q' is varied twice; give all its values at once\n"));
     CHECK(refusal({"--vary", "q=0:1:1e7", "--vary", "m=1:2:1e6"}) ==
           "--vary: all combinations make 1e+13 trajectories; at most 1e+12: give fewer values\n");
     CHECK(refusal({"--vary", "q=0:1:1e5", "--until", "1e14"}) ==
           "--vary: 100000 trajectories of 2000000000000000 steps are 2e+20 steps, too many to count; vary less, or "
           "make the end time smaller\n");
-    CHECK(contains(refusal({"--vary", "q=0:1:100", "--until", "1e10", "--every", "1"}),
-                   "GB of memory; give a larger number of steps, or fewer --threads\n"));
+    CHECK(test::contains(refusal({"--vary", "q=0:1:100", "--until", "1e10", "--every", "1"}),
+                         "GB of memory; give a larger number of steps, or fewer --threads\n"));
     CHECK(refusal({"--vary", "q=1", "--every", "0"}) ==
           "--every: 0 is not a number of states; give 1 to keep each, 10 to keep every tenth\n");
     CHECK(refusal({"--vary", "q=1", "--steps", "-1"}) == "--steps: -1 is not a number of steps\n");
     CHECK(refusal({"--vary", "q=1", "--step", "-1"}) == "--step: the step must be positive, but is -1\n");
-    CHECK(contains(refusal({"--vary", "q=1", "--steps", "2", "--until", "1"}), "--until excludes --steps"));
-    CHECK(contains(refusal({"--vary", "q=1", "--threads", "0"}), "--threads: Value 0 not in range"));
-    CHECK(contains(refusal({"--vary", "q=1", "--format", "xml"}), "--format: xml not in {csv,binary}"));
+    CHECK(test::contains(refusal({"--vary", "q=1", "--steps", "2", "--until", "1"}), "--until excludes --steps"));
+    CHECK(test::contains(refusal({"--vary", "q=1", "--threads", "0"}), "--threads: Value 0 not in range"));
+    CHECK(test::contains(refusal({"--vary", "q=1", "--format", "xml"}), "--format: xml not in {csv,binary}"));
     CHECK(refusal({}) ==
           "nothing is varied: give --vary NAME=FROM:TO:COUNT, --starts FILE, or --random COUNT with --draw\n");
-    CHECK(contains(refusal({"--vary", "q=1", "--set", "omgea=2"}), "--set:1:1: unknown parameter 'omgea'"));
+    CHECK(test::contains(refusal({"--vary", "q=1", "--set", "omgea=2"}), "--set:1:1: unknown parameter 'omgea'"));
 }
 
 TEST_CASE("trajectories that fail are listed, the others are in the table, the exit code is 3") {
@@ -387,7 +388,7 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
                      "[run]\nstep = 0.1\nuntil = 1\n");
     const test::Finished done = place.sweep({scene, "--vary", "x=-9:1:11", "--every", "4"});
     CHECK(done.exit_code == 3);
-    const TrajectoryTable table = read_trajectory(place.file());
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     const std::vector<double> index = test::column_of(table, "index"), status = test::column_of(table, "status"),
                               t = test::column_of(table, "t"), steps = test::column_of(table, "steps");
     std::map<double, double> end;
@@ -404,11 +405,11 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     CHECK(failed >= 5);
     CHECK(end[0] < end[4]);
     CHECK(end[10] == doctest::Approx(1));
-    CHECK(contains(done.out, fmt::format("  trajectories            11, {} failed\n", failed)));
+    CHECK(test::contains(done.out, fmt::format("  trajectories            11, {} failed\n", failed)));
     CHECK(done.err.starts_with(fmt::format("lobatto: {}: {} of 11 trajectories failed: ", scene, failed)));
-    CHECK(contains(done.err, ". The others went on. The first of them:\n  trajectory 0, x = -9: not "));
-    CHECK(contains(done.err, "\n  trajectory 4, x = -5: not "));
-    CHECK(!contains(done.err, "trajectory 5,"));  // five are told
+    CHECK(test::contains(done.err, ". The others went on. The first of them:\n  trajectory 0, x = -9: not "));
+    CHECK(test::contains(done.err, "\n  trajectory 4, x = -5: not "));
+    CHECK(!test::contains(done.err, "trajectory 5,"));  // five are told
     CHECK(done.err.ends_with("\nTry a smaller --step, or leave these values out. What was computed is in " +
                              place.file() + ".\n"));
     // No mass; no place to start from.
@@ -421,7 +422,7 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
               "  trajectory 2, m = -1: not finite in step 1, after t = 0\n"
               "Try a smaller --step, or leave these values out. What was computed is in " +
               place.file() + ".\n");
-    const TrajectoryTable starts = read_trajectory(place.file());
+    const test::TrajectoryTable starts = test::read_trajectory(place.file());
     REQUIRE(starts.rows.size() == 3);
     CHECK(test::column_of(starts, "status") == std::vector<double>{0, 4, 2});
     CHECK(std::isnan(test::column_of(starts, "x")[2]));
@@ -440,11 +441,12 @@ TEST_CASE("trajectories that leave their Lagrangian are told from those that sta
                                             energy));
         const test::Finished done = place.sweep({scene, "--vary", "y'=1,0,0.8"});  // straight into the centre
         CHECK(done.exit_code == 3);
-        CHECK(contains(done.out, "  trajectories            3, 1 failed\n"));
-        CHECK(
-            contains(done.err, ": 1 of 3 trajectories failed: 1 energy off: beyond stability, or past a singularity."));
-        CHECK(contains(done.err, "\n  trajectory 1, y' = 0: energy off: beyond stability, or past a singularity\n"));
-        const TrajectoryTable table = read_trajectory(place.file());
+        CHECK(test::contains(done.out, "  trajectories            3, 1 failed\n"));
+        CHECK(test::contains(done.err,
+                             ": 1 of 3 trajectories failed: 1 energy off: beyond stability, or past a singularity."));
+        CHECK(test::contains(done.err,
+                             "\n  trajectory 1, y' = 0: energy off: beyond stability, or past a singularity\n"));
+        const test::TrajectoryTable table = test::read_trajectory(place.file());
         CHECK(test::column_of(table, "status") == std::vector<double>{0, 7, 0});
     }
     // At rest, and nearly so: no kinetic energy, and nothing wrong.
@@ -467,8 +469,8 @@ TEST_CASE("trajectories that leave their Lagrangian are told from those that sta
     const test::Finished driven = place.sweep({scene, "--vary", "q=0.1,0.2", "--beyond-horizon"});
     CHECK(driven.exit_code == 0);
     CHECK(place.sweep({scene, "--vary", "q=0.1,0.2"}).exit_code == 3);  // nothing of them is left
-    CHECK(contains(driven.err,
-                   "lobatto: warning: the step is beyond the linear stability limit, at most in trajectory "));
+    CHECK(test::contains(driven.err,
+                         "lobatto: warning: the step is beyond the linear stability limit, at most in trajectory "));
     CHECK(place.sweep({scene, "--vary", "q=0.1,0.2", "--step", "0.16"}).err.empty());
 }
 
@@ -490,12 +492,14 @@ TEST_CASE("the step and the end are the same for all, and it is said when a vari
     const std::string note = "\nThe step and the end time are those of omega = 6.28319 for all trajectories.\n";
     const test::Finished done =
         place.sweep({pendulum, "--vary", "omega=5:7:5", "--step", "pi/omega/10", "--until", "10*pi/omega"});
-    CHECK(contains(done.out, "  steps                   100 each, h = 0.05, to t = 5\n"));
-    CHECK(contains(done.out, note));
-    CHECK(!contains(place.sweep({pendulum, "--vary", "q=1,2", "--step", "pi/omega/10", "--until", "1"}).out, note));
-    CHECK(contains(place.sweep({pendulum, "--vary", "q=1", "--step", "0.3", "--until", "1"}).out,
-                   "\nThe end time is not a multiple of the step: the runs end at the last multiple before it.\n"));
-    CHECK(contains(place.sweep({pendulum, "--vary", "q=1", "--steps", "1000000"}).out, " to t = 50000\n"));
+    CHECK(test::contains(done.out, "  steps                   100 each, h = 0.05, to t = 5\n"));
+    CHECK(test::contains(done.out, note));
+    CHECK(
+        !test::contains(place.sweep({pendulum, "--vary", "q=1,2", "--step", "pi/omega/10", "--until", "1"}).out, note));
+    CHECK(
+        test::contains(place.sweep({pendulum, "--vary", "q=1", "--step", "0.3", "--until", "1"}).out,
+                       "\nThe end time is not a multiple of the step: the runs end at the last multiple before it.\n"));
+    CHECK(test::contains(place.sweep({pendulum, "--vary", "q=1", "--steps", "1000000"}).out, " to t = 50000\n"));
     CHECK(place.table({pendulum, "--vary", "q=1", "--until", "1", "--points", "2"}).comments[2] ==
           "method: Lobatto, 2 points, h = 0.05");
 }
@@ -533,7 +537,7 @@ TEST_CASE("an interrupted sweep keeps complete rows, says so and returns 130; a 
                 CHECK(!std::filesystem::exists(partial));
             }
             const std::string path = signal == SIGKILL ? partial : out;
-            const TrajectoryTable table = binary ? read_npy(path) : read_trajectory(path);
+            const test::TrajectoryTable table = binary ? read_npy(path) : test::read_trajectory(path);
             REQUIRE(table.rows.size() > 10);
             for (std::size_t i = 0; i < table.rows.size(); ++i) {
                 REQUIRE(table.rows[i].size() == table.columns.size());
@@ -589,9 +593,9 @@ TEST_CASE(
         const test::Finished done = place.lobatto(words);
         CHECK(done.exit_code == 0);
         std::vector<double> found;
-        for (const double error : test::column_of(read_trajectory(place.file("away.csv")), "error"))
+        for (const double error : test::column_of(test::read_trajectory(place.file("away.csv")), "error"))
             if (!std::isnan(error)) found.push_back(error);
-        const bool says_none = contains(done.out, "none: 2 trajectories stopped before the first comparison");
+        const bool says_none = test::contains(done.out, "none: 2 trajectories stopped before the first comparison");
         CHECK(says_none == found.empty());
         return found;
     };
@@ -614,9 +618,9 @@ TEST_CASE("a sweep measures the error of every trajectory; what is not resolved 
                      "[parameters]\nw = 1\n[method]\nfamily = \"gauss\"\nstages = 4\n[run]\nstep = 0.1\nuntil = 10\n");
     const test::Finished done = place.sweep({scene, "--vary", "w=1,10,20,50,62.8,100"});
     CHECK(done.exit_code == 3);
-    CHECK(contains(done.err, "3 of 6 trajectories failed: 3 not resolved: the error is as large as the motion"));
-    CHECK(contains(done.out, "measured error"));
-    const TrajectoryTable table = read_trajectory(place.file());
+    CHECK(test::contains(done.err, "3 of 6 trajectories failed: 3 not resolved: the error is as large as the motion"));
+    CHECK(test::contains(done.out, "measured error"));
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     CHECK(test::column_of(table, "status") == std::vector<double>{0, 0, 0, 8, 8, 8});
     const std::vector<double> w = test::column_of(table, "w"), q = test::column_of(table, "q"),
                               error = test::column_of(table, "error");
@@ -627,11 +631,11 @@ TEST_CASE("a sweep measures the error of every trajectory; what is not resolved 
     }
     // The statistics are of the three that are resolved.
     const double mean = (q[0] + q[1] + q[2]) / 3;
-    CHECK_MESSAGE(contains(done.out, fmt::format("mean {:.6g}", mean)), done.out);
+    CHECK_MESSAGE(test::contains(done.out, fmt::format("mean {:.6g}", mean)), done.out);
     CHECK(place.sweep({scene, "--vary", "w=1,50", "--beyond-horizon"}).exit_code == 0);
     const test::Finished unmeasured = place.sweep({scene, "--vary", "w=1,50", "--unmeasured"});
     CHECK(unmeasured.exit_code == 0);
-    CHECK(!contains(unmeasured.out, "measured error"));
+    CHECK(!test::contains(unmeasured.out, "measured error"));
 }
 
 TEST_CASE("a sweep looks at motions on their way, and at pulses between its steps") {
@@ -642,14 +646,14 @@ TEST_CASE("a sweep looks at motions on their way, and at pulses between its step
                      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
                      "[method]\nfamily = \"gauss\"\nstages = 4\n[run]\nstep = 0.1\nuntil = 1000\n");
     CHECK(place.sweep({pendulum, "--vary", "q=1,3.1415926,3.5"}).exit_code == 3);
-    CHECK(test::column_of(read_trajectory(place.file()), "status") == std::vector<double>{0, 8, 0});
+    CHECK(test::column_of(test::read_trajectory(place.file()), "status") == std::vector<double>{0, 8, 0});
     // A kick of 0.1 sqrt(pi) that falls between all nodes; none when it comes after the end.
     const std::string pulse = place.file("pulse.toml");
     test::write_text(pulse,
                      "lagrangian = \"q'^2/2 - q^2/2 + 100*q*exp(-((t - c)/0.001)^2)\"\ntime = \"t\"\n[coordinates]\n"
                      "q = { position = 1, velocity = 0 }\n[parameters]\nc = 5\n[run]\nstep = 0.1\nuntil = 10\n");
     place.sweep({pulse, "--vary", "c=5.015,5.05,20"});
-    const TrajectoryTable table = read_trajectory(place.file());
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
     const std::vector<double> q = test::column_of(table, "q"), error = test::column_of(table, "error");
     for (const std::size_t i : {0, 1}) {
         CHECK(std::fabs(q[i] - std::cos(10)) < 1e-6);  // not seen
@@ -659,7 +663,7 @@ TEST_CASE("a sweep looks at motions on their way, and at pulses between its step
     CHECK(error[2] < 1e-10);
     // What is looked at does not change what is written.
     REQUIRE(place.sweep({pendulum, "--vary", "q=1,2", "--every", "3000"}).exit_code == 0);
-    CHECK(test::column_of(read_trajectory(place.file()), "steps") ==
+    CHECK(test::column_of(test::read_trajectory(place.file()), "steps") ==
           std::vector<double>{0, 3000, 6000, 9000, 10000, 0, 3000, 6000, 9000, 10000});
 }
 
@@ -672,7 +676,7 @@ TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by st
                      "[coordinates]\nq = { position = 1, velocity = 0 }\n[parameters]\nc = 0.1\n"
                      "[run]\nstep = 0.1\nuntil = 20\n");
     place.sweep({well, "--vary", "q=1,0.05"});
-    const std::vector<double> error = test::column_of(read_trajectory(place.file()), "error");
+    const std::vector<double> error = test::column_of(test::read_trajectory(place.file()), "error");
     CHECK(!(error[0] < 0.05));
     CHECK(error[1] < 1e-7);
     // 40 steps are one period. Before, the error of q = 0.001 was 0.1, relative to how far rounding moves the states.
@@ -681,7 +685,7 @@ TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by st
                      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
                      "[run]\nstep = \"2*pi/40\"\nuntil = \"200*pi\"\n");
     for (const char* every : {"1000", "400", "40"}) {
-        const TrajectoryTable table = place.table({still, "--vary", "q=0.001,0.01", "--every", every});
+        const test::TrajectoryTable table = place.table({still, "--vary", "q=0.001,0.01", "--every", every});
         const std::vector<double> errors = test::column_of(table, "error"), status = test::column_of(table, "status");
         for (std::size_t i = 0; i < errors.size(); ++i)
             if (!std::isnan(errors[i])) CHECK(errors[i] < 1e-9);
@@ -699,8 +703,8 @@ TEST_CASE("a trajectory whose formulas have no value, though they cancel, is no 
         const test::Finished done = place.sweep({scene, "--vary", vary});
         INFO(done.err);
         CHECK(done.exit_code == 3);
-        CHECK(contains(done.err, "a formula has no value there"));
-        return test::column_of(read_trajectory(place.file()), "status");
+        CHECK(test::contains(done.err, "a formula has no value there"));
+        return test::column_of(test::read_trajectory(place.file()), "status");
     };
     const std::string plain = "m*q'^2/2 - k*q^2/2";
     for (const char* position : {"\"sqrt(m - 2)^2\"", "\"(m - k)/(m - k)\"", "\"0*log(m - k) + 1\"",
@@ -718,7 +722,7 @@ TEST_CASE("contradictions on the command line are errors") {
     const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {
         const test::Finished done = place.sweep(std::move(arguments));
         CHECK(done.exit_code == 2);
-        CHECK_MESSAGE(contains(done.err, why), done.err);
+        CHECK_MESSAGE(test::contains(done.err, why), done.err);
     };
     refused({pendulum, "--vary", "m=1,2", "--set", "m=3"}, "--set: 'm' is varied too; leave one of both out");
     refused({pendulum, "--vary", "q=0:1:1"}, "one value does not lead from 0 to 1");

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 namespace lobatto::test {
 

@@ -69,7 +69,7 @@ TEST_CASE("a run as .npy or .h5 has the numbers of its CSV" * doctest::test_suit
         return place.lobatto(words);
     };
     REQUIRE(run("a.csv").exit_code == 0);
-    const TrajectoryTable text = read_trajectory(place.file("a.csv"));
+    const test::TrajectoryTable text = test::read_trajectory(place.file("a.csv"));
     for (const TableFormat format : {TableFormat::npy, TableFormat::h5}) {
         if (format == TableFormat::h5 && !has_hdf5()) continue;
         const std::string name = std::string("a") + ending_of(format);

@@ -124,6 +124,28 @@ TEST_CASE("what has no value where it stands is an error, also where the rest of
         CHECK_MESSAGE(refusal(lagrangian, one, mk) == "accepted", lagrangian);
 }
 
+TEST_CASE("a power with a parameter in it asks of its base what the value of the parameter asks") {
+    const auto begins_at = [](const std::string& x, const std::string& n, const std::string& potential) {
+        return refusal("x'^2/2 - k*" + potential, "x = { position = " + x + ", velocity = 0.5 }\n",
+                       "n = " + n + "\nk = 1\n");
+    };
+    for (const char* n : {"4", "3", "1", "-2", "-3"}) CHECK(begins_at("-1", n, "x^n") == "accepted");
+    for (const char* n : {"2.5", "-0.5"}) {
+        CHECK(begins_at("1", n, "x^n") == "accepted");
+        CHECK(begins_at("-1", n, "x^n").find("real power of a number that is not positive") != std::string::npos);
+    }
+    CHECK(begins_at("-1", "2", "x^(2*n)") == "accepted");
+    CHECK(begins_at("-1", "2", "x^(n + x)") != "accepted");
+    // Where the formula cancels it, what is written decides alone.
+    const auto is_told = [&](const std::string& x, const std::string& n) {
+        const std::string told = begins_at(x, n, "x*x^n/x^n");
+        return told.find("a power has no value at the start: it is of x = " + x + ", with") != std::string::npos;
+    };
+    CHECK(is_told("-1", "2.5"));
+    CHECK(is_told("0", "-3"));
+    CHECK(begins_at("-1", "3", "x*x^n/x^n") == "accepted");
+}
+
 TEST_CASE("a start is moved to the nearest that keeps the constraints, to all digits, also where they curve sharply") {
     // On an ellipse, from inside its evolute, from outside it, from far away and from almost on the line.
     for (const auto& [x0, y0] : {std::pair{"1.45", "0.01"},

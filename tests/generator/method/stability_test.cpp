@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -55,6 +56,13 @@ numeric trace_from_nodes(const Quadrature& quadrature, const numeric& z) {
             for (std::size_t j = 0; j < m; ++j) S[i][j] -= factor * S[k][j];
         }
     return -2 * S[0][0] / S[0][m - 1];
+}
+
+// Intervals alternate, and the first is stable.
+bool is_stable(const Stability& stability, double z) {
+    const auto below = std::count_if(stability.limits.begin(), stability.limits.end(),
+                                     [&](const RealRoot& limit) { return limit.high.to_double() < z; });
+    return below % 2 == 0;
 }
 
 }  // namespace
@@ -115,7 +123,6 @@ TEST_CASE("between two limits 4 - trace^2 keeps the sign that its interval claim
                 const numeric trace = member.trace(z);
                 const bool touches = 4 == trace * trace;
                 CHECK((touches || (4 - trace * trace).is_positive() == interval.stable));
-                CHECK(&member.interval_of(z) == &interval);
                 largest = std::fmax(largest, rate_of_step(member, z));
             }
             CHECK(largest <= interval.rate);
@@ -213,7 +220,7 @@ TEST_CASE("a kernel's own steps are unstable exactly where the intervals say") {
             ++compared;
             const bool grows = std::fabs(trace) > 2;
             unstable += grows ? 1 : 0;
-            CHECK(member.interval_of(numeric(cln::rational(cln::cl_DF(h * h)))).stable == !grows);
+            CHECK(is_stable(member, h * h) == !grows);
         }
         CHECK(compared > 2900);
         CHECK((unstable > 100) == (method.family == Family::lobatto));

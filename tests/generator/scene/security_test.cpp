@@ -7,16 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto::test;
 
 namespace {
-
-bool contains(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
 
 // A scene with one piece of it replaced by the attacker's.
 struct Pieces {
@@ -83,7 +79,7 @@ TEST_CASE("an event's text keeps the file of events one comment a line") {
     write_text(folder / "scene.toml", pieces.text());
     const Finished done = run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "a.csv"});
     REQUIRE_MESSAGE(done.exit_code == 0, done.err);
-    const lobatto::TrajectoryTable table = lobatto::read_trajectory(folder / "a.events.csv");
+    const TrajectoryTable table = read_trajectory(folder / "a.events.csv");
     CHECK(table.columns.front() == "event");
     pieces.event = "\"x = 0 # \\u001b[31m\"";
     const Finished coloured = attack("run", pieces);

@@ -95,7 +95,7 @@ TEST_CASE("a file that is not a kernel, or not the expected one, is refused with
         text, "not an object, but long enough to be read as the header of one, had it begun with the right four bytes");
     CHECK(refusal(text) == text + ": invalid ELF header");
     CHECK(refusal(kernel_builder.build("library", "int nothing;\n")) ==
-          "it has no function lobatto_kernel_table, so it is not a kernel");
+          "it has no function lobatto_kernel_table, so it is not such a kernel");
     CHECK(refusal(kernel_builder.build_stub("3", "sizeof(lobatto_kernel)")) ==
           "it speaks version 3 of the kernel interface, this program version 13");
     CHECK(refusal(kernel_builder.build_stub("LOBATTO_ABI_VERSION", "8")) ==

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/run/output.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -39,7 +39,7 @@ std::vector<std::vector<double>> times_of(const Motion& motion, const std::vecto
     REQUIRE(done.exit_code == 0);
     std::vector<std::vector<double>> times(events.size());
     double before = -1;
-    for (const std::vector<double>& row : read_trajectory(folder / "run.events.csv").rows) {
+    for (const std::vector<double>& row : test::read_trajectory(folder / "run.events.csv").rows) {
         CHECK(row[1] >= before);
         before = row[1];
         const auto event = static_cast<std::size_t>(row[0]) - 1;

@@ -17,6 +17,7 @@
 #include <sstream>
 
 #include "runtime/error.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 
@@ -99,7 +100,7 @@ TEST_CASE("every double reads back to the same bits") {
     TrajectoryFile file(folder / "a.csv", header);
     file.write({row.data(), nullptr, 1, 41});
     file.finish();
-    const TrajectoryTable table = read_trajectory(folder / "a.csv");
+    const test::TrajectoryTable table = test::read_trajectory(folder / "a.csv");
     CHECK(table.columns.size() == 41);
     REQUIRE(table.rows.size() == 1);
     CHECK(table.rows[0] == row);
@@ -112,21 +113,21 @@ TEST_CASE("until it is finished a trajectory stands beside its name, in whole li
         TrajectoryFile file(folder / "a.csv", pendulum_header());
         file.write(two_records);
         CHECK(content(folder / "a.csv") == "of before\n");
-        CHECK(read_trajectory(folder / "a.csv.partial").rows.size() == 2);
+        CHECK(test::read_trajectory(folder / "a.csv.partial").rows.size() == 2);
         file.write(two_records);
         file.finish();
-        CHECK(read_trajectory(folder / "a.csv").rows.size() == 4);
+        CHECK(test::read_trajectory(folder / "a.csv").rows.size() == 4);
         CHECK(!std::filesystem::exists(folder / "a.csv.partial"));
     }
     { TrajectoryFile unfinished(folder / "a.csv", pendulum_header()); }
-    CHECK(read_trajectory(folder / "a.csv").rows.size() == 4);
-    CHECK(read_trajectory(folder / "a.csv.partial").rows.empty());
+    CHECK(test::read_trajectory(folder / "a.csv").rows.size() == 4);
+    CHECK(test::read_trajectory(folder / "a.csv.partial").rows.empty());
 }
 
 TEST_CASE("a torn last line is left out when a file is read") {
     const Folder folder;
     std::ofstream(folder / "a.csv") << "# lobatto trajectory\nt,q\n0,1\n0.1,2";
-    const TrajectoryTable table = read_trajectory(folder / "a.csv");
+    const test::TrajectoryTable table = test::read_trajectory(folder / "a.csv");
     CHECK(table.comments == std::vector<std::string>{"lobatto trajectory"});
     CHECK(table.columns == std::vector<std::string>{"t", "q"});
     CHECK(table.rows == std::vector<std::vector<double>>{{0, 1}});
@@ -138,7 +139,7 @@ TEST_CASE("a symbolic link keeps pointing at what it pointed at") {
     std::filesystem::create_symlink("target.csv", folder / "link.csv");
     CHECK(error_of(folder / "link.csv") == "no error");
     CHECK(std::filesystem::is_symlink(folder / "link.csv"));
-    CHECK(read_trajectory(folder / "target.csv").rows.size() == 2);
+    CHECK(test::read_trajectory(folder / "target.csv").rows.size() == 2);
 }
 
 TEST_CASE("two runs cannot write one file at the same time") {
