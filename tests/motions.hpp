@@ -138,8 +138,8 @@ inline Kernel newton_kernel(const Derivation& derivation, Precision precision) {
     options.precision = precision;
     KernelSource source = emit(derivation, options);
     const std::string claim = "bool any_number = true";
-    const std::size_t at = source.header.find(claim);  // of a general derivation it is false
-    if (at != std::string::npos) source.header.replace(at, claim.size(), "bool any_number = false");
+    const std::size_t at = source.formulas.find(claim);  // of a general derivation it is false
+    if (at != std::string::npos) source.formulas.replace(at, claim.size(), "bool any_number = false");
     return kernel_of(source, precision);
 }
 

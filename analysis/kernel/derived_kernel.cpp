@@ -82,7 +82,7 @@ std::string kept_text(const SystemFacts& facts, const KernelSource& source) {
               {"drops_time", facts.drops_time},
               {"form", static_cast<int>(source.form)},
               {"name", source.name},
-              {"header", source.header},
+              {"formulas", source.formulas},
               {"support", source.support},
               {"digest", source.digest}};
     if (facts.closed_solution) json["closed_solution"] = kept_json(*facts.closed_solution);
@@ -100,7 +100,7 @@ DerivedKernel from_text(const std::string& text, const Scene& scene, const Kerne
     DerivedKernel kernel{Outline(scene, facts), {}, true, nullptr};
     kernel.source.form = static_cast<Form>(json.at("form").get<int>());
     kernel.source.name = json.at("name");
-    kernel.source.header = json.at("header");
+    kernel.source.formulas = json.at("formulas");
     kernel.source.support = json.at("support").get<std::vector<std::string>>();
     kernel.source.digest = json.at("digest");
     wish_for_energy(kernel.outline, wish);

@@ -100,7 +100,7 @@ Translation host_side_of(const KernelSource& source, Precision precision, const 
     translation.name = source.name;
     translation.short_loops = source.form == Form::general;
     translation.text = before_support(precision);
-    append_lanes(translation.text, source, source.header, watched);
+    append_lanes(translation.text, source, source.formulas, watched);
     translation.text += export_lanes + source.name + ")\n";
     return translation;
 }
@@ -110,7 +110,7 @@ DeviceTranslation device_side_of(const KernelSource& source, const std::string& 
     constexpr int most_written_out = 256;  // words of a row
     DeviceTranslation translation{source.name, fmt::format("#define LOBATTO_DEVICE_BLOCK {}\n", DeviceKernel::block),
                                   architecture};
-    append_lanes(translation.text, source, with_functions_of_device(source.header), watched);
+    append_lanes(translation.text, source, with_functions_of_device(source.formulas), watched);
     translation.text = with_loops_of_device(translation.text, host->words <= most_written_out);
     translation.text += fmt::format(
         "\nstatic_assert(lobatto::device_words<lobatto::kernels::{0}> == {1} &&\n"

@@ -59,7 +59,7 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     if (refilled) translation.text += "#define LOBATTO_REFILLED\n";
     append_part(translation.text, std::string(kernel_abi_h_text));
     append_part(translation.text, support_of(source, together > 0, refilled));
-    append_part(translation.text, source.header);
+    append_part(translation.text, source.formulas);
     for (const std::string_view text :
          {kernel_export_lanes_hpp_text, kernel_export_advance_hpp_text, kernel_export_export_hpp_text})
         append_part(translation.text, std::string(text));

@@ -45,17 +45,22 @@ public:
             if (program.name == "stage" && has_near_angles()) angles_ = angles_of(p_.graph, program);
     }
 
-    std::string header(const std::string& name, const std::string& digest, const std::vector<PassReport>& report,
-                       const std::vector<std::string>& support) const {
-        std::string text = preamble(name, report);
+    std::string header(const KernelSource& source) const {
+        std::string text = preamble(source.name, source.report);
         text += "#pragma once\n\n";
         text += before_support(options_.precision);
-        text += options_.support_text ? options_.support_text(support) : "#include \"kernel.hpp\"\n";
-        text += fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
-        text += shapes(d_, options_.precision, name, digest) + costs() + near_angles() +
-                tables(d_, options_.precision) + measured_values(p_, options_.precision) +
-                (d_.structure.looped ? looped_.tables() : "") + parameters() + coefficients() + prepare(name) +
-                set_inputs();
+        text += options_.support_text ? options_.support_text(source.support) : "#include \"kernel.hpp\"\n";
+        std::string formulas = source.formulas;
+        const std::string without = parameters(Values::left_out);
+        formulas.replace(formulas.find(without), without.size(), parameters(Values::of_scene));
+        return text + formulas;
+    }
+
+    std::string formulas(const std::string& name) const {
+        std::string text = fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
+        text += shapes(d_, options_.precision, name) + costs() + near_angles() + tables(d_, options_.precision) +
+                measured_values(p_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") +
+                parameters(Values::left_out) + coefficients() + prepare(name) + set_inputs();
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -78,6 +83,8 @@ public:
     }
 
 private:
+    enum class Values { of_scene, left_out };
+
     std::string preamble(const std::string& name, const std::vector<PassReport>& report) const {
         const Operations& now = report.back().after;
         std::string text = "// SPDX-License-Identifier: MIT\n";
@@ -139,14 +146,16 @@ private:
         return !angles_.empty() && std::string(declaration.program) == "stage";
     }
 
-    std::string parameters() const {
+    std::string parameters(Values values) const {
         std::string text = "\n    // Values of the scene; change them before prepare().\n    struct Parameters {\n";
         std::vector<std::string> lines;
         std::size_t widest = 0;
         for (const Parameter& parameter : d_.scene.parameters) {
             Graph graph;
             const Id value =
-                graph.constant(cln::the<cln::cl_R>(d_.scene.evaluate(parameter.value, parameter.name).to_cl_N()));
+                graph.constant(values == Values::of_scene
+                                   ? cln::the<cln::cl_R>(d_.scene.evaluate(parameter.value, parameter.name).to_cl_N())
+                                   : cln::cl_R(0));
             lines.push_back(fmt::format("real {} = {};", identifier(parameter.name),
                                         formula(graph, value, Notation::cpp, {}, options_.precision)));
             widest = std::max(widest, lines.back().size());
@@ -420,11 +429,12 @@ KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& 
         is_member_name(derivation.scene.name) ? derivation.scene.name + "_" : identifier(derivation.scene.name);
     source.report = optimised.report;
     const Emitter emitter(derivation, optimised, options);
-    // The digest of the text with the digest left out, put in its place.
-    source.header = emitter.header(source.name, "", source.report, source.support);
-    source.digest = digest_of(source.header);
+    // Of the text without a digest, which is put in its place.
+    source.formulas = emitter.formulas(source.name);
+    source.digest = digest_of(source.formulas);
     const std::string empty = "digest = \"\"";
-    source.header.replace(source.header.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
+    source.formulas.replace(source.formulas.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
+    source.header = emitter.header(source);
     return source;
 }
 

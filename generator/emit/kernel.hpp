@@ -24,10 +24,13 @@ struct EmitOptions {
 struct KernelSource {
     Form form{};         // of its steps (generator/mechanics/structure/structure.hpp)
     std::string name;    // struct lobatto::kernels::NAME, a C identifier
-    std::string header;  // the whole text of NAME.hpp
+    std::string header;  // the whole text of NAME.hpp, for people
+    // The struct in it without the values of the scene: what is compiled to run. Starts, steps and values of parameters
+    // that ask for the same formulas share it.
+    std::string formulas;
     // The parts of runtime/kernel/kernel.hpp that one trajectory stands on, beside those that they include.
     std::vector<std::string> support;
-    std::string digest;              // 16 hexadecimal digits of the header's formulas
+    std::string digest;              // of the formulas: 16 hexadecimal digits
     std::vector<PassReport> report;  // first row: as derived
 };
 

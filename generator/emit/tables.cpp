@@ -224,7 +224,7 @@ std::string watched_shapes(const Scene& scene) {
     return text + integer_table("reset_of", reset_of);
 }
 
-std::string shapes(const Derivation& d, Precision precision, const std::string& name, const std::string& digest) {
+std::string shapes(const Derivation& d, Precision precision, const std::string& name) {
     const Structure& structure = d.structure;
     const Outputs& outputs = d.scene.outputs;
     static constexpr const char* forms[] = {"linear_map", "separable", "general"};
@@ -238,9 +238,9 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
                   (multiplier ? static_cast<int>(structure.routhian().cyclic.size()) : 0);
     std::string text = fmt::format("    using real = {};\n\n", type_name(precision));
     text += fmt::format(
-        "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"{}\";\n"
+        "    static constexpr const char* name = \"{}\";\n    static constexpr const char* digest = \"\";\n"
         "    static constexpr const char* method = \"{}\";\n",
-        name, digest, d.quadrature.method.name());
+        name, d.quadrature.method.name());
     line(text, fmt::format("lobatto::Form form = lobatto::Form::{}", forms[static_cast<int>(structure.form())]),
          "how a step is taken");
     line(text, fmt::format("int coordinates = {}", d.system.n), "n");

@@ -23,8 +23,7 @@ bool has_lanes(Precision precision);
 // Whether all masses are 1, whatever the parameters.
 bool has_unit_masses(const System& system);
 
-std::string shapes(const Derivation& derivation, Precision precision, const std::string& name,
-                   const std::string& digest);
+std::string shapes(const Derivation& derivation, Precision precision, const std::string& name);
 std::string tables(const Derivation& derivation, Precision precision);
 std::string type_name(Precision precision);
 // static constexpr int NAME[...] = {...}; and real NAME[...] likewise.

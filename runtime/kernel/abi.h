@@ -109,7 +109,7 @@ typedef struct lobatto_kernel {
     uint32_t abi_version; /* LOBATTO_ABI_VERSION */
     uint32_t bytes;       /* sizeof(lobatto_kernel) */
     const char* name;     /* of the scene: a C identifier */
-    const char* digest;   /* of the emitted text: 16 hexadecimal digits */
+    const char* digest;   /* of the formulas: 16 hexadecimal digits */
     const char* method;   /* "Lobatto, 4 points" */
     int32_t real_kind;    /* lobatto_real */
     int32_t real_bytes;
@@ -228,7 +228,7 @@ typedef struct lobatto_device_call {
 typedef struct lobatto_device_lanes {
     uint32_t abi_version;                   /* LOBATTO_ABI_VERSION */
     uint32_t bytes;                         /* sizeof(lobatto_device_lanes) */
-    const char* digest;                     /* of the emitted text */
+    const char* digest;                     /* of the formulas */
     int32_t words;                          /* of a lane; 0: the kernel has none, and the functions are null */
     int32_t first_moving, moving;           /* of these, which steps change and `state` reads */
     int32_t shared_bytes, shared_alignment; /* of what all lanes of one step size share */

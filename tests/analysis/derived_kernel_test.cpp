@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "analysis/kernel/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 #include "tests/scenes/scenes.hpp"
 #include "tests/support.hpp"
@@ -51,7 +52,7 @@ TEST_CASE("a scene is derived once, and what is kept of it is what was derived" 
         CHECK(again.from_cache);
         CHECK(same(first.outline, again.outline));
         CHECK(same(again.outline, Outline(derive(scene))));
-        CHECK(again.source.header == emit(derive(scene)).header);
+        CHECK(again.source.formulas == emit(derive(scene)).formulas);
         CHECK(again.source.support == first.source.support);
         CHECK(again.source.name == first.source.name);
         CHECK(again.source.form == first.source.form);
@@ -122,11 +123,39 @@ TEST_CASE("a table that has changed is another scene") {
     }
 }
 
+TEST_CASE("starts, steps and values of parameters are not compiled: scenes that differ in them share a kernel") {
+    const auto source_of = [](const std::string& k, const std::string& x, const std::string& step,
+                              const std::string& power = "3") {
+        return derived_kernel(
+                   read_scene(Source("a.toml", "title = \"k = " + k + "\"\nlagrangian = \"x'^2/2 - x^2/2 - k*x^" +
+                                                   power + "\"\n[coordinates]\nx = { position = " + x +
+                                                   ", velocity = 0 }\n[parameters]\nk = " + k +
+                                                   "\n[run]\nstep = " + step + "\nuntil = 1\n")),
+                   {})
+            .source;
+    };
+    const test::TemporaryFolder folder;
+    const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
+    const KernelSource one = source_of("0.125", "0.1", "0.1");
+    static_cast<void>(kernel_of(one, Precision::double_));
+    for (const KernelSource& other :
+         {source_of("0.25", "0.1", "0.1"), source_of("0.125", "0.2", "0.1"), source_of("0.125", "0.1", "0.05")}) {
+        CHECK(other.digest == one.digest);
+        Compiled compiled;
+        static_cast<void>(kernel_of(other, Precision::double_, &compiled));
+        CHECK(compiled.from_cache);
+    }
+    CHECK(source_of("0.125", "0.1", "0.1", "4").digest != one.digest);
+    // People are told the values.
+    const KernelSource emitted = emit(derive(read(pendulum())));
+    CHECK(emitted.header.find("real g = 9.81;") != std::string::npos);
+}
+
 TEST_CASE("what was kept and then altered is derived again") {
     const test::TemporaryFolder folder;
     const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", (folder / "cache").string());
     const Scene scene = read(pendulum());
-    const std::string header = derived_kernel(scene, {}).source.header;
+    const std::string formulas = derived_kernel(scene, {}).source.formulas;
     int altered = 0;
     for (const auto& file : std::filesystem::directory_iterator(folder / "cache"))
         if (file.path().extension() == ".derived") {
@@ -138,6 +167,6 @@ TEST_CASE("what was kept and then altered is derived again") {
     REQUIRE(altered == 1);
     const DerivedKernel again = derived_kernel(scene, {});
     CHECK_FALSE(again.from_cache);
-    CHECK(again.source.header == header);
+    CHECK(again.source.formulas == formulas);
     CHECK(derived_kernel(scene, {}).from_cache);
 }

@@ -136,7 +136,7 @@ private:
 /// The kernel of a scene, compiled and loaded. Copies share it.
 class LOBATTO_API Kernel {
 public:
-    const std::string& digest() const;  ///< of its text
+    const std::string& digest() const;  ///< of its formulas
     std::string method() const;
     int order() const;
     double step() const;  ///< h; with a clock in its time

@@ -42,11 +42,11 @@ Kernel spoilt_pendulum() {
     KernelSource source;
     source.name = "handwritten_pendulum";
     source.digest = "0123456789abcdef";
-    source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
+    source.formulas = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
                     "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
     const std::string entry = "(11 - 5 * root5) / 120";
-    REQUIRE(source.header.find(entry) != std::string::npos);
-    source.header.replace(source.header.find(entry), entry.size(), "(11 - 4 * root5) / 120");
+    REQUIRE(source.formulas.find(entry) != std::string::npos);
+    source.formulas.replace(source.formulas.find(entry), entry.size(), "(11 - 4 * root5) / 120");
     const test::TemporaryFolder folder;
     const test::EnvironmentVariable cache("LOBATTO_CACHE_DIR", folder.string());
     return kernel_of(source, Precision::double_);

@@ -24,7 +24,7 @@ const Kernel& pendulum() {
         KernelSource source;
         source.name = "handwritten_pendulum";
         source.digest = "0123456789abcdef";
-        source.header = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
+        source.formulas = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
                         "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
         return kernel_of(source, Precision::double_);
     }();
@@ -37,7 +37,7 @@ const Kernel& eventful_pendulum() {
         KernelSource source;
         source.name = "eventful_pendulum";
         source.digest = "0123456789abcdef";
-        source.header =
+        source.formulas =
             test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
             "namespace lobatto::kernels {\nstruct eventful_pendulum : HandwrittenPendulum {\n"
             "    static constexpr int events = 2, stops = 0, impacts = 0, switches = 0;\n    static constexpr int "
