@@ -12,6 +12,7 @@
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constrained_start.hpp"
 #include "generator/mechanics/repeated/elements.hpp"
+#include "generator/mechanics/start_domains.hpp"
 
 namespace lobatto {
 
@@ -24,20 +25,6 @@ std::size_t unsigned_index(int index) {
     return static_cast<std::size_t>(index);
 }
 
-std::string short_text(const ex& expression) {
-    const std::string text = canonical_text(expression);
-    return text.size() <= 120 ? text : fmt::format("a formula of {} characters", text.size());
-}
-
-bool has(DomainCondition::Kind kind, const cln::cl_R& value) {
-    using Kind = DomainCondition::Kind;
-    return kind == Kind::any           ? true
-           : kind == Kind::nonzero     ? !cln::zerop(value)
-           : kind == Kind::nonnegative ? !cln::minusp(value)
-           : kind == Kind::positive    ? cln::plusp(value)
-                                       : cln::abs(value) <= 1;
-}
-
 class StartCheck {
 public:
     StartCheck(const Scene& scene, const System& system)
@@ -47,19 +34,9 @@ public:
           equations_(system, start_),
           constrained_(scene, system, start_, equations_) {}
 
-    // What formulas ask for as they are written, though they may have lost it since: a/a, sqrt(a)^2.
-    void require_domains() {
-        std::vector<const DomainCondition*> conditions;
-        for (const DomainCondition& condition : scene_.conditions) {
-            const bool moves = scene_.start == Start::momentum &&
-                               std::any_of(system_.v.begin(), system_.v.end(),
-                                           [&](const auto& v) { return condition.expression.has(v); });
-            if (!moves) conditions.push_back(&condition);  // else velocities are not known yet
-        }
-        for (const auto& [begin, end] : portions_of(conditions.size())) {
-            if (all_hold(conditions, begin, end)) continue;
-            for (std::size_t i = begin; i < end; ++i) require_domain(*conditions[i]);
-        }
+    void require_formulas() {
+        require_domains(scene_, system_, start_);
+        require_equations();
     }
 
     // Coordinates that are eliminated start as their equations say.
@@ -74,8 +51,7 @@ public:
 
     void run() {
         require_values();
-        require_domains();
-        require_equations();
+        require_formulas();
         if (!system_.constraints.empty()) {
             require_mass();
             constrained_.keep_positions();
@@ -133,73 +109,7 @@ private:
         return float_of(scene_.evaluate(expression, what));
     }
 
-    // Many formulas are evaluated together: what an evaluation costs besides them grows with all that are known.
-    static std::vector<std::pair<std::size_t, std::size_t>> portions_of(std::size_t count) {
-        constexpr std::size_t portion = 1000;
-        std::vector<std::pair<std::size_t, std::size_t>> result;
-        for (std::size_t begin = 0; begin < count; begin += portion)
-            result.emplace_back(begin, std::min(count, begin + portion));
-        return result;
-    }
-
-    bool holds(const DomainCondition& condition, const Sized& of) {
-        const cln::cl_R value = of.vanishes() ? cln::cl_R(0) : of.value;
-        if (condition.kind != DomainCondition::Kind::power) return has(condition.kind, value);
-        const cln::cl_R exponent = start_.evaluate(start_.convert({condition.exponent})).front();
-        return has(DomainCondition::of_base(exponent == cln::round1(exponent), cln::minusp(exponent)), value);
-    }
-
-    bool all_hold(const std::vector<const DomainCondition*>& conditions, std::size_t begin, std::size_t end) {
-        std::vector<ex> expressions;
-        for (std::size_t i = begin; i < end; ++i) expressions.push_back(conditions[i]->expression);
-        try {
-            const std::vector<Sized> values = start_.evaluate_sized(start_.convert(expressions));
-            for (std::size_t i = begin; i < end; ++i)
-                if (!holds(*conditions[i], values[i - begin])) return false;
-            return true;
-        } catch (const DomainError&) {
-            return false;
-        }
-    }
-
-    void require_domain(const DomainCondition& condition) {
-        std::string found;
-        try {
-            const Sized of = start_.evaluate_sized(start_.convert({condition.expression})).front();
-            if (holds(condition, of)) return;
-            found = of.vanishes() ? "0" : decimal(of.value, 6);
-        } catch (const DomainError& error) {
-            found = error.what();
-        }
-        scene_.source.fail(condition.at,
-                           fmt::format("{} has no value at the start: it is of {} = {}{}", condition.operation,
-                                       short_text(condition.expression), found, start_text(condition.expression)));
-    }
-
     [[noreturn]] void refuse(const std::string& reason) const { scene_.source.fail(scene_.lagrangian_at, reason); }
-
-    // "x = 0, x' = 1": what of the start an expression holds.
-    std::string values_in(const ex& expression) const {
-        std::string text;
-        int shown = 0;
-        const auto add = [&](const GiNaC::symbol& symbol) {
-            if (!expression.has(symbol) || ++shown > 6) return;
-            const cln::cl_R value = start_.get(symbol);
-            text += fmt::format("{}{} = {}", shown == 1 ? "" : ", ", symbol.get_name(),
-                                cln::zerop(value) ? "0" : decimal(value, 6));
-        };
-        for (const auto* symbols : {&system_.q, &system_.v})
-            for (const auto& symbol : *symbols) add(symbol);
-        add(system_.t);
-        if (shown == 0)
-            for (const auto& symbol : system_.parameters) add(symbol);
-        return text + (shown > 6 ? ", ..." : "");
-    }
-
-    std::string start_text(const ex& expression) const {
-        const std::string values = values_in(expression);
-        return (values.empty() ? "" : ", with " + values) + "; start elsewhere, or mend the formula";
-    }
 
     // All formulas at once; when one has no value, one by one to find it.
     void require_values() {
@@ -231,7 +141,7 @@ private:
             refuse(
                 fmt::format("has derivatives without a value at the start, {}, because of its term {}: {}; start "
                             "elsewhere, or mend the formula",
-                            values_in(term), short_text(-term), error.what()));
+                            values_in(term, system_, start_), short_text(-term), error.what()));
         }
     }
 
@@ -241,7 +151,7 @@ private:
                 start_({formula});
             } catch (const DomainError& error) {
                 scene_.source.fail(place, fmt::format("{} at the start, {}: {}; start elsewhere, or mend the formula",
-                                                      what(), values_in(formula), error.what()));
+                                                      what(), values_in(formula, system_, start_), error.what()));
             }
         };
         const Position lagrangian = scene_.lagrangian_at;
@@ -321,7 +231,7 @@ private:
         const bool everywhere =
             std::none_of(system_.q.begin(), system_.q.end(), [&](const auto& q) { return held.has(q); });
         refuse(fmt::format("the mass matrix is singular at the start, {}: no kinetic energy opposes the direction {}{}",
-                           values_in(held), direction_text(system_, elimination.vector),
+                           values_in(held, system_, start_), direction_text(system_, elimination.vector),
                            everywhere ? "; give it mass, or remove a coordinate"
                                       : " there; start elsewhere, or choose coordinates that are regular there (x and "
                                         "y instead of an angle at its pole)"));
@@ -457,8 +367,7 @@ void check_values(const Scene& scene) {
     System system = undifferentiated(in_time);
     system.formulas = std::make_shared<const Formulas>();
     StartCheck check(in_time, system);
-    check.require_domains();
-    check.require_equations();
+    check.require_formulas();
 }
 
 }  // namespace lobatto

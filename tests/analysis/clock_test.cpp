@@ -298,7 +298,8 @@ TEST_CASE("a clock that does not stay positive ends the run, and says so") {
     for (const auto& row : rows) CHECK(std::fabs(row[1] - std::cos(row[0])) < 1e-6);  // what was computed is right
 }
 
-TEST_CASE("a motion that rounding or the step would throw back where the clock is 0 ends there, alone and in a sweep") {
+TEST_CASE("a motion that rounding or the step would throw back where the clock is 0 ends there, alone and in a sweep" *
+          doctest::test_suite("slow")) {
     // x = cos t comes to every one of these places, however the steps are.
     const auto text = [](const std::string& clock, double step) {
         return fmt::format(
