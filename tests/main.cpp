@@ -11,7 +11,6 @@
 #include <cstring>
 #include <iostream>
 #include <map>
-#include <set>
 #include <sstream>
 
 #include "tests/support.hpp"
@@ -20,7 +19,7 @@ namespace {
 
 using lobatto::test::EnvironmentVariable;
 
-std::set<std::string> files_asked_for;  // by the last query
+std::map<std::string, bool> files_asked_for;  // by the last query: whether they have one of the slowest tests
 
 // A listener that need not say what it does not listen to.
 class Listener : public doctest::IReporter {
@@ -52,7 +51,11 @@ public:
         write("");
     }
     void report_query(const doctest::QueryData& query) override {
-        for (unsigned i = 0; i < query.num_data; ++i) files_asked_for.insert(query.data[i]->m_file.c_str());
+        for (unsigned i = 0; i < query.num_data; ++i) {
+            const doctest::TestCaseData& test = *query.data[i];
+            bool& is_slow = files_asked_for[test.m_file.c_str()];
+            is_slow = is_slow || std::strcmp(test.m_test_suite, "slowest") == 0;
+        }
     }
 
 private:
@@ -135,14 +138,14 @@ public:
     Workers(int argc, char** argv, int at_once) : argc_(argc), argv_(argv), at_once_(at_once) {}
 
     int run() {
-        // The longest texts first: they tend to run longest.
+        // Those with the slowest tests first, then the longest texts: they tend to run longest.
         std::vector<std::string> files = asked_for();
-        const auto length = [](const std::string& file) {
+        const auto weight = [](const std::string& file) {
             std::error_code unknown;
-            return std::filesystem::file_size(file, unknown);
+            return std::pair(files_asked_for.at(file), std::filesystem::file_size(file, unknown));
         };
         std::stable_sort(files.begin(), files.end(),
-                         [&](const std::string& a, const std::string& b) { return length(a) > length(b); });
+                         [&](const std::string& a, const std::string& b) { return weight(a) > weight(b); });
         for (const std::string& file : files) {
             if (std::ssize(running_) == at_once_) wait_for_one();
             start(file);
@@ -159,7 +162,9 @@ private:
         std::ostringstream nowhere;
         query.setCout(&nowhere);
         query.run();
-        return {files_asked_for.begin(), files_asked_for.end()};
+        std::vector<std::string> files;
+        for (const auto& [file, is_slow] : files_asked_for) files.push_back(file);
+        return files;
     }
 
     void start(const std::string& file) {

@@ -131,7 +131,8 @@ bool has_defect(const PreparedRun& run) {
 
 std::string defect_text(const PreparedRun& run) {
     const std::optional<double> defect = defect_of(run.kernel, run.scene.method.numbers, run.scene);
-    return defect ? fmt::format("{:.2g}", *defect) : "not measured: the first step has no derivative in this precision";
+    return defect && std::isfinite(*defect) ? fmt::format("{:.2g}", *defect)
+                                            : "not measured: the first step has no derivative in this precision";
 }
 
 void print_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,

@@ -115,6 +115,7 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
         case Op::raise:
             if (cln::abs(x[1]) <= 4096 && cln::round1(x[1]) == x[1])
                 return apply(Op::power, cln::cl_I_to_int(cln::round1(x[1])), {x[0]});  // real for a negative base too
+            if (cln::zerop(x[0]) && cln::plusp(x[1])) return 0;
             if (!cln::plusp(x[0])) throw DomainError("real power of a number that is not positive");
             return apply(Op::exp, 0, {real(x[1]) * cln::ln(real(x[0]))});  // far out it is 0 or too large, too
         case Op::constant:
@@ -184,6 +185,31 @@ void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
     factors.push_back(power(base, exponent));
 }
 
+namespace {
+
+// The factors of a product. x^n/x is x^(n - 1), which has a value at x = 0: GiNaC's derivative of x^n is n x^n/x.
+GiNaC::exvector factors_of(const GiNaC::ex& product) {
+    const auto base_of = [](const GiNaC::ex& factor) {
+        return GiNaC::is_a<GiNaC::power>(factor) ? factor.op(0) : factor;
+    };
+    GiNaC::exvector factors(product.begin(), product.end());
+    for (std::size_t i = 0; i < factors.size(); ++i) {
+        const bool is_open = GiNaC::is_a<GiNaC::power>(factors[i]) && !GiNaC::is_a<GiNaC::numeric>(factors[i].op(1));
+        if (!is_open) continue;
+        const GiNaC::ex base = factors[i].op(0);
+        GiNaC::ex exponent = 0;
+        for (const GiNaC::ex& factor : factors)
+            if (base_of(factor).is_equal(base)) exponent += GiNaC::is_a<GiNaC::power>(factor) ? factor.op(1) : 1;
+        if (exponent.is_equal(factors[i].op(1))) continue;
+        std::erase_if(factors, [&](const GiNaC::ex& factor) { return base_of(factor).is_equal(base); });
+        factors.push_back(GiNaC::pow(base, exponent));
+        i = static_cast<std::size_t>(-1);  // from the first on: one power less
+    }
+    return factors;
+}
+
+}  // namespace
+
 Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
     std::unordered_map<GiNaC::ex, Id> done;
     const auto convert = [&](const auto& self, const GiNaC::ex& e) -> Id {
@@ -207,7 +233,7 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
             id = add(terms);
         } else if (GiNaC::is_a<GiNaC::mul>(e)) {
             std::vector<Id> factors;
-            for (const auto& factor : e) append_factor(factors, self(self, factor), 1);
+            for (const auto& factor : factors_of(e)) append_factor(factors, self(self, factor), 1);
             id = multiply(factors);
         } else if (GiNaC::is_a<GiNaC::power>(e)) {
             const Id base = self(self, e.op(0));

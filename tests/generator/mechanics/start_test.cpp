@@ -134,6 +134,10 @@ TEST_CASE("a power with a parameter in it asks of its base what the value of the
         CHECK(begins_at("1", n, "x^n") == "accepted");
         CHECK(begins_at("-1", n, "x^n").find("real power of a number that is not positive") != std::string::npos);
     }
+    // x^n/x, as in its derivative, is x^(n - 1).
+    for (const char* n : {"4", "2", "2.5"}) CHECK(begins_at("0", n, "x^n") == "accepted");
+    CHECK(begins_at("0", "1.5", "x^n").find("the second derivative") != std::string::npos);
+    for (const char* n : {"-2", "-0.5"}) CHECK(begins_at("0", n, "x^n").find("has no value") != std::string::npos);
     CHECK(begins_at("-1", "2", "x^(2*n)") == "accepted");
     CHECK(begins_at("-1", "2", "x^(n + x)") != "accepted");
     // Where the formula cancels it, what is written decides alone.

@@ -43,7 +43,7 @@ Kernel spoilt_pendulum() {
     source.name = "handwritten_pendulum";
     source.digest = "0123456789abcdef";
     source.formulas = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
-                    "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
+                      "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
     const std::string entry = "(11 - 5 * root5) / 120";
     REQUIRE(source.formulas.find(entry) != std::string::npos);
     source.formulas.replace(source.formulas.find(entry), entry.size(), "(11 - 4 * root5) / 120");

@@ -25,7 +25,7 @@ const Kernel& pendulum() {
         source.name = "handwritten_pendulum";
         source.digest = "0123456789abcdef";
         source.formulas = test::read_file(LOBATTO_SOURCE_DIR "/tests/handwritten/pendulum.hpp") +
-                        "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
+                          "namespace lobatto::kernels { using handwritten_pendulum = HandwrittenPendulum; }\n";
         return kernel_of(source, Precision::double_);
     }();
     return kernel;
