@@ -36,6 +36,8 @@ KernelSource emitted(const Scene& scene, const Settings& settings, const EmitWis
 
 PlainSource plainly_emitted(const Scene& scene, const Settings& settings) {
     refuse_values(settings, "emit");
+    if (settings.tolerance)
+        throw lobatto::InputError("--tolerance: the plain integrator iterates to rounding; leave one of the two out");
     const lobatto::Scene changed = with_method(scene, settings);
     return lobatto::emit_plain(changed, changed.method.numbers);
 }

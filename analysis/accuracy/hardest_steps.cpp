@@ -38,7 +38,7 @@ std::vector<double> before_furthest(LoadedStepper<double>& stepper, const std::v
 States<double> ends_of(LoadedStepper<double>& stepper, const States<double>& states, std::int64_t steps) {
     States<double> ends(states.size());
     for (std::size_t i = 0; i < states.size(); ++i)
-        if (start_at(stepper, states[i]) == LOBATTO_OK) ends[i] = state_after(stepper, steps);
+        if (!states[i].empty() && start_at(stepper, states[i]) == LOBATTO_OK) ends[i] = state_after(stepper, steps);
     return ends;
 }
 
@@ -151,12 +151,15 @@ std::optional<double> first_unresolved(LoadedStepper<double>& stepper, const Sta
             state = before_furthest(stepper, state, std::min(every, left), scale);
         }
     const States<double> whole = ends_of(stepper, hardest, 1);
-    if (stepper.prepare(parameters, step / 2) != LOBATTO_OK) return {};
-    const States<double> halved = ends_of(stepper, hardest, 2);
+    // In two parts of the golden section: what looks constant at whole parts of a step does not look so at theirs.
+    if (stepper.prepare(parameters, step * golden) != LOBATTO_OK) return {};
+    const States<double> within = ends_of(stepper, hardest, 1);
+    if (stepper.prepare(parameters, step * (1 - golden)) != LOBATTO_OK) return {};
+    const States<double> parted = ends_of(stepper, within, 1);
     stepper.prepare(parameters, step);
     for (std::size_t i = 0; i < hardest.size(); ++i) {
         if (whole[i].empty()) continue;
-        const double difference = halved[i].empty() ? HUGE_VAL : distance(halved[i], whole[i], scale);
+        const double difference = parted[i].empty() ? HUGE_VAL : distance(parted[i], whole[i], scale);
         if (!(difference <= grossly * distance(whole[i], hardest[i], scale)) ||
             jumps_over(stepper, hardest[i], whole[i], step, scale))
             return hardest[i][0];

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -69,6 +70,51 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
     return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
 
+// The first root, logarithm or broken power of a scene that holds a switch; nothing where none does.
+const DomainCondition* root_of_switch(const Scene& scene) {
+    for (const DomainCondition& condition : scene.conditions)
+        for (const Switch& one : scene.switches)
+            if (condition.kind != DomainCondition::Kind::nonzero && condition.expression.has(one.side))
+                return &condition;
+    return nullptr;
+}
+
+// Of a step that failed where it would go through a switch that stands in a root. Empty: it would not.
+std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& request,
+                               const TrajectoryResult& result) {
+    const Scene& scene = run.scene;
+    const DomainCondition* const root = root_of_switch(scene);
+    LoadedStepper<double> stepper(run.plain);
+    std::vector<double> velocity;
+    if (root == nullptr || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
+        return "";
+    std::vector<GiNaC::symbol> symbols{scene.time};
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.velocity);
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    const auto variables_after = [&](double time) {
+        std::vector<double> variables{result.time + time};
+        for (std::size_t k = 0; k < velocity.size(); ++k) variables.push_back(result.q[k] + time * velocity[k]);
+        variables.insert(variables.end(), velocity.begin(), velocity.end());
+        variables.insert(variables.end(), request.parameters.begin(), request.parameters.end());
+        return variables;
+    };
+    const auto is_met = [&](const Switch& one) {
+        const std::optional<Tape> value = Tape::of(one.value, symbols);
+        if (!value) return false;
+        const double here = (*value)(variables_after(0)), ahead = (*value)(variables_after(2 * request.step));
+        return here * ahead <= 0 || std::fabs(here) < 1e-9 * std::fabs(ahead);
+    };
+    if (std::none_of(scene.switches.begin(), scene.switches.end(), is_met)) return "";
+    return fmt::format(
+        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: {}, line {} column {}, holds a switch, and "
+        "has no value beyond it, where a step looks before it is cut. Write a smooth formula that is positive "
+        "everywhere, such as (sqrt(u^2 + 1e-12) + u)/2 for max(u, 0).",
+        result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), root->operation, root->at.line,
+        root->at.column);
+}
+
 // Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
 std::string end_of_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                          const RunObservers& observers) {
@@ -92,8 +138,10 @@ std::string end_of_table(const PreparedRun& run, const TrajectoryRequest& reques
 std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                        const RunObservers& observers, const std::string& departure) {
     const Scene& scene = run.scene;
-    if (result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED)
+    if (result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED) {
         if (const std::string why = end_of_table(run, request, result, observers); !why.empty()) return why;
+        if (const std::string why = root_beyond_switch(run, request, result); !why.empty()) return why;
+    }
     if (result.status != LOBATTO_OK)
         return explain_stop(result, request, passing_step(run.plain, request, result), clock_advice(scene));
     if (!departure.empty()) return departure;

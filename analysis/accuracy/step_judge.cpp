@@ -153,7 +153,7 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement) {
             judgement.radians, judgement.limit, judgement.limit / judgement.radians));
     if (judgement.unresolved)
         texts.push_back(fmt::format(
-            "in step {}, from t = {:.6g} on, the motion is not resolved: half the step leads to another place, or the "
+            "in step {}, from t = {:.6g} on, the motion is not resolved: shorter steps lead to another place, or the "
             "step jumps over a singularity. Take a shorter step, or coordinates without a singularity there",
             judgement.unresolved->step, judgement.unresolved->time));
     return texts;

@@ -37,23 +37,30 @@ struct Parameters {
 };
 
 struct State {
-    real t = 0;
+    real t = 0, t_rest = 0;  // the time is their sum
     real q[n] = {};  // positions
     real p[n] = {};  // momenta
 };
 
 // Relative changes this small that no longer shrink are rounding.
 constexpr real rounding = 10000000 * std::numeric_limits<real>::epsilon();
+constexpr real small_part = real(0.0001);
 
 // The larger one, or not a number.
-inline real larger(real a, real b) { return a >= b || std::isnan(a) ? a : b; }
+inline real larger(real one, real other) { return one >= other || std::isnan(one) ? one : other; }
 // The change of a number; what it is measured against is at least a small part of the largest of its kind, whose
 // rounding it gets.
 inline real relative_change(real next, real last, const real* all) {
     real largest = 0;
     for (int k = 0; k < n; ++k) largest = larger(largest, std::fabs(all[k]));
-    const real size = std::fabs(next) + std::fabs(last) + largest / 10000;
+    const real size = std::fabs(next) + std::fabs(last) + small_part * largest;
     return next == last ? 0 : std::fabs(next - last) / size;
+}
+// A step later; what rounding leaves out of the time is kept beside it, else it would add up.
+inline void add_time(real h, State& x) {
+    const real step = h + x.t_rest, sum = x.t + step;
+    x.t_rest = step - (sum - x.t);
+    x.t = sum;
 }
 inline bool is_finite(const State& x) {
     bool all = std::isfinite(x.t);
@@ -108,7 +115,7 @@ inline bool step(const Parameters& parameters, real h, State& x) {
         if (iteration == 100 || !(change <= rounding || iteration < 4 || change < before)) return false;
     }
     State end = x;
-    end.t = x.t + h;
+    add_time(h, end);
     for (int k = 0; k < n; ++k) {
         end.q[k] = x.q[k] + h * v[k];
         for (int j = 1; j < s - 1; ++j) end.q[k] -= h * h * b[j] * (1 - c[j]) * W[j][k];

@@ -95,6 +95,9 @@ private:
         text += wrapped("// Lagrangian   L = " + comment_safe(d_.scene.lagrangian_text), "//                  ");
         text += fmt::format("// Method       {}: order {}, {}\n", d_.quadrature.method.name(), d_.quadrature.order(),
                             forced() ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
+        if (const double tolerance = d_.scene.method.tolerance; tolerance > 0)
+            text += fmt::format("// Tolerance    {}, once it is set: stepper.{}; else steps are iterated to rounding\n",
+                                tolerance, tolerance_setting(d_.scene));
         text += "// Coordinates  ";
         for (int k = 0; k < n_; ++k) {
             const Coordinate& coordinate = d_.scene.coordinates[static_cast<std::size_t>(k)];
@@ -416,6 +419,16 @@ private:
 };
 
 }  // namespace
+
+bool has_hybrid_stepper(const Scene& scene) {
+    return !scene.watched().empty() && !scene.clock;
+}
+
+std::string tolerance_setting(const Scene& scene) {
+    const double tolerance = scene.method.tolerance;
+    return has_hybrid_stepper(scene) ? fmt::format("set_tolerance({})", tolerance)
+                                     : fmt::format("tolerance = {}", tolerance);
+}
 
 KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options) {
     KernelSource source;

@@ -12,6 +12,7 @@
 namespace lobatto {
 
 struct Derivation;
+struct Scene;
 struct OptimisedPrograms;
 enum class Form;
 
@@ -33,6 +34,11 @@ struct KernelSource {
     std::string digest;              // of the formulas: 16 hexadecimal digits
     std::vector<PassReport> report;  // first row: as derived
 };
+
+// Whether a program steps it by lobatto::HybridStepper, which looks for events; else by lobatto::Stepper.
+bool has_hybrid_stepper(const Scene& scene);
+// "tolerance = 1e-09": how a program that holds the kernel's text asks its stepper for the tolerance of the scene.
+std::string tolerance_setting(const Scene& scene);
 
 // Writes the programs out. Throws DomainError when a number is beyond the range of the kernel's number type.
 KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options);

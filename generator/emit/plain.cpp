@@ -50,7 +50,7 @@ inline bool step(const Parameters& parameters, real h, State& x) {
         if (iteration == 100 || !(change <= rounding || iteration < 4 || change < before)) return false;
     }
     State end = x;
-    end.t = x.t + h;
+    add_time(h, end);
     for (int k = 0; k < n; ++k) {
         end.q[k] = x.q[k] + h * v[k];
         for (int j = 1; j < s - 1; ++j) end.q[k] -= h * h * b[j] * (1 - c[j]) * W[j][k];
@@ -81,7 +81,7 @@ inline bool step(const Parameters& parameters, real h, State& x) {
             if (i + 1 < s) end.q[k] += h * (c[i + 1] - c[i]) * u[k];
         }
     }
-    end.t = x.t + h;
+    add_time(h, end);
     momentum(parameters, u, end.p);
     if (!is_finite(end)) return false;
     x = end;
@@ -183,7 +183,7 @@ inline bool step(const Parameters& parameters, real h, State& x) {
         if (change <= rounding && !(change < before)) break;
         if (iteration == 100 || !(change < std::numeric_limits<real>::max())) return false;
     }
-    end.t = x.t + h;
+    add_time(h, end);
     for (int k = 0; k < n; ++k) {
         end.q[k] = X[m][k];
         for (int i = 0; i < nodes; ++i) end.p[k] += h * b[i] * g[i][n + k];
@@ -195,18 +195,21 @@ inline bool step(const Parameters& parameters, real h, State& x) {
 )";
 
 const char* const helpers = R"(
-// Relative changes this small that no longer shrink are rounding.
-constexpr real rounding = 10000000 * std::numeric_limits<real>::epsilon();
-
 // The larger one, or not a number.
-inline real larger(real a, real b) { return a >= b || std::isnan(a) ? a : b; }
+inline real larger(real one, real other) { return one >= other || std::isnan(one) ? one : other; }
 // The change of a number; what it is measured against is at least a small part of the largest of its kind, whose
 // rounding it gets.
 inline real relative_change(real next, real last, const real* all) {
     real largest = 0;
     for (int k = 0; k < n; ++k) largest = larger(largest, std::fabs(all[k]));
-    const real size = std::fabs(next) + std::fabs(last) + largest / 10000;
+    const real size = std::fabs(next) + std::fabs(last) + small_part * largest;
     return next == last ? 0 : std::fabs(next - last) / size;
+}
+// A step later; what rounding leaves out of the time is kept beside it, else it would add up.
+inline void add_time(real h, State& x) {
+    const real step = h + x.t_rest, sum = x.t + step;
+    x.t_rest = step - (sum - x.t);
+    x.t = sum;
 }
 inline bool is_finite(const State& x) {
     bool all = std::isfinite(x.t);
@@ -232,7 +235,7 @@ public:
         std::string all = preamble() + "#pragma once\n\n#include <cmath>\n#include <limits>\n";
         if (is_general()) all += "#include <utility>\n";
         all += fmt::format("\nnamespace lobatto::plain::{} {{\n\nusing real = {};\n\n", name_, type_name(precision_)) +
-               shapes() + parameters() + state() + helpers;
+               shapes() + parameters() + state() + rounding() + helpers;
         if (is_general())
             all += function("dL/dv(q, v), the momentum (D2).", "void", "momentum",
                             {"real time", "const real* q", "const real* velocity", "real* p"}, "momentum") +
@@ -337,9 +340,19 @@ private:
     }
     std::string state() const {
         return fmt::format(
-            "\nstruct State {{\n    real t = 0;\n    real q[n] = {{}};  // positions\n    real p[n] = "
-            "{{}};  // momenta\n{}}};\n",
+            "\nstruct State {{\n    real t = 0, t_rest = 0;  // the time is their sum\n    real q[n] = {{}};  // positions\n"
+            "    real p[n] = {{}};  // momenta\n{}}};\n",
             is_general() ? "    real v[n] = {};  // velocities, where the next iteration for them begins\n" : "");
+    }
+
+    // The smaller part float takes is the larger one: it has few digits.
+    std::string rounding() const {
+        const bool is_short = precision_ == Precision::single;
+        return fmt::format(
+            "\n// Relative changes this small that no longer shrink are rounding.\n"
+            "constexpr real rounding = {} * std::numeric_limits<real>::epsilon();\n"
+            "constexpr real small_part = {};\n",
+            is_short ? 3000 : 10000000, is_short ? "real(0.0625)" : "real(0.0001)");
     }
 
     // A program as a function of the parameters and of `arguments`, "real time" among them where it takes the time.

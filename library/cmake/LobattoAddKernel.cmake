@@ -11,6 +11,12 @@ function(lobatto_add_kernel target)
         message(FATAL_ERROR "lobatto_add_kernel(${target}): unknown argument ${KERNEL_UNPARSED_ARGUMENTS}; there are "
             "SCENE, POINTS, STAGES, SPLITTING, NUMBERS, ARITHMETIC, ENSEMBLE and PLAIN")
     endif()
+    if(KERNEL_KEYWORDS_MISSING_VALUES)
+        message(FATAL_ERROR "lobatto_add_kernel(${target}): no value after ${KERNEL_KEYWORDS_MISSING_VALUES}")
+    endif()
+    if(KERNEL_PLAIN AND KERNEL_ENSEMBLE)
+        message(FATAL_ERROR "lobatto_add_kernel(${target}): PLAIN has no ensembles; leave one of the two out")
+    endif()
     if(NOT KERNEL_SCENE)
         message(FATAL_ERROR "lobatto_add_kernel(${target}): SCENE is missing; name the scene file")
     endif()
@@ -22,7 +28,6 @@ function(lobatto_add_kernel target)
         message(FATAL_ERROR "lobatto_add_kernel(${target}): there is no scene file ${scene}")
     endif()
     cmake_path(GET scene STEM LAST_ONLY stem)
-    string(MAKE_C_IDENTIFIER ${stem} name)
     set(options)
     foreach(option POINTS STAGES SPLITTING NUMBERS ARITHMETIC)
         if(DEFINED KERNEL_${option})
@@ -40,7 +45,7 @@ function(lobatto_add_kernel target)
         target_link_libraries(${target} PRIVATE Lobatto::kernel)
     endif()
     set(folder ${CMAKE_CURRENT_BINARY_DIR}/lobatto/${target})
-    set(header ${folder}/${name}.hpp)
+    set(header ${folder}/${stem}.hpp)
     set(depends ${scene})
     # The files of table("torque.csv", t), which lie in the scene's folder or below it. Which they are is looked up anew
     # when the scene changes.
@@ -61,7 +66,8 @@ function(lobatto_add_kernel target)
     endif()
     add_custom_command(OUTPUT ${header} DEPENDS ${depends} VERBATIM
         COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
-        COMMAND ${LOBATTO_PROGRAM} emit ${scene} -o ${folder} ${options} > ${folder}/${name}.log
+        COMMAND ${LOBATTO_PROGRAM} emit ${scene} -o - ${options} > ${header}.part
+        COMMAND ${CMAKE_COMMAND} -E rename ${header}.part ${header}
         COMMENT "Deriving the integrator of ${stem}")
     target_sources(${target} PRIVATE ${header})
     target_include_directories(${target} PRIVATE ${folder})

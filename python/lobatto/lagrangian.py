@@ -7,7 +7,6 @@ import re
 from ._lobatto import InputError, Scene
 
 
-
 def _value(value):
     """As TOML has it: numbers with all their digits, formulas in quotes."""
     if isinstance(value, bool):
@@ -37,12 +36,12 @@ def _coordinate(name, value):
         table = {"position": value[0], "velocity": value[1]}
     else:
         table = {"position": value}
-    if "velocity" not in table and "momentum" not in table:
+    if "position" in table and "velocity" not in table and "momentum" not in table:
         table["velocity"] = 0
     return table
 
 
-def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output=None, inputs=(), extra="",
+def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=None, output=None, inputs=(), extra="",
                **variables):
     """A scene from a Lagrangian and the values of its names.
 
@@ -50,14 +49,16 @@ def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output
     position, ``(position, velocity)``, or a table: ``dict(position=1, momentum=0, unit="m", force="-c*q'")``. Every
     other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``.
 
-    ``method``: a table such as ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
+    ``time``: its name where it stands in the Lagrangian or a force, such as "t". ``method``: a table such as ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
     scene file. ``inputs``: names of parameters that ``Stepper.set`` may change before each step. ``extra``: more of a
-    scene file, as text.
+    scene file, as text. Scenes with arrays are written as such a text: ``Scene.from_text``.
     """
-    moving = set(re.findall(r"([A-Za-z_]\w*)'", lagrangian))
+    moving = set(re.findall(r"([A-Za-z_]\w*)'", re.sub("#[^\n]*", "", lagrangian)))  # without comments
     lines = []
     if title:
         lines.append(f"title = {_value(title)}")
+    if time:
+        lines.append(f"time = {_value(time)}")
     lines.append(f"lagrangian = {_value(lagrangian)}")
     coordinates = {name: value for name, value in variables.items() if name in moving}
     missing = sorted(moving - set(coordinates))
@@ -84,6 +85,8 @@ def Lagrangian(lagrangian, *, title="", step=0.01, until=10, method=None, output
     lines += [f"step = {_value(step)}", f"until = {_value(until)}"]
     if method:
         method = dict(method)
+        if "stages" in method and "splitting" in method:
+            raise InputError("method: stages are those of Gauss's method; leave splitting or stages out")
         for family, size in (("gauss", "stages"), ("splitting", "splitting")):
             if size in method:
                 method = {"family": family, "stages": method.pop(size), **method}

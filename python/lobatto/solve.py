@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """What is done with a scene."""
 
+import copy
 import json
 import warnings
 
@@ -24,6 +25,7 @@ def run(scene, *, measure=True, companion="", beyond_horizon=False, progress=Non
     second; False ends the run. Raises RunFailure where it fails on its way, with what was computed as its ``trajectory``.
     """
     scene = _scene(scene)
+    settings = copy.deepcopy(settings)  # states between those that are kept are computed later, with these
     try:
         values = _lobatto.run(scene, measure, companion, beyond_horizon, progress, **settings)
     except RunFailure as failure:
@@ -101,7 +103,8 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
 
     ``t_span`` begins where the scene begins, at 0, and ends later. ``y0``: positions and velocities; None: those of the
     scene. Steps are equal (setting ``step``); there is no tolerance: tune chooses a step for an error. Returns t, y, sol
-    (with ``dense_output``), status, message, success, nfev (0: not counted).
+    (with ``dense_output``), status, message, success, nfev (0: not counted). ``success`` says that all steps were taken.
+    Whether the motion is right is what ``run`` measures and tells.
     """
     scene = _scene(scene)
     begin, end = (float(time) for time in t_span)
@@ -112,7 +115,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
         raise _lobatto.InputError("until: the end stands in t_span")
     if t_eval is not None:
         t_eval = numpy.asarray(t_eval, dtype=float)
-        if t_eval.ndim != 1 or (t_eval < begin).any() or (t_eval > end).any() or (numpy.diff(t_eval) < 0).any():
+        if t_eval.ndim != 1 or not ((begin <= t_eval) & (t_eval <= end)).all() or (numpy.diff(t_eval) < 0).any():
             raise _lobatto.InputError(f"t_eval needs ascending times from {begin:g} to {end:g}")
     stepper = Stepper(scene, until=end, **settings)
     n = len(stepper.q)

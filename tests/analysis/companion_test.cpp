@@ -100,6 +100,45 @@ TEST_CASE("where rounding decides the error, a companion in finer numbers measur
     CHECK(worst_double > std::log10(1.25));
 }
 
+TEST_CASE("what the tolerance leaves of the equations of a step is measured, too") {
+    const std::string lagrangian = "3*x'^2/4 + 0.35*x'*a'*cos(a) + 0.1225*a'^2 + 3.4335*cos(a)",
+                      coordinates = "x = { position = 0, velocity = 0 }\na = { position = 2, velocity = 0 }";
+    const Place exact(scene_of(lagrangian, coordinates, "points = 12", 0.0125, 60));
+    REQUIRE(exact.run({"--unmeasured"}).exit_code == 0);
+    const std::vector<double> truth = exact.end();
+    struct Row {
+        std::string method, tolerance;
+        double step;
+    };
+    // With a companion of the same tolerance the last three errors were printed 12 to 30 times too small.
+    for (const Row& row : {Row{"points = 6", "1e-4", 0.05}, Row{"family = \"gauss\"\nstages = 6", "1e-5", 0.04},
+                           Row{"points = 8", "1e-5", 0.06}, Row{"points = 8", "1e-5", 0.05}}) {
+        const Place place(
+            scene_of(lagrangian, coordinates, row.method + "\ntolerance = " + row.tolerance, row.step, 60));
+        const test::Finished done = place.run();
+        CAPTURE(done.out);
+        REQUIRE(done.exit_code == 0);
+        const std::vector<double> end = place.end();
+        const double of_x = std::fabs(end[1] - truth[1]), of_a = std::fabs(end[2] - truth[2]),
+                     printed = absolute_error(done.out);
+        const bool is_near_x =
+            printed > of_x / 1.3 && printed<of_x * 1.3, is_near_a = printed> of_a / 1.3 && printed < of_a * 1.3;
+        CHECK((is_near_x || is_near_a));  // in the coordinate where it is largest, relative to the amplitude
+    }
+}
+
+TEST_CASE("a force that looks constant at the nodes of steps and of halves of them is told") {
+    for (const char* method : {"points = 2", "points = 3", "family = \"gauss\"\nstages = 1"}) {
+        test::TemporaryFolder folder;
+        test::write_text(folder / "scene.toml", scene_of("x'^2/2 - x^2/2", "x = { position = 0.1, velocity = 0 }",
+                                                         method, 0.1, 20, "[forces]\nx = \"cos(2*pi*520*t)\"\n"));
+        const test::Finished done =
+            test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
+        CAPTURE(method);
+        CHECK(done.err.find("the motion is not resolved") != std::string::npos);
+    }
+}
+
 TEST_CASE("a companion in numbers that it cannot have is refused") {
     const Place place(scene_of("q'^2/2 - q^2/2", swinging, four, 0.1, 10));
     const auto refusal = [&](std::vector<std::string> options) {

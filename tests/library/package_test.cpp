@@ -72,16 +72,17 @@ TEST_SUITE("slow") {
     TEST_CASE("lobatto_add_kernel derives again when a file of the scene's tables changes") {
         const test::TemporaryFolder folder;
         install(folder / "prefix");
-        const std::string scene = folder / "driven.toml", build = folder / "build";
+        const std::string scene = folder / "2 driven.toml", build = folder / "build";
         test::write_text(folder / "push.csv", "0,0\n1,1\n2,0\n3,1\n4,0\n");
         test::write_text(
             scene,
             "time = \"t\"\nlagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 "
             "}\n[forces]\nx = '''table( \"push.csv\", t)'''\n[run]\nstep = 0.1\nuntil = 4\n");
-        test::write_text(folder / "main.cpp", "#include \"driven.hpp\"\nint main() {}\n");
-        test::write_text(folder / "CMakeLists.txt",
-                         "cmake_minimum_required(VERSION 3.25)\nproject(p LANGUAGES CXX)\nfind_package(Lobatto "
-                         "REQUIRED)\nadd_executable(main main.cpp)\nlobatto_add_kernel(main SCENE driven.toml)\n");
+        test::write_text(folder / "main.cpp", "#include \"2 driven.hpp\"\nint main() {}\n");
+        test::write_text(
+            folder / "CMakeLists.txt",
+            "cmake_minimum_required(VERSION 3.25)\nproject(p LANGUAGES CXX)\nfind_package(Lobatto "
+            "REQUIRED)\nadd_executable(main main.cpp)\nlobatto_add_kernel(main SCENE \"2 driven.toml\")\n");
         output_of({"cmake", "-S", folder.string(), "-B", build, "-G", "Ninja",
                    "-DCMAKE_PREFIX_PATH=" + (folder / "prefix").string()});
         const auto derives = [&] {
@@ -164,5 +165,9 @@ TEST_SUITE("slow") {
         CHECK(configure("lobatto_add_kernel(a)").find("SCENE is missing") != std::string::npos);
         CHECK(configure("lobatto_add_kernel(b SCENE x.toml)").find("there is no target b") != std::string::npos);
         CHECK(configure("lobatto_add_kernel(a SCEN x.toml)").find("unknown argument") != std::string::npos);
+        CHECK(configure("lobatto_add_kernel(a SCENE x.toml POINTS)").find("no value after POINTS") !=
+              std::string::npos);
+        CHECK(configure("lobatto_add_kernel(a SCENE x.toml PLAIN ENSEMBLE)").find("PLAIN has no ensembles") !=
+              std::string::npos);
     }
 }

@@ -63,7 +63,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
     request_.arrivals = request.arrivals;
     request_.arrivals.keeps_chain = false;
     request_.every = request.every;
-    request_.tolerance = request.tolerance;
+    request_.tolerance = request.tolerance * finer_iteration;
     pulses_ = find_pulses(outline, request.parameters, request.time, time_after(request, request.steps),
                           std::fabs(request.step));
     const std::int64_t comparisons =

@@ -41,6 +41,9 @@ inline constexpr std::int64_t fewest_driven_steps = 8;
 // Of a companion with a clock: its steps for one of the run, both equally long in the time of the clock.
 inline constexpr double clocked_ratio = 1.5;
 
+// Of the run's tolerance, the companion's: what the run leaves of its equations is measured, too.
+inline constexpr double finer_iteration = 1e-3;
+
 class Companion {
 public:
     // What is handed over is copied, but for what the kernel needs. `request`: the run's; its whole numbers are those

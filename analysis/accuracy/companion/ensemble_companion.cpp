@@ -91,6 +91,7 @@ void EnsembleCompanion::move(EnsembleStart& start) const {
 void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_t every) {
     const std::size_t n = groups_.size();
     EnsembleRequest companion = request_;
+    companion.tolerance = request_.tolerance * finer_iteration;
     companion.first = 0;
     companion.count = std::ssize(known_);
     companion.start = [&](std::int64_t index, EnsembleStart& start) {

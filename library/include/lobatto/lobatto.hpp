@@ -229,7 +229,7 @@ private:
 struct Trajectory {
     std::vector<Variable> coordinates;
     std::vector<std::string> event_names;
-    /// count rows. energy is empty where the scene keeps none.
+    /// count rows. energy is empty where the scene keeps none, unless the motion conserves it.
     std::size_t count = 0;
     std::vector<double> t, q, p, energy;
     /// count x column_names: multipliers that the scene asks for, eliminated coordinates and their velocities, the

@@ -116,7 +116,7 @@ struct ManyDigits {
         mpfr_custom_init_set(header, MPFR_ZERO_KIND, 0, bits, result.word);
         operation(header);
         result.kind = mpfr_zero_p(header) ? zero : mpfr_nan_p(header) ? nan : mpfr_inf_p(header) ? infinite : regular;
-        result.negative = mpfr_signbit(header) ? 1 : 0;
+        result.negative = static_cast<std::int16_t>(mpfr_signbit(header) != 0);
         result.exponent = result.kind == regular ? static_cast<std::int32_t>(mpfr_custom_get_exp(header)) : 0;
         return result;
     }

@@ -2,7 +2,9 @@
 // Numbers: what the number types of kernels need, and their elementary functions. C++17, no allocation.
 #ifndef LOBATTO_KERNEL_NUMBERS_HPP
 #define LOBATTO_KERNEL_NUMBERS_HPP
-
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || __FINITE_MATH_ONLY__ + 0 > 0
+#error "-Ofast and -ffast-math give wrong motions: compile kernels without them, or use `lobatto emit --plain`"
+#endif
 #include <cstdint>
 #include <limits>
 #include <type_traits>

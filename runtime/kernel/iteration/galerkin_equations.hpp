@@ -295,7 +295,8 @@ protected:
                 if constexpr (kappas > 0) assemble_entry<row, Slot::momentum>(H, stride, u, v, at);
                 break;
             case Slot::multiplier:  // of dL/dq + G^T Lambda
-                for (int j = 0; j < m; ++j) at(u, j, v, j) += step_size * K::b[j] * H[j * stride];
+                if constexpr (constraints > 0)
+                    for (int j = 0; j < m; ++j) at(u, j, v, j) += step_size * K::b[j] * H[j * stride];
                 break;
         }
     }
@@ -315,9 +316,10 @@ protected:
                     if constexpr (kappas > 0) assemble_row<Slot::momentum>(H + e, stride, e, at);
                     break;
                 case Slot::multiplier:  // of phi: an entry of G
-                    for (int j = 0; j < m; ++j)
-                        at(Tables::block(K::entry_row[e]), j, Tables::block(K::entry_column[e]), j) +=
-                            H[e + (j + 1) * stride];
+                    if constexpr (constraints > 0)
+                        for (int j = 0; j < m; ++j)
+                            at(Tables::block(K::entry_row[e]), j, Tables::block(K::entry_column[e]), j) +=
+                                H[e + (j + 1) * stride];
                     break;
             }
         }

@@ -375,6 +375,7 @@ public:
     HybridStepper& operator=(const HybridStepper&) = delete;
     ~HybridStepper() { delete looks; }
 
+    void set_tolerance(real tolerance) { stepper.tolerance = tolerance; }  // of increments, relative; 0: to rounding
     Status prepare(const typename K::Parameters& parameters, real h) {
         delete looks;
         looks = nullptr;
@@ -385,16 +386,17 @@ public:
     Status start(real time, const real* q, const real* p) {
         delete looks;
         looks = nullptr;
-        Status status;
         if constexpr (WatchedStepper<K>::walls > 0)
-            status = Sides<K>::start(stepper, time, q, p);
+            started = Sides<K>::start(stepper, time, q, p);
         else
-            status = stepper.start(time, q, p);
-        if (status == Status::ok) looks = new Looks(stepper);
-        return status;
+            started = stepper.start(time, q, p);
+        if (started == Status::ok) looks = new Looks(stepper);
+        return started;
     }
-    // Status::stopped: the motion met a stop in this step, where the last event says. To be called after start().
+    // Status::stopped: the motion met a stop in this step, where the last event says. After a start that was refused it
+    // is refused too.
     Status step() {
+        if (looks == nullptr) return started;
         looks->count = 0;
         looks->watch.keep(stepper);
         const Status status = stepper.step();
@@ -420,6 +422,7 @@ private:
         std::int64_t count = 0;
     };
     WatchedStepper<K> stepper{};
+    Status started = Status::unsupported;
     Looks* looks = nullptr;
 };
 

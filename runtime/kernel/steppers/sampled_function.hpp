@@ -19,8 +19,9 @@ LOBATTO_DEVICE inline auto is_no_dip(const T* y, int i, const T& largest) {
     const int middle = i < 2 ? 2 : i > pieces - 2 ? pieces - 2 : i;
     const auto bend = [&](int j) { return y[j - 1] - T(real(2)) * y[j] + y[j + 1]; };
     const T here = bend(middle), before = bend(middle - 1), after = bend(middle + 1), half = T(real(0.5)) * here;
-    return (y[i] >= T(real(0.5)) * largest) & (half < before) & (half < after) & (before < here + here) &
-           (after < here + here);
+    const auto is_far = y[i] >= T(real(0.5)) * largest, is_least = half < before, is_lesser = half < after,
+               is_most = before < here + here, is_more = after < here + here;
+    return is_far & is_least & is_lesser & is_most & is_more;
 }
 
 // One function of the motion, sampled over a step.

@@ -718,6 +718,20 @@ TEST_CASE("a run that leaves the domain of a formula is told, though the formula
     }
 }
 
+TEST_CASE("a broken power of max(u, 0) has no value beyond the switch, which is told; a smooth one goes on") {
+    const test::TemporaryFolder folder;
+    const auto done = [&](const std::string& indentation) {
+        test::write_text(folder / "scene.toml", "lagrangian = \"x'^2/2 - 100*" + indentation +
+                                                    "^(5/2) - x\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                                                    "[method]\npoints = 6\n[run]\nstep = 0.05\nuntil = 8\n");
+        return test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "out.csv"});
+    };
+    const test::Finished sharp = done("max(-x, 0)");
+    CHECK(sharp.exit_code == 3);
+    CHECK(test::contains(sharp.err, "a broken power, line 1 column 38, holds a switch, and has no value beyond it"));
+    CHECK(done("((sqrt(x^2 + 1e-12) - x)/2)").exit_code == 0);
+}
+
 TEST_CASE("energies beyond all numbers are told, and are no crash") {
     const test::TemporaryFolder folder;
     test::write_text(

@@ -106,6 +106,7 @@ TEST_CASE("an emitted kernel with walls, switches and events takes the steps of 
                                      "    lobatto::HybridStepper<lobatto::kernels::{}> stepper;\n"
                                      "    const double q[] = {};\n"
                                      "    if (stepper.prepare({{}}, {}) != lobatto::Status::ok) return 1;\n"
+                                     "    if (stepper.step() != lobatto::Status::unsupported) return 4;\n"  // no start
                                      "    if (stepper.start(0, q, p) != lobatto::Status::ok) return 2;\n"
                                      "    long met = 0;\n"
                                      "    for (int i = 0; i < {}; ++i) {{\n"
@@ -121,6 +122,15 @@ TEST_CASE("an emitted kernel with walls, switches and events takes the steps of 
             test::run({"g++", "-std=c++17", "-O2", "-march=native", "-ffp-contract=off", "-Wall", "-Wextra",
                        "-Wpedantic", "-Werror", "-o", folder / "program", folder / "program.cpp"});
         REQUIRE_MESSAGE(compiled.exit_code == 0, compiled.err);
+        // Options with which it would compute something else.
+        for (const char* option :
+             {"-ffast-math", "-Ofast", "-fassociative-math -fno-signed-zeros -fno-trapping-math"}) {
+            const test::Finished refused = test::run(
+                {"sh", "-c",
+                 fmt::format("g++ -std=c++17 -O2 {} -fsyntax-only '{}'", option, std::string(folder / "program.cpp"))});
+            CHECK(refused.exit_code != 0);
+            CHECK_MESSAGE(refused.err.find("-ffast-math give wrong motions") != std::string::npos, option);
+        }
         const test::Finished ran = test::run({folder / "program"});
         REQUIRE(ran.exit_code == 0);
         const test::Finished whole =
@@ -317,4 +327,41 @@ TEST_CASE("the emitted discrete energy of the oscillator is the paper's form, an
     }
     CHECK(worst < 1e-12);
     CHECK(worst > 0);
+}
+
+TEST_CASE("emit says how a program asks for the tolerance of the scene; the plain text has none") {
+    const test::TemporaryFolder folder;
+    const std::string scene = tree + "/scenes/pendulum.toml", bouncing = tree + "/scenes/bouncing_ball.toml";
+    const auto emitted = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> words{LOBATTO_PROGRAM, "emit", "-o", folder.string()};
+        words.insert(words.end(), more.begin(), more.end());
+        return test::run(words);
+    };
+    CHECK(test::contains(emitted({scene, "--tolerance", "1e-6"}).out, "  stepper.tolerance = 1e-06;\n"));
+    CHECK(test::contains(test::read_file(folder / "pendulum.hpp"),
+                         "// Tolerance    1e-06, once it is set: "
+                         "stepper.tolerance = 1e-06;"));
+    CHECK(test::contains(emitted({bouncing, "--tolerance", "1e-6"}).out, "  stepper.set_tolerance(1e-06);\n"));
+    CHECK_FALSE(test::contains(emitted({scene}).out, "tolerance"));
+    const test::Finished plain = emitted({scene, "--plain", "--tolerance", "1e-6"});
+    CHECK(plain.exit_code == 2);
+    CHECK(test::contains(plain.err, "--tolerance: the plain integrator iterates to rounding"));
+}
+
+TEST_CASE("kernels of the general form make no warning where they are optimised" * doctest::test_suite("slow")) {
+    for (const std::string name : {"kapitza_pendulum", "lagrange_top", "relativistic_oscillator"}) {
+        const test::TemporaryFolder folder;
+        const test::Finished emitted = test::run(
+            {LOBATTO_PROGRAM, "emit", tree + "/scenes/" + name + ".toml", "--standalone", "-o", folder.string()});
+        REQUIRE_MESSAGE(emitted.exit_code == 0, emitted.err);
+        test::write_text(folder / "program.cpp", fmt::format("#include \"{0}.hpp\"\nint main() {{\n"
+                                                             "    lobatto::Stepper<lobatto::kernels::{0}> stepper;\n"
+                                                             "    const double q[8] = {{1, 1}}, p[8] = {{}};\n"
+                                                             "    stepper.prepare({{}}, 0.01);\n"
+                                                             "    stepper.start(0, q, p);\n    stepper.step();\n}}\n",
+                                                             name));
+        const test::Finished compiled = test::run({"g++", "-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", "-c",
+                                                   folder / "program.cpp", "-o", folder / "program.o"});
+        CHECK_MESSAGE(compiled.exit_code == 0, compiled.err);
+    }
 }
