@@ -99,7 +99,8 @@ void SweepStarts::add_table(StartTable table) {
         };
         const VariedName name = varied_name(scene_, table.names[c], "column", fail);
         if (name.is_setting())
-            fail(fmt::format("'{}' is a setting of the method and no start: `lobatto sweep --vary` varies it", name.name));
+            fail(fmt::format("'{}' is a setting of the method and no start: `lobatto sweep --vary` varies it",
+                             name.name));
         add(name, table.path, {dimensions_.size() - 1, std::nullopt, std::move(table.columns[c]), std::nullopt});
     }
 }

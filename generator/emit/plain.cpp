@@ -340,7 +340,8 @@ private:
     }
     std::string state() const {
         return fmt::format(
-            "\nstruct State {{\n    real t = 0, t_rest = 0;  // the time is their sum\n    real q[n] = {{}};  // positions\n"
+            "\nstruct State {{\n    real t = 0, t_rest = 0;  // the time is their sum\n    real q[n] = {{}};  // "
+            "positions\n"
             "    real p[n] = {{}};  // momenta\n{}}};\n",
             is_general() ? "    real v[n] = {};  // velocities, where the next iteration for them begins\n" : "");
     }

@@ -288,6 +288,26 @@ def test_other_threads_run_meanwhile(pendulum):
     assert len(counted) > 20
 
 
+def test_a_run_keeps_its_own_settings():
+    scene = lobatto.Lagrangian("m*q'^2/2 - k*q^2/2", q=(1, 0), m=1, k=1, step=0.1, until=10, output=dict(every=10))
+    values = {"k": 1}
+    first = lobatto.run(scene, set=values)
+    values["k"] = 4
+    assert first(5.5).q == pytest.approx(numpy.cos(5.5), abs=1e-6)
+    assert lobatto.run(scene, set=values)(5.5).q == pytest.approx(numpy.cos(11), abs=1e-3)
+
+
+def test_a_lagrangian_may_hold_the_time_and_comments():
+    driven = lobatto.Lagrangian("x'^2/2 - x^2/2 + a*x*cos(2*t) # the spring's energy", time="t", x=(0, 0), a=1, step=0.05,
+                                until=3)
+    assert [variable.name for variable in driven.coordinates] == ["x"]
+    assert lobatto.run(driven, points=6).q[-1, 0] == pytest.approx((numpy.cos(3) - numpy.cos(6)) / 3, abs=1e-9)
+    with pytest.raises(lobatto.InputError, match="leave splitting or stages out"):
+        lobatto.Lagrangian("x'^2/2 - x^2/2", x=1, method=dict(splitting=11, stages=2))
+    with pytest.raises(lobatto.InputError, match="is no number of threads"):
+        lobatto.sweep(driven, {"x": [1, 2]}, threads=-1)
+
+
 def test_solve_ivp_agrees_with_scipy(pendulum):
     integrate = pytest.importorskip("scipy.integrate")
     omega = 2 * numpy.pi
@@ -311,7 +331,7 @@ def test_solve_ivp_ends_where_it_should():
         assert solution.sol([[0, end]]).shape == (2, 1, 2)
     assert lobatto.run(scene)([]).q.shape == (0, 1) and lobatto.solve_ivp(scene, (0, 1), t_eval=[]).y.shape == (2, 0)
     assert not hasattr(solution, "t_events")
-    for wrong in (dict(t_eval=[0.5, 2]), dict(t_eval=[0.5, 0.2]), dict(until=3)):
+    for wrong in (dict(t_eval=[0.5, 2]), dict(t_eval=[0.5, 0.2]), dict(t_eval=[0, numpy.nan, 1]), dict(until=3)):
         with pytest.raises(lobatto.InputError, match="t_eval needs ascending times from 0 to 1|the end stands in t_span"):
             lobatto.solve_ivp(scene, (0, 1), **wrong)
     solution = lobatto.solve_ivp(comet(0.5), (0, 2.2))

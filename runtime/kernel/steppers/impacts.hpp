@@ -379,6 +379,7 @@ public:
     Status prepare(const typename K::Parameters& parameters, real h) {
         delete looks;
         looks = nullptr;
+        started = Status::unsupported;
         stepper.parameters = parameters;
         return stepper.prepare(parameters, h);
     }

@@ -89,7 +89,8 @@ TEST_CASE("a file of starts that makes no sense is refused with its place") {
     CHECK(csv("q,r\n1,2\n").starts_with("s.csv: unknown column 'r'; what can be varied: m, omega, q, q'"));
     CHECK(csv("q,p_q\n1,2\n").starts_with("s.csv: " + pendulum_file + " gives initial velocities, not momenta"));
     CHECK(csv("q,q\n1,2\n").starts_with("'q' is varied twice"));
-    CHECK(csv("step\n1\n") == "s.csv: 'step' is a setting of the method and no start: `lobatto sweep --vary` varies it\n");
+    CHECK(csv("step\n1\n") ==
+          "s.csv: 'step' is a setting of the method and no start: `lobatto sweep --vary` varies it\n");
     CHECK(csv("q\n1\nabc\n") == "s.csv:3:1: 'abc' is no finite number, of the column q\n");
     CHECK(csv("q,m\n1,nan\n") == "s.csv:2:3: 'nan' is no finite number, of the column m\n");
     CHECK(csv("q,m\n1\n") == "s.csv:2:2: no value of the column m\n");
