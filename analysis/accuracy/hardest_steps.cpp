@@ -15,6 +15,7 @@ constexpr double spike = 100;            // times as fast as at the ends of the 
 constexpr std::size_t spike_limit = 64;  // coordinates
 constexpr int looks = 16, closer = 60;   // at the way of a step; then golden sections
 constexpr double golden = 0.6180339887498949;
+constexpr double first_part = 0.4142135623730950;  // sqrt(2) - 1: the nodes of Lobatto and Gauss hold other roots
 
 // Of the `every` states from `state` on, the one from which a step goes furthest.
 std::vector<double> before_furthest(LoadedStepper<double>& stepper, const std::vector<double>& state,
@@ -151,10 +152,11 @@ std::optional<double> first_unresolved(LoadedStepper<double>& stepper, const Sta
             state = before_furthest(stepper, state, std::min(every, left), scale);
         }
     const States<double> whole = ends_of(stepper, hardest, 1);
-    // In two parts of the golden section: what looks constant at whole parts of a step does not look so at theirs.
-    if (stepper.prepare(parameters, step * golden) != LOBATTO_OK) return {};
+    // In two parts that no nodes share with the whole step: what looks constant at its nodes does not look so at
+    // theirs.
+    if (stepper.prepare(parameters, step * first_part) != LOBATTO_OK) return {};
     const States<double> within = ends_of(stepper, hardest, 1);
-    if (stepper.prepare(parameters, step * (1 - golden)) != LOBATTO_OK) return {};
+    if (stepper.prepare(parameters, step * (1 - first_part)) != LOBATTO_OK) return {};
     const States<double> parted = ends_of(stepper, within, 1);
     stepper.prepare(parameters, step);
     for (std::size_t i = 0; i < hardest.size(); ++i) {

@@ -32,10 +32,10 @@ private:
     double energy_before_ = 0;
 };
 
-// The time of the first step that half its length would take elsewhere, or that jumps over a singularity: the motion on
-// the way is not the one that it takes. Of one step from each of `states`; of kept ones, which are `every` steps apart,
-// the last at `end`, the one of these steps that goes furthest. `stepper` is prepared with `step`, and its trajectory
-// is lost; distances are relative to `scale`; infinite: that number does not count.
+// The time of the first step that two shorter ones would take elsewhere, or that jumps over a singularity: the motion
+// on the way is not the one that it takes. Of one step from each of `states`; of kept ones, which are `every` steps
+// apart, the last at `end`, the one of these steps that goes furthest. `stepper` is prepared with `step`, and its
+// trajectory is lost; distances are relative to `scale`; infinite: that number does not count.
 std::optional<double> first_unresolved(LoadedStepper<double>& stepper, const States<double>& states, std::int64_t every,
                                        double end, const std::vector<double>& parameters, double step,
                                        const std::vector<double>& scale);

@@ -70,23 +70,14 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
     return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
 
-// The first root, logarithm or broken power of a scene that holds a switch; nothing where none does.
-const DomainCondition* root_of_switch(const Scene& scene) {
-    for (const DomainCondition& condition : scene.conditions)
-        for (const Switch& one : scene.switches)
-            if (condition.kind != DomainCondition::Kind::nonzero && condition.expression.has(one.side))
-                return &condition;
-    return nullptr;
-}
-
-// Of a step that failed where it would go through a switch that stands in a root. Empty: it would not.
+// Of a step that failed where it would go through a switch that stands in a root, a logarithm or a broken power. Empty:
+// it would not.
 std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& request,
                                const TrajectoryResult& result) {
     const Scene& scene = run.scene;
-    const DomainCondition* const root = root_of_switch(scene);
     LoadedStepper<double> stepper(run.plain);
     std::vector<double> velocity;
-    if (root == nullptr || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+    if (scene.switches.empty() || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
         stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
         return "";
     std::vector<GiNaC::symbol> symbols{scene.time};
@@ -106,13 +97,23 @@ std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& 
         const double here = (*value)(variables_after(0)), ahead = (*value)(variables_after(2 * request.step));
         return here * ahead <= 0 || std::fabs(here) < 1e-9 * std::fabs(ahead);
     };
-    if (std::none_of(scene.switches.begin(), scene.switches.end(), is_met)) return "";
-    return fmt::format(
-        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: {}, line {} column {}, holds a switch, and "
-        "has no value beyond it, where a step looks before it is cut. Write a smooth formula that is positive "
-        "everywhere, such as (sqrt(u^2 + 1e-12) + u)/2 for max(u, 0).",
-        result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), root->operation, root->at.line,
-        root->at.column);
+    const auto is_root = [&](const DomainCondition& condition) {
+        using Kind = DomainCondition::Kind;
+        if (condition.kind != Kind::power)
+            return condition.kind == Kind::nonnegative || condition.kind == Kind::positive;
+        const std::optional<Tape> exponent = Tape::of(condition.exponent, symbols);
+        return exponent && (*exponent)(variables_after(0)) != std::round((*exponent)(variables_after(0)));
+    };
+    for (const DomainCondition& condition : scene.conditions)
+        for (const Switch& one : scene.switches)
+            if (condition.expression.has(one.side) && is_root(condition) && is_met(one))
+                return fmt::format(
+                    "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: {}, line {} column {}, holds a "
+                    "switch, and has no value beyond it, where a step looks before it is cut. Write a smooth formula "
+                    "that is positive everywhere, such as (sqrt(u^2 + 1e-12) + u)/2 for max(u, 0).",
+                    result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), condition.operation,
+                    condition.at.line, condition.at.column);
+    return "";
 }
 
 // Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.

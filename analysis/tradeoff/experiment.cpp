@@ -53,6 +53,7 @@ std::string subject_of(const Scene& scene, const KernelBuilder& kernel_builder, 
     std::string text =
         measurements_version + kernel_builder.digest(reference) + processor_identity() + exact_text(until);
     if (scene.clock) text += " " + scene.clock->text;
+    text += scene.start == Start::momentum ? " momenta" : "";
     for (const auto* values : {&scene.initial_position, &scene.initial_rate})
         for (const GiNaC::ex& value : *values)
             text += " " + exact_text(scene.evaluate(value, "an initial value").to_double());

@@ -346,7 +346,7 @@ private:
             is_general() ? "    real v[n] = {};  // velocities, where the next iteration for them begins\n" : "");
     }
 
-    // The smaller part float takes is the larger one: it has few digits.
+    // float has few digits, so its rounding is measured against a larger part of the largest number.
     std::string rounding() const {
         const bool is_short = precision_ == Precision::single;
         return fmt::format(

@@ -49,7 +49,8 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     position, ``(position, velocity)``, or a table: ``dict(position=1, momentum=0, unit="m", force="-c*q'")``. Every
     other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``.
 
-    ``time``: its name where it stands in the Lagrangian or a force, such as "t". ``method``: a table such as ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
+    ``time``: its name where it stands in the Lagrangian or a force, such as "t". ``method``: a table such as
+    ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
     scene file. ``inputs``: names of parameters that ``Stepper.set`` may change before each step. ``extra``: more of a
     scene file, as text. Scenes with arrays are written as such a text: ``Scene.from_text``.
     """

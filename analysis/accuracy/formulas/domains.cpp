@@ -63,9 +63,9 @@ Domains::Domains(const Scene& scene, const SystemOutline& system)
         // Quotients that have no value at a single place have one beside it, as sin(q)/q.
         const bool of_way = written.kind != Kind::nonzero && !has_velocity && holds_any(written.expression, moving) &&
                             !kept.contains(written.expression);
-        watches_ = watches_ || of_way;
         std::optional<Tape> exponent;
         if (written.kind == Kind::power && !(exponent = Tape::of(written.exponent, numbered))) continue;
+        watches_ = watches_ || of_way;
         conditions_.push_back({written, std::move(*tape), std::move(exponent), has_velocity, of_way});
     }
 }

@@ -3,7 +3,7 @@
 #ifndef LOBATTO_KERNEL_NUMBERS_HPP
 #define LOBATTO_KERNEL_NUMBERS_HPP
 #if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || __FINITE_MATH_ONLY__ + 0 > 0
-#error "-Ofast and -ffast-math give wrong motions: compile kernels without them, or use `lobatto emit --plain`"
+#error "-Ofast and -ffast-math give wrong motions: compile kernels without them"
 #endif
 #include <cstdint>
 #include <limits>

@@ -394,8 +394,8 @@ public:
         if (started == Status::ok) looks = new Looks(stepper);
         return started;
     }
-    // Status::stopped: the motion met a stop in this step, where the last event says. After a start that was refused it
-    // is refused too.
+    // Status::stopped: the motion met a stop in this step, where the last event says. Without a start:
+    // Status::unsupported; after one that was refused: the status of that one.
     Status step() {
         if (looks == nullptr) return started;
         looks->count = 0;

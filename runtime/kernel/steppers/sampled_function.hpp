@@ -19,9 +19,9 @@ LOBATTO_DEVICE inline auto is_no_dip(const T* y, int i, const T& largest) {
     const int middle = i < 2 ? 2 : i > pieces - 2 ? pieces - 2 : i;
     const auto bend = [&](int j) { return y[j - 1] - T(real(2)) * y[j] + y[j + 1]; };
     const T here = bend(middle), before = bend(middle - 1), after = bend(middle + 1), half = T(real(0.5)) * here;
-    const auto is_far = y[i] >= T(real(0.5)) * largest, is_least = half < before, is_lesser = half < after,
-               is_most = before < here + here, is_more = after < here + here;
-    return is_far & is_least & is_lesser & is_most & is_more;
+    const auto is_large = y[i] >= T(real(0.5)) * largest, above_before = half < before, above_after = half < after,
+               below_before = before < here + here, below_after = after < here + here;
+    return is_large & above_before & above_after & below_before & below_after;
 }
 
 // One function of the motion, sampled over a step.
