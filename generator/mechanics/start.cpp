@@ -11,6 +11,7 @@
 #include "generator/mechanics/algebra/sample.hpp"
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constrained_start.hpp"
+#include "generator/mechanics/constraints/impacts.hpp"
 #include "generator/mechanics/repeated/elements.hpp"
 #include "generator/mechanics/start_domains.hpp"
 

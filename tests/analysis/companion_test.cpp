@@ -128,16 +128,19 @@ TEST_CASE("what the tolerance leaves of the equations of a step is measured, too
 }
 
 TEST_CASE("a force that looks constant at the nodes of steps and of halves of them is told") {
-    const std::pair<const char*, int> tried[] = {
-        {"points = 2", 520}, {"points = 3", 520}, {"points = 4", 470}, {"family = \"gauss\"\nstages = 1", 520}};
-    for (const auto& [method, frequency] : tried) {
+    struct Row {
+        std::string method;
+        int frequency;
+    };
+    for (const Row& row : {Row{"points = 2", 520}, Row{"points = 3", 520}, Row{"points = 4", 470},
+                           Row{"family = \"gauss\"\nstages = 1", 520}}) {
         test::TemporaryFolder folder;
         test::write_text(folder / "scene.toml",
-                         scene_of("x'^2/2 - x^2/2", "x = { position = 0.1, velocity = 0 }", method, 0.1, 20,
-                                  fmt::format("[forces]\nx = \"cos(2*pi*{}*t)\"\n", frequency)));
+                         scene_of("x'^2/2 - x^2/2", "x = { position = 0.1, velocity = 0 }", row.method, 0.1, 20,
+                                  fmt::format("[forces]\nx = \"cos(2*pi*{}*t)\"\n", row.frequency)));
         const test::Finished done =
             test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
-        INFO(method << done.out << done.err);
+        INFO(row.method << done.out << done.err);
         CHECK(done.err.find("the motion is not resolved") != std::string::npos);
     }
 }
