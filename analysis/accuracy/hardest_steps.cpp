@@ -35,11 +35,11 @@ std::vector<double> before_furthest(LoadedStepper<double>& stepper, const std::v
     return furthest;
 }
 
-// After `steps` steps from each state; empty where one fails.
-States<double> ends_of(LoadedStepper<double>& stepper, const States<double>& states, std::int64_t steps) {
+// After a step from each state; empty where it fails, and where there is none.
+States<double> ends_of(LoadedStepper<double>& stepper, const States<double>& states) {
     States<double> ends(states.size());
     for (std::size_t i = 0; i < states.size(); ++i)
-        if (!states[i].empty() && start_at(stepper, states[i]) == LOBATTO_OK) ends[i] = state_after(stepper, steps);
+        if (!states[i].empty() && start_at(stepper, states[i]) == LOBATTO_OK) ends[i] = state_after(stepper, 1);
     return ends;
 }
 
@@ -151,13 +151,13 @@ std::optional<double> first_unresolved(LoadedStepper<double>& stepper, const Sta
             const std::int64_t left = std::llround((end - state[0]) / step);
             state = before_furthest(stepper, state, std::min(every, left), scale);
         }
-    const States<double> whole = ends_of(stepper, hardest, 1);
+    const States<double> whole = ends_of(stepper, hardest);
     // In two parts that no nodes share with the whole step: what looks constant at its nodes does not look so at
     // theirs.
     if (stepper.prepare(parameters, step * first_part) != LOBATTO_OK) return {};
-    const States<double> within = ends_of(stepper, hardest, 1);
+    const States<double> within = ends_of(stepper, hardest);
     if (stepper.prepare(parameters, step * (1 - first_part)) != LOBATTO_OK) return {};
-    const States<double> parted = ends_of(stepper, within, 1);
+    const States<double> parted = ends_of(stepper, within);
     stepper.prepare(parameters, step);
     for (std::size_t i = 0; i < hardest.size(); ++i) {
         if (whole[i].empty()) continue;

@@ -70,24 +70,38 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
     return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
 
+// Velocities where a run stopped; nothing where there are none.
+std::optional<std::vector<double>> velocity_at_stop(const PreparedRun& run, const TrajectoryRequest& request,
+                                                    const TrajectoryResult& result) {
+    LoadedStepper<double> stepper(run.plain);
+    std::vector<double> velocity;
+    if (stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
+        return std::nullopt;
+    return velocity;
+}
+
+// t and q after so long with these velocities.
+std::vector<double> straight_on(const TrajectoryResult& result, const std::vector<double>& velocity, double time) {
+    std::vector<double> ahead{result.time + time};
+    for (std::size_t k = 0; k < velocity.size(); ++k) ahead.push_back(result.q[k] + time * velocity[k]);
+    return ahead;
+}
+
 // Of a step that failed where it would go through a switch that stands in a root, a logarithm or a broken power. Empty:
 // it would not.
 std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& request,
                                const TrajectoryResult& result) {
     const Scene& scene = run.scene;
-    LoadedStepper<double> stepper(run.plain);
-    std::vector<double> velocity;
-    if (scene.switches.empty() || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
-        return "";
+    const auto velocity = scene.switches.empty() ? std::nullopt : velocity_at_stop(run, request, result);
+    if (!velocity) return "";
     std::vector<GiNaC::symbol> symbols{scene.time};
     for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
     for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.velocity);
     for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
     const auto variables_after = [&](double time) {
-        std::vector<double> variables{result.time + time};
-        for (std::size_t k = 0; k < velocity.size(); ++k) variables.push_back(result.q[k] + time * velocity[k]);
-        variables.insert(variables.end(), velocity.begin(), velocity.end());
+        std::vector<double> variables = straight_on(result, *velocity, time);
+        variables.insert(variables.end(), velocity->begin(), velocity->end());
         variables.insert(variables.end(), request.parameters.begin(), request.parameters.end());
         return variables;
     };
@@ -101,8 +115,9 @@ std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& 
         using Kind = DomainCondition::Kind;
         if (condition.kind != Kind::power)
             return condition.kind == Kind::nonnegative || condition.kind == Kind::positive;
-        const std::optional<Tape> exponent = Tape::of(condition.exponent, symbols);
-        return exponent && (*exponent)(variables_after(0)) != std::round((*exponent)(variables_after(0)));
+        const std::optional<Tape> formula = Tape::of(condition.exponent, symbols);
+        const double exponent = formula ? (*formula)(variables_after(0)) : 0;
+        return exponent != std::round(exponent);
     };
     for (const DomainCondition& condition : scene.conditions)
         for (const Switch& one : scene.switches)
@@ -119,13 +134,9 @@ std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& 
 // Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
 std::string end_of_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                          const RunObservers& observers) {
-    LoadedStepper<double> stepper(run.plain);
-    std::vector<double> velocity;
-    if (run.scene.tables.empty() || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
-        return "";
-    std::vector<double> ahead = {result.time + request.step};
-    for (std::size_t k = 0; k < velocity.size(); ++k) ahead.push_back(result.q[k] + request.step * velocity[k]);
+    const auto velocity = run.scene.tables.empty() ? std::nullopt : velocity_at_stop(run, request, result);
+    if (!velocity) return "";
+    std::vector<double> ahead = straight_on(result, *velocity, request.step);
     ahead.insert(ahead.end(), result.p.begin(), result.p.end());
     const std::string what = observers.domains.text(observers.parameters, ahead.data());
     if (what.empty()) return "";

@@ -394,8 +394,7 @@ Proof prove(const Scene& written, const MethodChoice& method,
     taken_steps(rows, derivation, kernel, exact_kernel, start, exact, say);
     say("checking symplecticity and reversal", 0.85);
     const auto states = states_along(kernel, start);
-    const bool forced = std::any_of(derivation.system.outer_force.begin(), derivation.system.outer_force.end(),
-                                    [](const GiNaC::ex& force) { return !force.is_zero(); });
+    const bool forced = derivation.system.has_forces();
     if (!scene.constraints.empty())
         symplecticity_on_constraints(rows, exact_kernel, quadruple_start, exact.step, forced);
     else if (with_tangent)

@@ -140,8 +140,7 @@ void Describer::separable_system() {
                 sum += inverse(static_cast<std::size_t>(k), l) * system.hessian(l, static_cast<std::size_t>(j));
         if (!sum.is_zero()) S.put(k, j, sum);
     }
-    const bool forced = std::any_of(system.outer_force.begin(), system.outer_force.end(),
-                                    [](const GiNaC::ex& force) { return !force.is_zero(); });
+    const bool forced = system.has_forces();
     vector("acceleration", "D1", "",
            forced ? "negative acceleration, M^-1 (grad V - F)" : "negative acceleration, M^-1 grad V",
            by_coordinate("W"), W);
@@ -154,8 +153,7 @@ void Describer::general_system() {
     const System& system = d_.system;
     section("The system");
     vector("momentum", "D25", "", "momentum, dL/dq'", by_coordinate("p"), system.momentum);
-    const bool forced = std::any_of(system.outer_force.begin(), system.outer_force.end(),
-                                    [](const GiNaC::ex& force) { return !force.is_zero(); });
+    const bool forced = system.has_forces();
     vector("force", "D25", "", forced ? "force, dL/dq + F" : "force, dL/dq", by_coordinate("f"), system.force);
     second_derivatives("momentum_by_velocity", "dp/dq'", "p_v", system.momentum_v);
     second_derivatives("momentum_by_position", "dp/dq", "p_q", system.momentum_q);

@@ -257,8 +257,7 @@ private:
         std::string text =
             fmt::format("// SPDX-License-Identifier: MIT\n// {}: {}.\n//\n", name_, comment_line(d_.scene.title));
         text += wrapped("// Lagrangian   L = " + comment_line(d_.scene.lagrangian_text), "//                  ");
-        const bool forced = std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
-                                        [](const GiNaC::ex& force) { return !force.is_zero(); });
+        const bool forced = d_.system.has_forces();
         text += fmt::format("// Method       {}: order {}, {}\n", d_.quadrature.method.name(), d_.quadrature.order(),
                             forced ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic and symmetric");
         text += fmt::format(

@@ -434,4 +434,10 @@ std::string canonical_text(const GiNaC::ex& expression, Notation notation) {
     return formula(graph, graph.from(expression, inputs), notation);
 }
 
+std::string short_text(const GiNaC::ex& expression) {
+    constexpr std::size_t longest = 120;
+    const std::string text = canonical_text(expression);
+    return text.size() <= longest ? text : fmt::format("a formula of {} characters", text.size());
+}
+
 }  // namespace lobatto

@@ -28,6 +28,8 @@ std::string decimal(const cln::cl_R& value, int digits);
 // A GiNaC expression as a person reads it, in an order that does not change from run to run. Symbols are ordered by
 // name.
 std::string canonical_text(const GiNaC::ex& expression, Notation notation = Notation::text);
+// For messages: of a long one only how long it is.
+std::string short_text(const GiNaC::ex& expression);
 
 // A name for LaTeX: theta_1' becomes \dot{\theta}_{1}.
 std::string latex_name(const std::string& name);

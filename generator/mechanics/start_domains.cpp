@@ -89,11 +89,6 @@ private:
 
 }  // namespace
 
-std::string short_text(const ex& expression) {
-    const std::string text = canonical_text(expression);
-    return text.size() <= 120 ? text : fmt::format("a formula of {} characters", text.size());
-}
-
 std::string values_in(const ex& expression, const System& system, const Formulas& start) {
     std::string text;
     int shown = 0;

@@ -16,7 +16,6 @@ struct System;
 // What formulas ask for as they are written, though they may have lost it since: a/a, sqrt(a)^2. Throws InputError.
 void require_domains(const Scene& scene, const System& system, Formulas& start);
 
-std::string short_text(const GiNaC::ex& expression);
 // "x = 0, x' = 1": what of the start an expression holds.
 std::string values_in(const GiNaC::ex& expression, const System& system, const Formulas& start);
 

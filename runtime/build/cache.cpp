@@ -129,9 +129,8 @@ void check_parent(const fs::path& folder, const fs::path& parent) {
     const auto is_foreign = [](uid_t user) { return user != 0 && user != ::geteuid(); };
     if (is_foreign(link.st_uid) || is_foreign(status.st_uid))
         fail_untrusted(folder, parent.string() + " belongs to another user", "make that yours (chown)");
-    // A group of one's own is no stranger: with umask 002, folders such as ~/.cache are writable by it.
-    const mode_t strangers = status.st_gid == ::getegid() ? S_IWOTH : S_IWGRP | S_IWOTH;
-    if (S_ISDIR(status.st_mode) && (status.st_mode & strangers) != 0 && (status.st_mode & S_ISVTX) == 0)
+    if (S_ISDIR(status.st_mode) && strangers_can_write(status, Writers::owner_and_own_group) &&
+        (status.st_mode & S_ISVTX) == 0)
         fail_untrusted(folder, "other users may rename what is in " + parent.string(),
                        "take their permission to write there (chmod go-w)");
 }
@@ -158,7 +157,7 @@ std::string cache_folder() {
     const char* reason = nullptr;
     if (link.st_uid != ::geteuid() || status.st_uid != ::geteuid())
         reason = "it belongs to another user";
-    else if (!only_we_can_write(status, Writers::owner))
+    else if (strangers_can_write(status, Writers::owner))
         reason = "other users may write to it";
     if (reason != nullptr) fail_untrusted(folder, reason, "make it yours alone (chmod 700)");
     // Behind links the folder has other parents than those of its name.
@@ -218,7 +217,7 @@ void CacheEntry::publish(const std::string& file) const {
     const std::string built = building_path() + "/" + file;
     ::chmod(built.c_str(), 0700);  // whatever the umask was
     const PrivateFile object = read_private_file(built, Writers::owner);
-    if (!object.is_whole) fail("read", built, object.error);
+    if (!object.is_whole) fail("read", built, object.error != 0 ? object.error : EPERM);
     const int descriptor = ::open(built.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0 || ::fsync(descriptor) != 0) fail("write", built, errno);
     ::close(descriptor);

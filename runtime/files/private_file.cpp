@@ -10,10 +10,9 @@
 
 namespace lobatto {
 
-bool only_we_can_write(const struct stat& status, Writers writers) {
+bool strangers_can_write(const struct stat& status, Writers writers) {
     const bool trusts_group = writers == Writers::owner_and_own_group && status.st_gid == ::getegid();
-    const mode_t strangers = trusts_group ? S_IWOTH : S_IWGRP | S_IWOTH;
-    return status.st_uid == ::geteuid() && (status.st_mode & strangers) == 0;
+    return (status.st_mode & (trusts_group ? S_IWOTH : S_IWGRP | S_IWOTH)) != 0;
 }
 
 PrivateFile read_private_file(const std::string& path, Writers writers) {
@@ -24,13 +23,16 @@ PrivateFile read_private_file(const std::string& path, Writers writers) {
         return file;
     }
     struct stat status {};
-    if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && only_we_can_write(status, writers)) {
+    if (::fstat(descriptor, &status) != 0) {
+        file.error = errno;
+    } else if (S_ISREG(status.st_mode) && status.st_uid == ::geteuid() && !strangers_can_write(status, writers)) {
         file.is_private = true;
         file.content.resize(static_cast<std::size_t>(status.st_size));
         std::size_t done = 0;
         while (done < file.content.size()) {
             const ssize_t count = ::read(descriptor, file.content.data() + done, file.content.size() - done);
             if (count < 0 && errno == EINTR) continue;
+            if (count < 0) file.error = errno;
             if (count <= 0) break;
             done += static_cast<std::size_t>(count);
         }

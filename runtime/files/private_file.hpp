@@ -11,10 +11,10 @@ namespace lobatto {
 // A group of one's own is no stranger: with umask 002 it can write what one writes.
 enum class Writers { owner, owner_and_own_group };
 
-bool only_we_can_write(const struct stat& status, Writers writers);
+bool strangers_can_write(const struct stat& status, Writers writers);
 
 struct PrivateFile {
-    int error = 0;            // errno, where it cannot be opened
+    int error = 0;            // errno, where it cannot be opened or read
     bool is_private = false;  // a regular file that only we can write to
     bool is_whole = false;    // all of it was read
     std::string content;

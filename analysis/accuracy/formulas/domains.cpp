@@ -126,12 +126,10 @@ std::string Domains::text(const std::vector<double>& parameters, const double* r
     for (const Condition& condition : conditions_) {
         if (!condition.of_way || holds(condition, variables)) continue;
         const DomainCondition& written = condition.written;
-        std::string formula = canonical_text(written.expression);
-        if (formula.size() > 120) formula = "a formula";
         std::string operation = written.operation;  // "the table a.csv, which goes from 0 to 2,"
         if (operation.ends_with(',')) operation.pop_back();
         return fmt::format("{}, line {} column {}, is of {} = {:.6g}", operation, written.at.line, written.at.column,
-                           formula, condition.tape(variables));
+                           short_text(written.expression), condition.tape(variables));
     }
     return "";
 }

@@ -47,9 +47,7 @@ void check_mass(const Scene& scene, const System& system) {
 }
 
 std::string slope_text(const std::string& of, const GiNaC::symbol& by, const ex& value) {
-    std::string text = canonical_text(value);
-    if (text.size() > 200) text = "a formula of " + std::to_string(text.size()) + " characters";
-    return "d" + of + "/d" + by.get_name() + " = " + text;
+    return "d" + of + "/d" + by.get_name() + " = " + short_text(value);
 }
 
 }  // namespace
