@@ -14,6 +14,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/say.hpp"
+#include "generator/emit/header.hpp"
 #include "library/whole.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
@@ -56,6 +57,7 @@ void print_use(const KernelSource& source, const EmitCommand& options, const Sce
     const Precision numbers = scene.method.numbers;
     const bool quadruple = numbers == Precision::quadruple, hybrid = has_hybrid_stepper(scene);
     const char* const exact = numbers == Precision::double_double ? " -ffp-contract=off" : "";
+    const std::string tolerance = tolerance_setting(scene, source.form);
     const std::string include = options.standalone ? "" : options.no_support ? " -I runtime/kernel" : "";
     fmt::print(
         std::cout,
@@ -69,7 +71,7 @@ void print_use(const KernelSource& source, const EmitCommand& options, const Sce
         : has_many_digits(numbers) ? " -lmpfr"
                                    : "",
         exact, hybrid ? "HybridStepper" : "Stepper", hybrid ? "q()" : "q", hybrid ? "; .events()" : "",
-        scene.method.tolerance > 0 ? fmt::format("  stepper.{};\n", tolerance_setting(scene)) : "");
+        tolerance.empty() ? "" : fmt::format("  stepper.{};\n", tolerance));
 }
 
 // The folder, made where it is not there, and the file in it, which must not be the scene.

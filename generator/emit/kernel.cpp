@@ -12,6 +12,7 @@
 #include "generator/emit/angles.hpp"
 #include "generator/emit/declarations.hpp"
 #include "generator/emit/function_text.hpp"
+#include "generator/emit/header.hpp"
 #include "generator/emit/looped.hpp"
 #include "generator/emit/measured.hpp"
 #include "generator/emit/support.hpp"
@@ -45,22 +46,12 @@ public:
             if (program.name == "stage" && has_near_angles()) angles_ = angles_of(p_.graph, program);
     }
 
-    std::string header(const KernelSource& source) const {
-        std::string text = preamble(source.name, source.report);
-        text += "#pragma once\n\n";
-        text += before_support(options_.precision);
-        text += options_.support_text ? options_.support_text(source.support) : "#include \"kernel.hpp\"\n";
-        std::string formulas = source.formulas;
-        const std::string without = parameters(Values::left_out);
-        formulas.replace(formulas.find(without), without.size(), parameters(Values::of_scene));
-        return text + formulas;
-    }
-
     std::string formulas(const std::string& name) const {
         std::string text = fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
         text += shapes(d_, options_.precision, name) + costs() + near_angles() + tables(d_, options_.precision) +
                 measured_values(p_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") +
-                parameters(Values::left_out) + coefficients() + prepare(name) + set_inputs();
+                parameters(d_.scene, options_.precision, Values::left_out) + coefficients() + prepare(name) +
+                set_inputs();
         for (const RowFunction& row : looped_.row_functions()) text += row_function(row);
         for (const Declaration& declaration : declarations(d_.structure.form())) text += function(declaration);
         if (is_map() && n_ > 1)
@@ -71,7 +62,7 @@ public:
                 "q1, "
                 "number* p1) {\n"
                 "        lobatto::apply_map<coordinates>(k.Phi_minus_I, q, p, q1, p1);\n    }\n";
-        if (is_map() && !forced())
+        if (is_map() && !d_.system.has_forces())
             text +=
                 "\n    // (D21) The energy that the steps conserve exactly, nearly h times H(q, p); q, p: n.\n"
                 "    template <class given, class number>\n"
@@ -83,39 +74,6 @@ public:
     }
 
 private:
-    enum class Values { of_scene, left_out };
-
-    std::string preamble(const std::string& name, const std::vector<PassReport>& report) const {
-        const Operations& now = report.back().after;
-        std::string text = "// SPDX-License-Identifier: MIT\n";
-        text += fmt::format("// {}: {}.\n", name, comment_safe(d_.scene.title));
-        text +=
-            "// Written by Lobatto from a scene file; edit the scene, not this file. Formula numbers (D..): "
-            "docs/derivation.md.\n//\n";
-        text += wrapped("// Lagrangian   L = " + comment_safe(d_.scene.lagrangian_text), "//                  ");
-        text += fmt::format("// Method       {}: order {}, {}\n", d_.quadrature.method.name(), d_.quadrature.order(),
-                            forced() ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
-        if (const double tolerance = d_.scene.method.tolerance; tolerance > 0)
-            text += fmt::format("// Tolerance    {}, once it is set: stepper.{}; else steps are iterated to rounding\n",
-                                tolerance, tolerance_setting(d_.scene));
-        text += "// Coordinates  ";
-        for (int k = 0; k < n_; ++k) {
-            const Coordinate& coordinate = d_.scene.coordinates[static_cast<std::size_t>(k)];
-            text += fmt::format("{}q[{}] = {}{}", k > 0 ? ", " : "", k, coordinate.name,
-                                coordinate.unit.empty() ? "" : " [" + comment_safe(coordinate.unit) + "]");
-        }
-        text += "\n";
-        for (const Finding& finding : d_.findings)
-            if (finding.holds)
-                text += wrapped(fmt::format("// Structure    {}: {}", finding.name, comment_safe(finding.reason)),
-                                "//              ");
-        text += fmt::format(
-            "// Operations   {} in all, {} as derived: {} additions, {} multiplications, {} divisions, {} functions\n",
-            now.total(), report.front().after.total(), now.additions, now.multiplications, now.divisions,
-            now.functions);
-        return text;
-    }
-
     // Accelerations of few operations are put where they are used: a call would cost as much. So is a stage that gives
     // angles near: at the start of a step nothing else is asked of it.
     bool is_put_in_place(const Declaration& declaration) const {
@@ -147,45 +105,6 @@ private:
     }
     bool takes_angles(const Declaration& declaration) const {
         return !angles_.empty() && std::string(declaration.program) == "stage";
-    }
-
-    std::string parameters(Values values) const {
-        std::string text = "\n    // Values of the scene; change them before prepare().\n    struct Parameters {\n";
-        std::vector<std::string> lines;
-        std::size_t widest = 0;
-        for (const Parameter& parameter : d_.scene.parameters) {
-            Graph graph;
-            const Id value =
-                graph.constant(values == Values::of_scene
-                                   ? cln::the<cln::cl_R>(d_.scene.evaluate(parameter.value, parameter.name).to_cl_N())
-                                   : cln::cl_R(0));
-            lines.push_back(fmt::format("real {} = {};", identifier(parameter.name),
-                                        formula(graph, value, Notation::cpp, {}, options_.precision)));
-            widest = std::max(widest, lines.back().size());
-        }
-        for (std::size_t i = 0; i < lines.size(); ++i) {
-            const Parameter& parameter = d_.scene.parameters[i];
-            std::string unit = comment_safe(parameter.unit);
-            if (!unit.empty()) unit = "[" + unit + "]";
-            if (identifier(parameter.name) != parameter.name)  // C++ or <complex.h> has that name
-                unit += (unit.empty() ? "" : " ") + ("the scene's " + parameter.name);
-            if (parameter.is_input) unit += (unit.empty() ? "" : " ") + std::string("an input: set_inputs()");
-            text += unit.empty()
-                        ? fmt::format("        {}\n", lines[i])
-                        : fmt::format("        {:<{}}  // {}\n", lines[i], std::min<std::size_t>(widest, 60), unit);
-        }
-        text += "    };\n    static real& parameter(Parameters& p, int index) {\n";
-        if (d_.scene.parameters.empty()) {
-            text +=
-                "        (void)p;\n        (void)index;\n        static real none = 0;\n        return none;\n    }\n";
-            return text;
-        }
-        text += "        switch (index) {\n";
-        for (std::size_t i = 0; i + 1 < d_.scene.parameters.size(); ++i)
-            text += fmt::format("            case {}: return p.{};\n", i, identifier(d_.scene.parameters[i].name));
-        text += fmt::format("            default: return p.{};\n        }}\n    }}\n",
-                            identifier(d_.scene.parameters.back().name));
-        return text;
     }
 
     std::string coefficients() const {
@@ -401,10 +320,6 @@ private:
         return d_.structure.neighbours() && has_lanes(options_.precision) &&
                std::string(declaration.program) == "minus_acceleration";
     }
-    bool forced() const {
-        return std::any_of(d_.system.outer_force.begin(), d_.system.outer_force.end(),
-                           [](const GiNaC::ex& force) { return !force.is_zero(); });
-    }
     bool is_map() const { return d_.structure.form() == Form::linear_map; }
 
     const Derivation& d_;
@@ -419,16 +334,6 @@ private:
 };
 
 }  // namespace
-
-bool has_hybrid_stepper(const Scene& scene) {
-    return !scene.watched().empty() && !scene.clock;
-}
-
-std::string tolerance_setting(const Scene& scene) {
-    const double tolerance = scene.method.tolerance;
-    return has_hybrid_stepper(scene) ? fmt::format("set_tolerance({})", tolerance)
-                                     : fmt::format("tolerance = {}", tolerance);
-}
 
 KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& optimised, const EmitOptions& options) {
     KernelSource source;
@@ -447,7 +352,7 @@ KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& 
     source.digest = digest_of(source.formulas);
     const std::string empty = "digest = \"\"";
     source.formulas.replace(source.formulas.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
-    source.header = emitter.header(source);
+    source.header = header(derivation, source, options);
     return source;
 }
 

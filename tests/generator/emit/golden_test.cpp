@@ -343,6 +343,8 @@ TEST_CASE("emit says how a program asks for the tolerance of the scene; the plai
                          "stepper.tolerance = 1e-06;"));
     CHECK(test::contains(emitted({bouncing, "--tolerance", "1e-6"}).out, "  stepper.set_tolerance(1e-06);\n"));
     CHECK_FALSE(test::contains(emitted({scene}).out, "tolerance"));
+    const std::string linear = tree + "/scenes/harmonic_oscillator.toml";  // one matrix: nothing is iterated
+    CHECK_FALSE(test::contains(emitted({linear, "--tolerance", "1e-6"}).out, "tolerance"));
     const test::Finished plain = emitted({scene, "--plain", "--tolerance", "1e-6"});
     CHECK(plain.exit_code == 2);
     CHECK(test::contains(plain.err, "--tolerance: the plain integrator iterates to rounding"));
