@@ -187,23 +187,46 @@ void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
 
 namespace {
 
-// The factors of a product. x^n/x is x^(n - 1), which has a value at x = 0: GiNaC's derivative of x^n is n x^n/x.
+GiNaC::exvector parts_of(const GiNaC::ex& product) {
+    if (!GiNaC::is_a<GiNaC::mul>(product)) return {product};
+    return {product.begin(), product.end()};
+}
+
+std::pair<GiNaC::ex, GiNaC::ex> base_and_exponent(const GiNaC::ex& factor) {
+    return GiNaC::is_a<GiNaC::power>(factor) ? std::pair(factor.op(0), factor.op(1)) : std::pair(factor, GiNaC::ex(1));
+}
+
+// Whether a product holds one over a factor of `base`: 1/x, where the base is x/a.
+bool is_divided_by(const GiNaC::ex& product, const GiNaC::ex& base) {
+    const GiNaC::exvector parts = parts_of(product), divisors = parts_of(GiNaC::pow(base, -1));
+    return std::any_of(divisors.begin(), divisors.end(), [&](const GiNaC::ex& divisor) {
+        const auto [of, exponent] = base_and_exponent(divisor);
+        return exponent.info(GiNaC::info_flags::negative) &&
+               std::any_of(parts.begin(), parts.end(), [&, of = of](const GiNaC::ex& part) {
+                   const auto [other, power] = base_and_exponent(part);
+                   return other.is_equal(of) && power.info(GiNaC::info_flags::negative);
+               });
+    });
+}
+
+// The factors of a product. B^n/B is B^(n - 1), which has a value where B is 0: GiNaC's derivative of B^n is n B^n
+// B'/B.
 GiNaC::exvector factors_of(const GiNaC::ex& product) {
-    const auto base_of = [](const GiNaC::ex& factor) {
-        return GiNaC::is_a<GiNaC::power>(factor) ? factor.op(0) : factor;
-    };
-    GiNaC::exvector factors(product.begin(), product.end());
+    GiNaC::exvector factors = parts_of(product);
     for (std::size_t i = 0; i < factors.size(); ++i) {
-        const bool is_open = GiNaC::is_a<GiNaC::power>(factors[i]) && !GiNaC::is_a<GiNaC::numeric>(factors[i].op(1));
-        if (!is_open) continue;
-        const GiNaC::ex base = factors[i].op(0);
-        GiNaC::ex exponent = 0;
-        for (const GiNaC::ex& factor : factors)
-            if (base_of(factor).is_equal(base)) exponent += GiNaC::is_a<GiNaC::power>(factor) ? factor.op(1) : 1;
-        if (exponent.is_equal(factors[i].op(1))) continue;
-        std::erase_if(factors, [&](const GiNaC::ex& factor) { return base_of(factor).is_equal(base); });
-        factors.push_back(GiNaC::pow(base, exponent));
-        i = static_cast<std::size_t>(-1);  // from the first on: one power less
+        const auto [base, exponent] = base_and_exponent(factors[i]);
+        if (GiNaC::is_a<GiNaC::numeric>(exponent)) continue;
+        GiNaC::exvector others = factors;
+        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+        GiNaC::ex rest = GiNaC::mul(others), less = exponent;
+        while (is_divided_by(rest, base)) {
+            for (const GiNaC::ex& divisor : parts_of(GiNaC::pow(base, -1))) rest *= GiNaC::pow(divisor, -1);
+            less -= 1;
+        }
+        if (less.is_equal(exponent)) continue;
+        factors = parts_of(rest);
+        factors.insert(factors.begin(), GiNaC::pow(base, less));
+        i = 0;  // the one that is done; others may follow
     }
     return factors;
 }

@@ -137,6 +137,10 @@ TEST_CASE("a power with a parameter in it asks of its base what the value of the
     // x^n/x, as in its derivative, is x^(n - 1).
     for (const char* n : {"4", "2", "2.5"}) CHECK(begins_at("0", n, "x^n") == "accepted");
     CHECK(begins_at("0", "1.5", "x^n").find("the second derivative") != std::string::npos);
+    for (const char* power : {"(x/k)^n", "(k*x)^n", "(-x)^n", "abs(x + 1e-30)^n", "(x^2)^n", "(2*x)^n", "(x + x*k)^n"})
+        CHECK_MESSAGE(begins_at("0", "4", power) == "accepted", power);
+    for (const char* power : {"(1 - x)^n", "(2*x - 2)^n", "(k - x)^n", "((x - 1)*k)^n"})
+        CHECK_MESSAGE(begins_at("1", "4", power) == "accepted", power);
     for (const char* n : {"-2", "-0.5"}) CHECK(begins_at("0", n, "x^n").find("has no value") != std::string::npos);
     CHECK(begins_at("-1", "2", "x^(2*n)") == "accepted");
     CHECK(begins_at("-1", "2", "x^(n + x)") != "accepted");
