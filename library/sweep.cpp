@@ -104,9 +104,9 @@ void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& t
 
 OpenedSweep open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options) {
     if (options.threads < 0)
-        throw lobatto::InputError(fmt::format("threads: {} is no number of threads", options.threads));
+        throw lobatto::InputError(fmt::format("--threads: {} is no number of threads", options.threads));
     if (options.steps && !options.until.empty())
-        throw lobatto::InputError("steps: the end is given by until; leave one of them out");
+        throw lobatto::InputError("--steps: the end is given by --until; leave one of them out");
     auto study = in_algebra([&] {
         lobatto::Scene read =
             options.keep.empty() ? scene.parts().scene : read_scene(scene.parts().scene.source, options.keep);

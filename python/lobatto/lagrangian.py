@@ -50,9 +50,9 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``.
 
     ``time``: its name where it stands in the Lagrangian or a force, such as "t". ``method``: a table such as
-    ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a
-    scene file. ``inputs``: names of parameters that ``Stepper.set`` may change before each step. ``extra``: more of a
-    scene file, as text. Scenes with arrays are written as such a text: ``Scene.from_text``.
+    ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a scene file. ``inputs``: names of
+    parameters that ``Stepper.set`` may change before each step. ``extra``: more of a scene file, as text. Scenes with
+    arrays are written as such a text: ``Scene.from_text``.
     """
     moving = set(re.findall(r"([A-Za-z_]\w*)'", re.sub("#[^\n]*", "", lagrangian)))  # without comments
     lines = []

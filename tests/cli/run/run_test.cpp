@@ -718,6 +718,22 @@ TEST_CASE("a run that leaves the domain of a formula is told, though the formula
     }
 }
 
+TEST_CASE("a run that leaves the domain of a power is told where the parameter in it asks for a domain") {
+    const test::TemporaryFolder folder;
+    const std::string scene = folder / "scene.toml";
+    test::write_text(
+        scene,
+        "lagrangian = \"q'^2/2 - q*(q - 3)^n/(q - 3)^n\"\n[coordinates]\nq = { position = 4, velocity = 0 }\n"
+        "[parameters]\nn = 2\n[run]\nstep = 0.1\nuntil = 3\n");
+    const auto done = [&](const std::string& n) {
+        return test::run({LOBATTO_PROGRAM, "run", scene, "--set", "n=" + n, "-o", folder / "out.csv"});
+    };
+    CHECK(done("2").exit_code == 0);
+    const test::Finished left = done("1.5");
+    CHECK(left.exit_code == 3);
+    CHECK(test::contains(left.err, "a power, line 1 column 33, is of q - 3 = -0.125, and has no value there"));
+}
+
 TEST_CASE("a broken power of max(u, 0) has no value beyond the switch, which is told; a smooth one goes on") {
     const test::TemporaryFolder folder;
     const auto done = [&](const std::string& indentation) {
