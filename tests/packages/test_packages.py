@@ -55,6 +55,7 @@ def test_pip_installs_the_module_from_the_tree_without_network(tmp_path):
     python = environment / "bin" / "python"
     outside = {**{name: value for name, value in os.environ.items() if name != "PYTHONPATH"}, "HOME": str(home),
                "PIP_CONFIG_FILE": os.devnull}
+    outside.setdefault("CCACHE_DIR", str(pathlib.Path.home() / ".cache" / "ccache"))  # another home compiles nothing anew
     # No index may be asked: neither for the module nor for what builds it.
     succeed(python, "-m", "pip", "install", "--no-index", "--no-cache-dir", ROOT, env=outside, cwd=tmp_path)
     said = succeed(python, ROOT / "examples" / "python" / "first_pendulum.py", "picture.png", env=outside, cwd=tmp_path)
