@@ -25,23 +25,25 @@ constexpr double of_energy = 0x1p19;       // roundings: 1e-10 in double
 constexpr double of_tangent_map = 0x1p13;  // roundings in a symplectic defect: 5e3 in quadruple's bound
 
 struct State {
-    Parts q, p;
+    Parts time, q, p;
 };
 
 State start_of(const NumberStepper& stepper, const ExactStart& start) {
-    State state{parts_of(start.q, stepper.parts()), parts_of(start.rate, stepper.parts())};
-    if (start.from_velocity) state.p = stepper.momentum(as_parts({0}, stepper.parts()), state.q, state.p);
+    State state{as_parts({0}, stepper.parts()), parts_of(start.q, stepper.parts()),
+                parts_of(start.rate, stepper.parts())};
+    if (start.from_velocity) state.p = stepper.momentum(state.time, state.q, state.p);
     return state;
 }
 
 // Moves the state; false where a step fails.
-bool take_steps(NumberStepper& stepper, double time, State& state) {
-    Parts t = as_parts({time}, stepper.parts()), records, events;
+bool take_steps(NumberStepper& stepper, State& state) {
+    Parts records, events;
     lobatto_advance call{};
     call.steps = steps_there;
-    if (stepper.start(t, state.q, state.p) != LOBATTO_OK || stepper.advance(call, records, events) != LOBATTO_OK)
+    if (stepper.start(state.time, state.q, state.p) != LOBATTO_OK ||
+        stepper.advance(call, records, events) != LOBATTO_OK)
         return false;
-    stepper.state(t, state.q, state.p);
+    stepper.state(state.time, state.q, state.p);
     return true;
 }
 
@@ -88,7 +90,7 @@ std::vector<ProofRow> prove_numbers(Precision numbers, const Kernel& kernel, con
 
     const std::string against = fmt::format("{} steps against quadruple, {}", steps_there, name),
                       back = fmt::format("{} steps and back, {}", steps_there, name);
-    if (!take_steps(own, 0, there) || !take_steps(reference, 0, exact) || !take_steps(reference, 0, disturbed)) {
+    if (!take_steps(own, there) || !take_steps(reference, exact) || !take_steps(reference, disturbed)) {
         rows.push_back({against, "not decided", "a step fails on the way", true, ""});
         return rows;
     }
@@ -102,10 +104,9 @@ std::vector<ProofRow> prove_numbers(Precision numbers, const Kernel& kernel, con
                           of_steps * (kernel->epsilon + quadruple->epsilon),
                           "the kernel in " + name + " does not take the steps that the one in quadruple takes"));
     if (kernel->has_energy != 0 && quadruple->has_energy != 0) {
-        const Parts time = as_parts({0}, own.parts()), exact_time = as_parts({0}, reference.parts());
         Parts H(own.parts()), exact_H(reference.parts());
-        const bool has_both = own.energy(time.data(), begin.q.data(), begin.p.data(), H.data()) == LOBATTO_OK &&
-                              reference.energy(exact_time.data(), exact_begin.q.data(), exact_begin.p.data(),
+        const bool has_both = own.energy(begin.time.data(), begin.q.data(), begin.p.data(), H.data()) == LOBATTO_OK &&
+                              reference.energy(exact_begin.time.data(), exact_begin.q.data(), exact_begin.p.data(),
                                                exact_H.data()) == LOBATTO_OK;
         const std::string claim = "H at the start, " + name + " against quadruple";
         if (has_both)
@@ -115,7 +116,7 @@ std::vector<ProofRow> prove_numbers(Precision numbers, const Kernel& kernel, con
     }
     State home = there;
     prepare(own, -step);
-    if (take_steps(own, steps_there * step.to_double(), home))
+    if (take_steps(own, home))
         rows.push_back(within(back, distance(begin, own.parts(), home, own.parts()), 2 * of_steps * kernel->epsilon,
                               "the step is not its own inverse with -h"));
     else

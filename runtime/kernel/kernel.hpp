@@ -24,6 +24,7 @@
 #include "iteration/convergence.hpp"
 #include "iteration/ensemble_fixed_point.hpp"
 #include "iteration/ensemble_tables.hpp"
+#include "iteration/extrapolation.hpp"
 #include "iteration/fixed_point.hpp"
 #include "iteration/galerkin.hpp"
 #include "iteration/galerkin_constraints.hpp"

@@ -16,6 +16,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "convergence.hpp"
+#include "extrapolation.hpp"
 #include "stage_map.hpp"
 
 namespace lobatto {
@@ -250,11 +251,12 @@ private:
             for (int i = 0; i < s; ++i) sum += K::extrapolation[j * s + i] * last[i];
             return sum;
         };
+        const bool continues = has_history && may_extrapolate<K>();
         for (int c = 0; c < constraints; ++c)
-            for (int j = 0; j < s; ++j) multipliers[c * s + j] = has_history ? continued(lambda + c * s, j) : real(0);
+            for (int j = 0; j < s; ++j) multipliers[c * s + j] = continues ? continued(lambda + c * s, j) : real(0);
         for (int c = 0; c < n; ++c) {
             real W[m];
-            for (int j = 0; j < m; ++j) W[j] = has_history ? continued(w + c * s, j) : real(0);
+            for (int j = 0; j < m; ++j) W[j] = continues ? continued(w + c * s, j) : real(0);
             for (int part = 0; part < parts; ++part) {
                 V next = fused(drift[part], V(v[c]), V(q[c]));
                 for (int j = 0; j < m; ++j) next = fused(move[j][part], V(W[j]), next);

@@ -10,6 +10,7 @@
 #include "../base/dense.hpp"
 #include "../base/numbers.hpp"
 #include "../iteration/constrained_fixed_point.hpp"
+#include "../iteration/extrapolation.hpp"
 #include "../iteration/galerkin.hpp"
 #include "../iteration/galerkin_constraints.hpp"
 #include "../iteration/velocity_of_momentum.hpp"
@@ -328,7 +329,7 @@ private:
 
     Status step_in(Arrays& a) {
         Status status = Status::not_converged;
-        if (has_history) {
+        if (has_history && may_extrapolate<K>()) {
             for (int b = 0; b < active; ++b) {  // the last step's polynomial, beyond its end
                 const real* const last = Y + Layout::index(b, 0);
                 for (int j = 0; j < m; ++j) {
