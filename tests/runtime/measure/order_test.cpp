@@ -174,6 +174,22 @@ TEST_CASE("a Stoermer-Verlet kernel does not pass for one of order 4, nor a kern
     CHECK(bears_out(sixth, 4, true));  // a linear system may converge faster
 }
 
+TEST_CASE("high orders may still rise, and weakly nonlinear motions converge faster; other orders do not pass") {
+    const auto measured = [](std::vector<double> orders) {
+        Convergence convergence;
+        convergence.settled = true;
+        convergence.order = orders.back();
+        for (const double order : orders) convergence.rows.push_back({0, 0, order});
+        return convergence;
+    };
+    CHECK(bears_out(measured({0, 19.31, 20.22, 20.88}), 22, false));  // a nonlinear fall onto a floor
+    CHECK(!bears_out(measured({0, 20.8, 20.85, 20.88}), 22, false));
+    CHECK(bears_out(measured({0, 23.99, 24.1}), 22, false));  // a harmonic oscillator under a gauge
+    CHECK(!bears_out(measured({0, 24.9, 24.8}), 22, false));
+    CHECK(!bears_out(measured({0, 5.95, 6.0}), 4, false));
+    CHECK(!bears_out(measured({0, 3.4, 3.45}), 4, false));
+}
+
 TEST_CASE("a ladder that begins far too coarse is refined until the orders settle") {
     const Convergence convergence = measure_order(quadruple_kernel(test::pendulum_scene(3)), wide_swing, 40);
     CHECK(convergence.settled);
