@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -294,6 +295,24 @@ TEST_CASE("what a blow in measured values does is measured, in the time and alon
         CHECK(absolute_error(done.out) > error / 2);  // without looking at the table: 1e-14
         CHECK(absolute_error(done.out) < error * 2);
     }
+}
+
+TEST_CASE("the companion's steps end at the points of measured values in time, whether those of the run do or not") {
+    const auto place_with = [](double step) {
+        auto place = std::make_unique<Place>(
+            scene_of("q'^2/2 - q^2/2 + q*table(\\\"force.csv\\\", t)", swinging, "points = 12", step, 2));
+        test::write_text(place->folder / "force.csv", "0, 0.1\n0.5, 0.3\n1, -0.2\n1.5, 0.7\n2, 1.9\n");
+        return place;
+    };
+    const auto exact = place_with(0.125);
+    REQUIRE(exact->run({"--unmeasured"}).exit_code == 0);
+    // Steps that end at t = 1 have errors of rounding. A companion whose steps did not printed 1.5e-8.
+    for (const double step : {0.25, 0.5, 1.0}) CHECK(absolute_error(place_with(step)->run().out) < 1e-14);
+    const auto across = place_with(0.4);
+    const test::Finished done = across->run();
+    const double error = std::fabs(across->end()[1] - exact->end()[1]);
+    CHECK(error > 1e-8);
+    CHECK(absolute_error(done.out) == doctest::Approx(error).epsilon(0.1));
 }
 
 TEST_CASE("a pulse far from the start is not taken for nothing, and what rounds to zero is zero") {

@@ -66,6 +66,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
     request_.tolerance = request.tolerance * finer_iteration;
     pulses_ = find_pulses(outline, request.parameters, request.time, time_after(request, request.steps),
                           std::fabs(request.step));
+    knots_ = find_knots(outline, request.parameters, request.time, time_after(request, request.steps));
     const std::int64_t comparisons =
         std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
@@ -174,13 +175,27 @@ bool Companion::is_near_pulse(double from, double step) const {
     return false;
 }
 
+// A knot that the step crosses, not one at which it begins or ends but for rounding.
+std::optional<double> Companion::knot_within(double from, double step) const {
+    const double margin = finest * std::fmax(std::fabs(step), std::fabs(from));
+    const double begin = std::fmin(from, from + step) + margin, end = std::fmax(from, from + step) - margin;
+    const auto first = std::lower_bound(knots_.begin(), knots_.end(), begin);
+    if (first == knots_.end() || *first >= end) return std::nullopt;
+    return *first;
+}
+
 bool Companion::can_halve(double from, double step) const {
     return std::fabs(step) > finest * std::fmax(std::fabs(request_.step), std::fabs(from));
 }
 
-// Steps shorter and shorter towards a pulse.
+// Steps shorter and shorter towards a pulse, each on one side of all knots.
 void Companion::take_finely(Place& place, double from, double step) {
     if (place.status != LOBATTO_OK || cancelled_) return;
+    if (const std::optional<double> knot = knot_within(from, step)) {
+        take_finely(place, from, *knot - from);
+        take_finely(place, *knot, from + step - *knot);
+        return;
+    }
     if (is_near_pulse(from, step) && can_halve(from, step)) {
         take_finely(place, from, step / 2);
         take_finely(place, from + step / 2, step / 2);
@@ -221,9 +236,10 @@ void Companion::take(Place& place, const Segment& part) {
         const double here = from + static_cast<double>(done) * size;
         const bool looks = !narrow_.empty() && !is_clocked() && looked_ < most_looked;
         std::int64_t count = 0;
+        const bool is_even = pulses_.empty() && knots_.empty();
         while (!looks && count < std::min(piece, part.taken - done) &&
-               (pulses_.empty() || !is_near_pulse(here + static_cast<double>(count) * size, size)))
-            count = pulses_.empty() ? std::min(piece, part.taken - done) : count + 1;
+               (is_even || !needs_parts(here + static_cast<double>(count) * size, size)))
+            count = is_even ? std::min(piece, part.taken - done) : count + 1;
         if (count == 0) {
             take_finely(place, here, size);
             ++done;

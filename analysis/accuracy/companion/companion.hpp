@@ -4,8 +4,9 @@
 // of their steps; where rounding decides, D is the error itself, about.
 //
 // Where explicit time makes short pulses, or the motion meets terms that are narrower than a step (narrow_terms.hpp),
-// which steps may miss, the companion takes short ones. In equally many times it takes steps of a number without a
-// common divisor with that of the run: oscillations that look constant to the one do not to the other.
+// which steps may miss, the companion takes short ones. Its steps end at the points of measured values in time. In
+// equally many times it takes steps of a number without a common divisor with that of the run: oscillations that look
+// constant to the one do not to the other.
 //
 // The companion begins four units in the last place beside the start: what no number of steps can know, and what grows
 // where nearby trajectories diverge, is an error too.
@@ -91,6 +92,8 @@ private:
     bool has_caught_up() const;
     bool can_halve(double from, double step) const;
     bool is_near_pulse(double from, double step) const;
+    std::optional<double> knot_within(double from, double step) const;
+    bool needs_parts(double from, double step) const { return is_near_pulse(from, step) || knot_within(from, step); }
     // 2n, of the motion until so many comparisons; 0: of what does not move, or by rounding alone.
     std::vector<double> amplitudes(std::size_t comparisons) const;
     MeasuredError compare(const TrajectoryResult& result) const;
@@ -102,6 +105,7 @@ private:
     std::vector<int> groups_;
     int rows_a_step_;
     std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
+    std::vector<double> knots_;  // at which its steps end
     NarrowTerms narrow_;         // likewise, where the motion meets them
     std::int64_t looked_ = 0;    // steps of the companion at which that was looked at
     bool is_driven_ = false;     // explicit time

@@ -97,6 +97,12 @@ public:
             add((passages[i - 1] + passages[i]) / 2, passages[i] - passages[i - 1]);
     }
 
+    std::vector<double> knots() {
+        std::sort(knots_.begin(), knots_.end());
+        knots_.erase(std::unique(knots_.begin(), knots_.end()), knots_.end());
+        return std::move(knots_);
+    }
+
     std::vector<Pulse> pulses() {
         std::sort(pulses_.begin(), pulses_.end(), [](const Pulse& a, const Pulse& b) { return a.time < b.time; });
         if (pulses_.size() > most_pulses) pulses_.resize(most_pulses);
@@ -167,6 +173,11 @@ private:
         if (c.size() != 2) return;
         for (const Bend& bend : bends_of(spline))
             if (pulses_.size() < most_pulses) add((bend.place - c[0]) / c[1], bend.width / std::fabs(c[1]));
+        const std::vector<cln::cl_R>& x = spline.x();
+        for (std::size_t i = 2; i + 2 < x.size(); ++i) {  // the second and the last but one are no knots
+            const double time = (cln::double_approx(x[i]) - c[0]) / c[1];
+            if (time > begin_ && time < end_) knots_.push_back(time);
+        }
     }
 
     double time_of_sample(std::size_t i) const { return begin_ + static_cast<double>(i) * ((end_ - begin_) / samples); }
@@ -204,19 +215,35 @@ private:
     GiNaC::exmap values_;
     GiNaC::exset motion_, known_;
     std::vector<Pulse> pulses_;
+    std::vector<double> knots_;
 };
+
+bool may_have_any(const Outline& outline) {
+    return !outline.system.autonomous || !outline.scene.switches.empty();
+}
+
+PulseFinder finder_in(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
+                      double widest) {
+    PulseFinder finder(outline.system, parameters, begin, end, widest);
+    finder.look_at(outline.system.lagrangian);
+    for (const ex& force : outline.system.outer_force) finder.look_at(force);
+    return finder;
+}
 
 }  // namespace
 
 std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
                                double widest) {
-    const SystemOutline& system = outline.system;
-    if (system.autonomous && outline.scene.switches.empty()) return {};
-    PulseFinder finder(system, parameters, begin, end, widest);
-    finder.look_at(system.lagrangian);
-    for (const ex& force : system.outer_force) finder.look_at(force);
+    if (!may_have_any(outline)) return {};
+    PulseFinder finder = finder_in(outline, parameters, begin, end, widest);
     for (const Switch& one : outline.scene.switches) finder.look_at_side(one.value);
     return finder.pulses();
+}
+
+std::vector<double> find_knots(const Outline& outline, const std::vector<double>& parameters, double begin,
+                               double end) {
+    if (outline.scene.tables.empty() || !may_have_any(outline)) return {};
+    return finder_in(outline, parameters, begin, end, 0).knots();
 }
 
 }  // namespace lobatto

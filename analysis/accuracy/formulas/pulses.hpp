@@ -21,4 +21,8 @@ struct Pulse {
 std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
                                double widest);
 
+// Inner points of tables of a linear u(t), in the order of time: the third derivative jumps there, and only steps that
+// end at them keep their order.
+std::vector<double> find_knots(const Outline& outline, const std::vector<double>& parameters, double begin, double end);
+
 }  // namespace lobatto
