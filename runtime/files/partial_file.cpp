@@ -186,6 +186,7 @@ void PartialFile::keep(std::int64_t kept) {
             throw MachineError(fmt::format(
                 "cannot continue with {} in {}: it is shorter than the run had written it. Run without --resume", what_,
                 path_));
+        is_copy_ = true;
     }
     if (ftruncate(descriptor_, kept) != 0 || lseek(descriptor_, kept, SEEK_SET) != kept) fail(partial_, errno);
     size_ = kept;

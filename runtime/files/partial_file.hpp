@@ -43,6 +43,7 @@ public:
 
     bool is_regular() const { return partial_ != path_; }
     std::int64_t size() const { return size_; }
+    bool is_copy() const { return is_copy_; }  // what was kept is that of NAME: there was no NAME.partial
     std::string read(std::int64_t offset, std::size_t count) const;  // shorter where there is less; regular files only
     void write(std::string_view bytes);
     void sync();                                  // to the disk
@@ -60,6 +61,7 @@ private:
     std::string partial_;  // what is being written; the same as path_ for a pipe or device
     std::string what_, otherwise_;
     int descriptor_ = -1;
+    bool is_copy_ = false;
     std::int64_t size_ = 0;
 };
 

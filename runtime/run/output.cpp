@@ -61,11 +61,13 @@ TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& 
         flush();
     } else {
         add_to_checksum(kept.size);
-        if (file_.read(0, text_.size()) != text_ || checksum_.written() != kept)
+        if (file_.read(0, text_.size()) != text_ || checksum_.written() != kept) {
+            if (file_.is_copy()) file_.discard();
             throw MachineError(fmt::format(
                 "cannot continue with the trajectory in {}: it is not what the run had written. Run without "
                 "--resume to start again",
-                path));
+                file_.is_copy() ? path : path + ".partial"));
+        }
         text_.clear();
     }
 }
