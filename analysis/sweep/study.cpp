@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "analysis/accuracy/companion/companion.hpp"
@@ -93,10 +94,7 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
     if (options.steps && *options.steps < 0)
         throw InputError(fmt::format("--steps: {} is not a number of steps", *options.steps));
     starts_ = std::make_unique<SweepStarts>(scene_, starts, algebra_);
-    for (std::int64_t number = 0; number < starts_->settings(); ++number) {
-        Scene of_setting = starts_->with_settings(scene_, number * starts_->count_of_setting());
-        steps_.push_back(steps_of_setting(of_setting).count);
-    }
+    count_steps();
     rows_ = std::make_unique<SweepRows>(scene_, *starts_, kept_by_sweeps(options.overrides, scene_), options.measures);
     first_ = prepare(0);
     if (options_.device != StudyDevice::cuda) return;
@@ -104,6 +102,23 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
         throw InputError(fmt::format("{}: --device cuda: {}; compute with --device cpu", scene_.path, obstacle));
     device_ = CudaDevice::open();
     put_on_device(*first_);
+}
+
+void SweepStudy::count_steps() {
+    double first_end = 0, last_end = 0;
+    for (std::int64_t number = 0; number < starts_->settings(); ++number) {
+        Scene of_setting = starts_->with_settings(scene_, number * starts_->count_of_setting());
+        steps_.push_back(steps_of_setting(of_setting).count);
+        const double end = static_cast<double>(steps_.back()) * step_of(of_setting, options_.overrides).to_double();
+        first_end = number == 0 ? end : std::fmin(first_end, end);
+        last_end = number == 0 ? end : std::fmax(last_end, end);
+    }
+    constexpr double rounding = 1e-9;
+    if (!scene_.clock && !options_.steps && last_end - first_end > rounding * last_end)
+        warnings_.push_back(
+            fmt::format("the end time is not a multiple of every step: trajectories end at the last multiple before "
+                        "it, from t = {:.6g} to t = {:.6g}, and differ for that alone",
+                        first_end, last_end));
 }
 
 void SweepStudy::choose_device() {

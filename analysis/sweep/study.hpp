@@ -85,6 +85,7 @@ public:
     std::string identity() const;
 
 private:
+    void count_steps();  // and warns of end times that differ
     std::unique_ptr<Setting> prepare(std::int64_t number);
     EnsembleRequest request_of(const Setting& setting) const;
     Steps steps_of_setting(Scene& scene) const;

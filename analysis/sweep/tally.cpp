@@ -50,7 +50,6 @@ void SweepTally::add(const SweepFigures& figures, const double* state) {
     tally.error.see(figures.error, figures.index);
     if (std::isnan(figures.error)) ++tally.unmeasured;
     tally.energy_error.see(figures.energy_error_largest, figures.index);
-    was_resumed_ = was_resumed_ || (std::isnan(figures.energy_error_largest) && !std::isnan(figures.energy_error));
     energy_error_.add(figures.energy_error);
     for (std::size_t k = 0; k < n_; ++k) {
         q_[k].add(state[k]);

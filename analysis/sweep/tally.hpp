@@ -51,14 +51,15 @@ public:
     std::int64_t failed() const { return trajectories_ - count_of_[LOBATTO_OK]; }
     std::int64_t count_of(int status) const { return count_of_[static_cast<std::size_t>(status)]; }
     const std::vector<SweepFigures>& first_failures() const { return failures_; }  // five at most
-    // Of all that succeeded.
-    Spread q(std::size_t k) const { return q_[k].spread(); }
-    Spread p(std::size_t k) const { return p_[k].spread(); }
+    // Of all that succeeded, but for those that were read back from a table without these columns.
+    const Sums& q(std::size_t k) const { return q_[k]; }
+    const Sums& p(std::size_t k) const { return p_[k]; }
     const Sums& energy_error() const { return energy_error_; }
     const std::vector<SettingTally>& settings() const { return settings_; }
     Worst worst_error() const;
-    // Whether some rows were read back: they do not tell the largest energy error between their times.
-    bool was_resumed() const { return was_resumed_; }
+    // What was added until now was read back from a table: it does not tell the largest energy error between its times.
+    void begin_after(std::int64_t trajectories) { read_back_ = trajectories; }
+    std::int64_t read_back() const { return read_back_; }
 
 private:
     std::size_t n_;
@@ -67,7 +68,7 @@ private:
     std::vector<SweepFigures> failures_;
     std::vector<Sums> q_, p_;
     Sums energy_error_;
-    bool was_resumed_ = false;
+    std::int64_t read_back_ = 0;
     std::vector<SettingTally> settings_;
 };
 

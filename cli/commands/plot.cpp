@@ -13,6 +13,7 @@
 #include "cli/plot/plot_script.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/summary.hpp"
+#include "cli/print/tell.hpp"
 #include "generator/formula/source.hpp"
 #include "runtime/error.hpp"
 
@@ -98,6 +99,7 @@ void plot(const PlotCommand& options) {
     request.log_x = options.log == Log::x || options.log == Log::xy;
     request.log_y = options.log == Log::y || options.log == Log::xy;
     request.points = options.points;
+    const std::vector<std::string> notes = left_out(tables, request);
     if (options.terminal) {
         winsize size{};
         const bool is_known = ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 20;
@@ -109,12 +111,14 @@ void plot(const PlotCommand& options) {
             text += drawn_in_characters(plot_script(tables, events, one, false), columns, std::max(rows, 12));
         }
         fmt::print("{}", text);
+        for (const std::string& note : notes) tell("lobatto: warning: {}.\n", note);
         return;
     }
     const std::string path = plot_path(options);
     const int panels = static_cast<int>(request.y.size());
     draw_picture(path, plot_script(tables, events, request, true), 900, panels == 1 ? 560 : 120 + 210 * panels);
     print_row("picture", path);
+    for (const std::string& note : notes) tell("lobatto: warning: {}.\n", note);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "cli/print/drawing.hpp"
 #include "generator/formula/source.hpp"
@@ -98,18 +99,46 @@ bool are_lengths(const NumberTable::Column& x, const NumberTable::Column& y) {
            x.name.substr(1) == y.name.substr(1) && x.name != y.name;
 }
 
+bool is_seen(double value, bool log) {
+    return std::isfinite(value) && (!log || value > 0);
+}
+
+// Rows of two numbers, and those of them that the axes can show.
+std::pair<std::size_t, std::size_t> rows_and_seen(const NumberTable::Column& x, const NumberTable::Column& y,
+                                                  const PlotRequest& request) {
+    std::size_t rows = 0, seen = 0;
+    for (std::size_t i = 0; i < x.values.size(); ++i) {
+        if (is_seen(x.values[i], false) && is_seen(y.values[i], false)) ++rows;
+        if (is_seen(x.values[i], request.log_x) && is_seen(y.values[i], request.log_y)) ++seen;
+    }
+    return {rows, seen};
+}
+
 // Something of a curve must be seen.
 void refuse_empty(const NumberTable& table, const NumberTable::Column& x, const NumberTable::Column& y,
                   const PlotRequest& request) {
-    const auto is_seen = [](double value, bool log) { return std::isfinite(value) && (!log || value > 0); };
-    for (std::size_t i = 0; i < x.values.size(); ++i)
-        if (is_seen(x.values[i], request.log_x) && is_seen(y.values[i], request.log_y)) return;
+    if (rows_and_seen(x, y, request).second > 0) return;
     throw InputError(fmt::format("{}: nothing of {} over {} can be drawn: there is no row with two numbers{}",
                                  table.path, y.name, x.name,
                                  request.log_x || request.log_y ? " above 0, where an axis is logarithmic" : ""));
 }
 
 }  // namespace
+
+std::vector<std::string> left_out(const std::vector<NumberTable>& tables, const PlotRequest& request) {
+    std::vector<std::string> sentences;
+    for (const NumberTable& table : tables)
+        for (const std::vector<std::string>& panel : request.y)
+            for (const std::string& name : panel) {
+                const auto [rows, seen] = rows_and_seen(table.column(request.x), table.column(name), request);
+                if (seen < rows)
+                    sentences.push_back(
+                        fmt::format("{}: {} of {} rows of {} over {} are not drawn: they are not above "
+                                    "0, and an axis is logarithmic",
+                                    table.path, rows - seen, rows, name, request.x));
+            }
+    return sentences;
+}
 
 std::string plot_script(const std::vector<NumberTable>& tables, const std::vector<NumberTable>& events,
                         const PlotRequest& request, bool in_colour) {

@@ -21,4 +21,7 @@ struct PlotRequest {
 std::string plot_script(const std::vector<NumberTable>& tables, const std::vector<NumberTable>& events,
                         const PlotRequest& request, bool in_colour);
 
+// What logarithmic axes leave out, a sentence for each curve: "a.csv: 3 of 5 rows of y over x are not drawn: ...".
+std::vector<std::string> left_out(const std::vector<NumberTable>& tables, const PlotRequest& request);
+
 }  // namespace lobatto

@@ -52,12 +52,21 @@ void print_settings(const SweepStudy& study, const SweepTally& tally) {
     if (count > settings_told) print_row("…", counted(static_cast<std::int64_t>(count), "setting", "settings"));
 }
 
+// Where rows of an earlier call do not tell what the sums are of.
+std::string of_those(const SweepTally& tally, std::int64_t count) {
+    const bool lacks_some = tally.read_back() > 0 && count < tally.trajectories() - tally.failed();
+    return lacks_some ? "; of those computed now" : "";
+}
+
 void print_state(const Scene& scene, const SweepTally& tally) {
     if (tally.failed() == tally.trajectories() || scene.coordinates.size() > coordinates_told) return;
-    for (std::size_t k = 0; k < scene.coordinates.size(); ++k)
-        print_row(scene.coordinates[k].name + " at the end", spread_text(tally.q(k)));
+    const auto print = [&](const std::string& name, const Sums& sums) {
+        if (sums.count() > 0)
+            print_row(name + " at the end", spread_text(sums.spread()) + of_those(tally, sums.count()));
+    };
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k) print(scene.coordinates[k].name, tally.q(k));
     for (std::size_t k = 0; k < scene.coordinates.size() && scene.outputs.momenta; ++k)
-        print_row("p_" + scene.coordinates[k].name + " at the end", spread_text(tally.p(k)));
+        print("p_" + scene.coordinates[k].name, tally.p(k));
 }
 
 }  // namespace
@@ -105,18 +114,21 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
     const SettingTally none, &all = tally.settings().empty() ? none : tally.settings().back();
     if (scene.outputs.energy && all.energy_error.index >= 0) {
         const bool conserves = study.first_setting().outline->conserves_energy();
-        print_row(
-            conserves ? "energy error" : "energy change",
-            fmt::format("{:.2g} at most, of trajectory {}, {}{}", all.energy_error.value, all.energy_error.index,
-                        starts.text_of(all.energy_error.index), tally.was_resumed() ? "; of those computed now" : ""));
+        print_row(conserves ? "energy error" : "energy change",
+                  fmt::format("{:.2g} at most, of trajectory {}, {}{}", all.energy_error.value, all.energy_error.index,
+                              starts.text_of(all.energy_error.index),
+                              tally.read_back() > 0 ? "; of those computed now" : ""));
         const Spread spread = tally.energy_error().spread();
-        print_row("  at the end", fmt::format("{:.2g} to {:.2g}, mean {:.2g}, rms {:.2g}", spread.least, spread.largest,
-                                              spread.mean, spread.rms));
+        print_row("  at the end",
+                  fmt::format("{:.2g} to {:.2g}, mean {:.2g}, rms {:.2g}{}", spread.least, spread.largest, spread.mean,
+                              spread.rms, of_those(tally, tally.energy_error().count())));
     }
     if (all.error.index >= 0)
-        print_row("measured error", fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}",
-                                                all.error.value, all.error.index, starts.text_of(all.error.index)));
-    if (study.measures() && all.unmeasured > 0 && !scene.run.stops.empty())
+        print_row("measured error",
+                  fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}{}", all.error.value,
+                              all.error.index, starts.text_of(all.error.index),
+                              tally.read_back() > 0 && all.unmeasured > 0 ? "; of those computed now" : ""));
+    if (study.measures() && all.unmeasured > 0 && tally.read_back() == 0 && !scene.run.stops.empty())
         print_row(
             all.error.index >= 0 ? "  not of" : "measured error",
             fmt::format("{}{} stopped before the first comparison; keep states on the way (--every)",

@@ -100,16 +100,16 @@ TEST_CASE("a tally counts what failed, and what is said of numbers is of those t
     CHECK(tally.trajectories() == 5);
     CHECK(tally.failed() == 1);
     CHECK(tally.first_failures().front().index == 2);
-    CHECK(tally.q(0).least == -2);
-    CHECK(tally.q(0).largest == 4);
-    CHECK(tally.q(0).mean == 3.5 / 4);
-    CHECK(tally.q(0).rms == std::sqrt(21.25 / 4));
-    CHECK(tally.p(0).mean == 2);
+    CHECK(tally.q(0).spread().least == -2);
+    CHECK(tally.q(0).spread().largest == 4);
+    CHECK(tally.q(0).spread().mean == 3.5 / 4);
+    CHECK(tally.q(0).spread().rms == std::sqrt(21.25 / 4));
+    CHECK(tally.p(0).spread().mean == 2);
     CHECK(tally.energy_error().spread().rms == 0);
     REQUIRE(tally.settings().size() == 2);
     CHECK(tally.settings()[0].failed == 1);
     CHECK(tally.settings()[0].energy_error.index == 1);
     CHECK(tally.settings()[1].steps_done == 20);
     CHECK(tally.worst_error().index == 4);
-    CHECK(std::isnan(SweepTally(1, 1).q(0).mean));
+    CHECK(std::isnan(SweepTally(1, 1).q(0).spread().mean));
 }

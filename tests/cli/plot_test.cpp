@@ -170,6 +170,10 @@ TEST_CASE("what cannot be drawn is told with its reason and the mend") {
     CHECK(plot({folder / "empty.csv"}).exit_code == 2);
     test::write_text(folder / "negative.csv", "a,b\n1,-2\n2,-3\n");
     CHECK(plot({folder / "negative.csv", "--y", "b", "--log", "y"}).err.find("above 0") != std::string::npos);
+    test::write_text(folder / "some.csv", "a,b\n0,-1\n1,10\n2,0\n3,100\n4,-50\n");
+    CHECK(plot({folder / "some.csv", "--log", "y", "--terminal"}).err ==
+          "lobatto: warning: " + (folder / "some.csv").string() +
+              ": 3 of 5 rows of b over a are not drawn: they are not above 0, and an axis is logarithmic.\n");
     test::write_text(folder / "nan.csv", "a,b\n1,nan\n2,inf\n");
     CHECK(plot({folder / "nan.csv"}).exit_code == 2);
     CHECK(plot({folder.string()}).err.find("Is a directory") != std::string::npos);

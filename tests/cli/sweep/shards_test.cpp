@@ -312,6 +312,21 @@ TEST_CASE("a sweep with stops and with what is kept has the same bytes by thread
     }
 }
 
+TEST_CASE("where rows do not tell the states, a sweep that goes on says that it speaks of those computed now") {
+    const test::SweepFolder place;
+    std::vector<std::string> words{"--vary", "q=0.5:2:5", "--until", "5", "--keep", "max(H)"};
+    const std::string whole = place.sweep("kept.csv", words).out;
+    CHECK(whole.find("computed now") == std::string::npos);
+    words.push_back("--resume");
+    const std::string resumed = place.sweep("kept.csv", words).out;
+    for (const char* label : {"  energy error ", "    at the end ", "  q at the end ", "  p_q at the end "}) {
+        const std::size_t at = resumed.find(label);
+        CAPTURE(label);
+        REQUIRE(at != std::string::npos);
+        CHECK(resumed.substr(at, resumed.find('\n', at) - at).ends_with("; of those computed now"));
+    }
+}
+
 TEST_CASE("an interrupted sweep goes on from its table, and says of all what a whole one says") {
     const test::SweepFolder place;
     for (const std::string& ending : endings()) {

@@ -638,6 +638,19 @@ TEST_CASE("a sweep measures the error of every trajectory; what is not resolved 
     CHECK(!test::contains(unmeasured.out, "measured error"));
 }
 
+TEST_CASE("a sweep warns where its steps end at different times") {
+    const Place place;
+    const std::string scene = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
+    const test::Finished differ = place.sweep({scene, "--vary", "step=0.03,0.04", "--until", "1", "--quiet"});
+    CHECK(differ.exit_code == 0);
+    CHECK(
+        differ.err ==
+        "lobatto: warning: the end time is not a multiple of every step: trajectories end at the last multiple before "
+        "it, from t = 0.99 to t = 1, and differ for that alone.\n");
+    CHECK(place.sweep({scene, "--vary", "step=0.025,0.05", "--until", "1"}).err.empty());
+    CHECK(place.sweep({scene, "--vary", "points=3,4", "--step", "0.03", "--until", "1"}).err.empty());
+}
+
 TEST_CASE("a sweep looks at motions on their way, and at pulses between its steps") {
     const Place place;
     // Near the top of its barrier the pendulum is lost at t = 208; at t = 1000 its companion is near it by chance.
