@@ -114,7 +114,7 @@ void SweepStudy::count_steps() {
         last_end = number == 0 ? end : std::fmax(last_end, end);
     }
     constexpr double rounding = 1e-9;
-    if (!scene_.clock && !options_.steps && last_end - first_end > rounding * last_end)
+    if (!scene_.clock && !options_.steps && scene_.run.stops.empty() && last_end - first_end > rounding * last_end)
         warnings_.push_back(
             fmt::format("the end time is not a multiple of every step: trajectories end at the last multiple before "
                         "it, from t = {:.6g} to t = {:.6g}, and differ for that alone",

@@ -57,6 +57,11 @@ void SweepTally::add(const SweepFigures& figures, const double* state) {
     }
 }
 
+void SweepTally::begin_after_read_back() {
+    read_back_ = trajectories_;
+    for (SettingTally& setting : settings_) setting.read_back = setting.trajectories;
+}
+
 Worst SweepTally::worst_error() const {
     Worst worst;
     for (const SettingTally& setting : settings_)

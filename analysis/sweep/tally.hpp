@@ -36,7 +36,7 @@ struct Worst {
 
 // Of the trajectories of one setting of the method.
 struct SettingTally {
-    std::int64_t trajectories = 0, failed = 0, unmeasured = 0, steps_done = 0;
+    std::int64_t trajectories = 0, read_back = 0, failed = 0, unmeasured = 0, steps_done = 0;
     Worst energy_error, error;
 };
 
@@ -58,7 +58,7 @@ public:
     const std::vector<SettingTally>& settings() const { return settings_; }
     Worst worst_error() const;
     // What was added until now was read back from a table: it does not tell the largest energy error between its times.
-    void begin_after(std::int64_t trajectories) { read_back_ = trajectories; }
+    void begin_after_read_back();
     std::int64_t read_back() const { return read_back_; }
 
 private:

@@ -44,7 +44,8 @@ void print_settings(const SweepStudy& study, const SweepTally& tally) {
                                                : counted(setting.steps_done, "step", "steps");
         if (setting.failed > 0) text += fmt::format(", {} of {} failed", setting.failed, setting.trajectories);
         if (study.scene().outputs.energy && setting.energy_error.index >= 0)
-            text += fmt::format(", energy error {:.2g} at most", setting.energy_error.value);
+            text += fmt::format(", energy error {:.2g} at most{}", setting.energy_error.value,
+                                setting.read_back > 0 ? " of those computed now" : "");
         if (setting.error.index >= 0)
             text += fmt::format(", measured error {:.1e} of the amplitude at most", setting.error.value);
         print_row(starts.text_of(static_cast<std::int64_t>(number) * starts.count_of_setting(), true), text);
@@ -124,11 +125,9 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
                               spread.rms, of_those(tally, tally.energy_error().count())));
     }
     if (all.error.index >= 0)
-        print_row("measured error",
-                  fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}{}", all.error.value,
-                              all.error.index, starts.text_of(all.error.index),
-                              tally.read_back() > 0 && all.unmeasured > 0 ? "; of those computed now" : ""));
-    if (study.measures() && all.unmeasured > 0 && tally.read_back() == 0 && !scene.run.stops.empty())
+        print_row("measured error", fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}",
+                                                all.error.value, all.error.index, starts.text_of(all.error.index)));
+    if (study.measures() && all.unmeasured > 0 && !scene.run.stops.empty())
         print_row(
             all.error.index >= 0 ? "  not of" : "measured error",
             fmt::format("{}{} stopped before the first comparison; keep states on the way (--every)",

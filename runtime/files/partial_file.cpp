@@ -167,10 +167,16 @@ int PartialFile::open_free() {
     }
 }
 
-// The first `kept` bytes of the partial file or, when it has fewer, of the destination; nothing after them.
+void PartialFile::fail_as_short(const std::string& path) const {
+    throw MachineError(fmt::format(
+        "cannot continue with {} in {}: it is shorter than the run had written it. Run without --resume", what_, path));
+}
+
+// The first `kept` bytes of the partial file or, when it is new, of the destination; nothing after them.
 void PartialFile::keep(std::int64_t kept) {
     struct stat status {};
     if (fstat(descriptor_, &status) != 0) fail(partial_, errno);
+    if (status.st_size > 0 && status.st_size < kept) fail_as_short(partial_);
     if (status.st_size < kept) {
         const int source = open(path_.c_str(), O_RDONLY | O_CLOEXEC);
         char block[65536];
@@ -182,10 +188,10 @@ void PartialFile::keep(std::int64_t kept) {
             copied += count;
         }
         if (source >= 0) close(source);
-        if (copied < kept)
-            throw MachineError(fmt::format(
-                "cannot continue with {} in {}: it is shorter than the run had written it. Run without --resume", what_,
-                path_));
+        if (copied < kept) {
+            discard();
+            fail_as_short(path_);
+        }
         is_copy_ = true;
     }
     if (ftruncate(descriptor_, kept) != 0 || lseek(descriptor_, kept, SEEK_SET) != kept) fail(partial_, errno);

@@ -44,6 +44,7 @@ public:
     bool is_regular() const { return partial_ != path_; }
     std::int64_t size() const { return size_; }
     bool is_copy() const { return is_copy_; }  // what was kept is that of NAME: there was no NAME.partial
+    const std::string& partial() const { return partial_; }
     std::string read(std::int64_t offset, std::size_t count) const;  // shorter where there is less; regular files only
     void write(std::string_view bytes);
     void sync();                                  // to the disk
@@ -53,6 +54,7 @@ public:
 
 private:
     [[noreturn]] void fail(const std::string& path, int error) const;
+    [[noreturn]] void fail_as_short(const std::string& path) const;
     int open_locked() const;
     int open_free();
     void keep(std::int64_t kept);

@@ -22,7 +22,6 @@ constexpr int coarse_steps = 8;  // where errors are compared
 // How many steps each of these is divided into. Of a high order two halvings lead from too coarse a step to rounding.
 constexpr std::array<int, 5> halvings = {1, 2, 4, 8, 16}, near_ones = {2, 3, 4, 6, 8};
 constexpr int high_order = 12;
-constexpr int nearly_linear = 10;  // orders from here on have errors so small that a weak nonlinearity hides below them
 constexpr int finest_ratio = 8;    // the reference against the smallest step of the ladder
 constexpr int most_attempts = 14;  // ladders, each half of the one before, or three or four times it below rounding
 constexpr double roundings = 64;   // of a step, all the same way; measured: 5 on the linear oscillator
@@ -151,16 +150,28 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
     return best;
 }
 
+namespace {
+
+// By how much the orders of a ladder may still rise: by as much as they last did, where that is a high order's and less
+// than before.
+double still_to_come(const std::vector<ConvergenceRow>& rows, int order) {
+    if (order <= high_order || rows.size() < 4) return 0;  // the first row has no order
+    const auto from_end = [&](std::size_t i) { return rows[rows.size() - i].order; };
+    const double change = from_end(1) - from_end(2), before = from_end(2) - from_end(3);
+    return change > 0 && change < before ? change : 0;
+}
+
+}  // namespace
+
 bool bears_out(const Convergence& convergence, int order, bool linear) {
     if (convergence.exact || convergence.below_rounding) return true;
-    // The orders may go on towards the promised one, by as much as they last did. Nearly linear motions seem to
-    // converge as linear ones do, two orders faster, until their errors are rounding; of high orders little room is
-    // left above it.
-    const std::size_t count = convergence.rows.size();
-    const double change = count > 2 ? convergence.order - convergence.rows[count - 2].order : 0;
-    const double below = std::fmax(0.3, order / 30.0) + std::fmax(change, 0),
-                 above = order < nearly_linear ? std::fmax(0.3, order / 15.0) + std::fmax(-change, 0) : 2.5;
-    return convergence.settled && convergence.order > order - below && (linear || convergence.order < order + above);
+    const double below = std::fmax(0.3, order / 30.0) + still_to_come(convergence.rows, order),
+                 above = std::fmax(0.3, order / 15.0);
+    // Nearly linear motions seem to converge as linear ones do, two orders faster: of high orders little room is left
+    // above rounding for the rest to show.
+    const bool is_nearly_linear = order > high_order && std::fabs(convergence.order - order - 2) < 0.5;
+    return convergence.settled && convergence.order > order - below &&
+           (linear || is_nearly_linear || convergence.order < order + above);
 }
 
 }  // namespace lobatto

@@ -35,9 +35,9 @@ struct Convergence {
 // ComputationError when no step of the ladder can be taken.
 Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step, double least = 0);
 
-// Whether the measurement bears out an order: within 0.3 (for high orders a thirtieth below, a fifteenth above, from
-// order 10 on 2.5 above) and the last change of orders that still approach it; for a linear system at least (some
-// super-converge); or cannot tell.
+// Whether the measurement bears out an order: within 0.3, of high orders within a thirtieth below and a fifteenth
+// above; for a linear system at least (some super-converge); or cannot tell. Beyond order 12 also where the orders
+// still rise towards it, less and less, or are those of a nearly linear motion, two higher.
 bool bears_out(const Convergence& convergence, int order, bool linear);
 
 }  // namespace lobatto

@@ -66,7 +66,7 @@ TrajectoryFile::TrajectoryFile(const std::string& path, const TrajectoryHeader& 
             throw MachineError(fmt::format(
                 "cannot continue with the trajectory in {}: it is not what the run had written. Run without "
                 "--resume to start again",
-                file_.is_copy() ? path : path + ".partial"));
+                file_.is_copy() ? path : file_.partial()));
         }
         text_.clear();
     }

@@ -19,8 +19,10 @@ constexpr std::int64_t most_comparisons = 256;
 constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude, at least
 constexpr std::int64_t most_at_once = 65536;   // steps or arrivals, before it hears that nobody waits
 constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
-constexpr double graded = 8;        // steps are at most this part of the distance to a pulse, or half of its width
-constexpr double finest = 0x1p-30;  // steps are never shorter than this part of those of the run
+constexpr double graded = 8;            // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double finest = 0x1p-30;      // steps are never shorter than this part of those of the run
+constexpr double same_time = 0x1p-48;   // relative: times that differ by no more differ by rounding
+constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
 constexpr std::int64_t most_looked = 500000;  // steps of the companion, for what is narrow in them
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -177,7 +179,8 @@ bool Companion::is_near_pulse(double from, double step) const {
 
 // A knot that the step crosses, not one at which it begins or ends but for rounding.
 std::optional<double> Companion::knot_within(double from, double step) const {
-    const double margin = finest * std::fmax(std::fabs(step), std::fabs(from));
+    const double rounding = std::fmax(same_time, same_as_rounded * kernel_->epsilon);
+    const double margin = std::fmax(finest * std::fabs(step), rounding * std::fabs(from + step));
     const double begin = std::fmin(from, from + step) + margin, end = std::fmax(from, from + step) - margin;
     const auto first = std::lower_bound(knots_.begin(), knots_.end(), begin);
     if (first == knots_.end() || *first >= end) return std::nullopt;
@@ -243,6 +246,8 @@ void Companion::take(Place& place, const Segment& part) {
         if (count == 0) {
             take_finely(place, here, size);
             ++done;
+            if (parts_ == 1 && place.status == LOBATTO_OK)  // the roundings of its parts do not add up
+                place.time[0] = from + static_cast<double>(done) * size;
         } else {
             place.set_step(whole_size, request_.whole_parameters);
             done += place.advance(count, request_.tolerance);

@@ -139,8 +139,7 @@ bool EnsembleCompanion::has_pulses(const EnsembleStart& start) {
     if (start.parameters == pulse_parameters_ && !start.parameters.empty()) return has_pulses_;
     pulse_parameters_ = start.parameters;
     const double end = request_.time + static_cast<double>(request_.steps) * request_.step;
-    has_pulses_ = !find_pulses(outline_, start.parameters, request_.time, end, std::fabs(request_.step)).empty() ||
-                  !find_knots(outline_, start.parameters, request_.time, end).empty();
+    has_pulses_ = !find_pulses(outline_, start.parameters, request_.time, end, std::fabs(request_.step)).empty();
     return has_pulses_;
 }
 
@@ -166,7 +165,7 @@ bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const E
     return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
 }
 
-// As of a run: companions take short steps at pulses, each at its own, and end steps at knots.
+// As of a run: companions take short steps at pulses, each at its own.
 EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& trajectory,
                                                   const EnsembleStart& start) const {
     TrajectoryRequest request;

@@ -278,8 +278,14 @@ TEST_CASE("another run's checkpoint, a damaged one, a missing or altered file ar
 
     const std::string text = read_file(stopped.out);
     write_text(stopped.out, text.substr(0, text.size() / 2));
-    CHECK(contains(stopped.resume().err, "it is shorter than the run had written it. Run without --resume"));
+    CHECK(contains(stopped.resume().err, stopped.out + ": it is shorter than the run had written it. Run without"));
+    CHECK(!std::filesystem::exists(stopped.out + ".partial"));
     write_text(stopped.out, text);
+    // Rows that stand in NAME.partial alone are not written over.
+    write_text(stopped.out + ".partial", text.substr(0, text.size() / 2));
+    CHECK(contains(stopped.resume().err, stopped.out + ".partial: it is shorter than the run had written it."));
+    CHECK(read_file(stopped.out + ".partial") == text.substr(0, text.size() / 2));
+    std::filesystem::remove(stopped.out + ".partial");
     // One byte, anywhere, in the trajectory or in the events.
     const std::string event_file = stopped.folder / "run.events.csv", event_text = read_file(event_file);
     const auto refuse_altered = [&](const std::string& file, const std::string& whole, std::size_t at) {

@@ -184,8 +184,11 @@ TEST_CASE("high orders may still rise, and weakly nonlinear motions converge fas
     };
     CHECK(bears_out(measured({0, 19.31, 20.22, 20.88}), 22, false));  // a nonlinear fall onto a floor
     CHECK(!bears_out(measured({0, 20.8, 20.85, 20.88}), 22, false));
-    CHECK(bears_out(measured({0, 23.99, 24.1}), 22, false));  // a harmonic oscillator under a gauge
+    CHECK(!bears_out(measured({0, 20.4, 20.3, 20.88}), 22, false));  // no rise, but rounding
+    CHECK(bears_out(measured({0, 23.99, 24.1}), 22, false));         // a harmonic oscillator under a gauge
     CHECK(!bears_out(measured({0, 24.9, 24.8}), 22, false));
+    CHECK(!bears_out(measured({0, 12.1, 12.0}), 10, false));
+    CHECK(!bears_out(measured({0, 10.8, 11.1, 11.25}), 12, false));
     CHECK(!bears_out(measured({0, 5.95, 6.0}), 4, false));
     CHECK(!bears_out(measured({0, 3.4, 3.45}), 4, false));
 }
