@@ -9,6 +9,8 @@
 #include <chrono>
 #include <cstring>
 #include <map>
+#include <sstream>
+#include <string>
 #include <type_traits>
 
 #include "library/errors.hpp"
@@ -219,7 +221,8 @@ std::vector<std::string> CrewLeader::end() {
         if (message.second[0] == 'X') error = message;
         if (message.second[0] != 'D') continue;
         --left;
-        if (message.second.size() > 1) warnings.push_back(message.second.substr(1));
+        std::istringstream lines(message.second.substr(1));
+        for (std::string warning; std::getline(lines, warning);) warnings.push_back(warning);
     }
     if (!error.second.empty()) rethrow_of(error.first, error.second);
     std::sort(warnings.begin(), warnings.end());
@@ -251,8 +254,7 @@ void work_in_crew(Ranks& ranks, const std::function<api::OpenedSweep()>& begin) 
             } else {
                 std::string warnings = "D";
                 if (study)
-                    for (const std::string& warning : study->end())
-                        warnings += (warnings.size() > 1 ? "; " : "") + warning;
+                    for (const std::string& warning : study->end()) warnings += warning + "\n";
                 ranks.send(0, warnings);
                 return;
             }

@@ -77,6 +77,14 @@ TEST_CASE("four processes write the table of one, in every format, with all that
     }
 }
 
+TEST_CASE("what all processes warn of is told once") {
+    const test::SweepFolder place;
+    const std::vector<std::string> words{"--vary", "step=0.03,0.04", "--vary", "q=1,2,3", "--until", "1", "--quiet"};
+    const std::string alone = place.sweep("a.csv", words).err;
+    CHECK(alone.starts_with("lobatto: warning: the end time is not a multiple of every step"));
+    CHECK(test::run(mpi_command(place.file("b.csv"), words)).err == alone);
+}
+
 TEST_CASE("an error is told once, with its exit code") {
     const test::SweepFolder place;
     const test::Finished done = test::run(mpi_command(place.file("a.csv"), {"--vary", "r=1"}));
