@@ -57,7 +57,7 @@ void SweepTally::add(const SweepFigures& figures, const double* state) {
     }
 }
 
-void SweepTally::begin_after_read_back() {
+void SweepTally::mark_read_back() {
     read_back_ = trajectories_;
     for (SettingTally& setting : settings_) setting.read_back = setting.trajectories;
 }

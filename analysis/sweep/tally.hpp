@@ -58,7 +58,7 @@ public:
     const std::vector<SettingTally>& settings() const { return settings_; }
     Worst worst_error() const;
     // What was added until now was read back from a table: it does not tell the largest energy error between its times.
-    void begin_after_read_back();
+    void mark_read_back();
     std::int64_t read_back() const { return read_back_; }
 
 private:

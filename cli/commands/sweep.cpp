@@ -135,7 +135,7 @@ Results results_of(const SweepOptions& options, const SweepStudy& study, const s
         if (resumed) {
             results.table = std::move(resumed->table);
             results.next = resumed->next;
-            results.tally.begin_after_read_back();
+            results.tally.mark_read_back();
             return results;
         }
     }

@@ -4,7 +4,7 @@
 // of their steps; where rounding decides, D is the error itself, about.
 //
 // Where explicit time makes short pulses, or the motion meets terms that are narrower than a step (narrow_terms.hpp),
-// which steps may miss, the companion takes short ones. Its steps end at the points of measured values in time. In
+// which steps may miss, the companion takes short ones. Its steps end at the knots of measured values in time. In
 // equally many times it takes steps of a number without a common divisor with that of the run: oscillations that look
 // constant to the one do not to the other.
 //
@@ -105,8 +105,8 @@ private:
     std::vector<int> groups_;
     int rows_a_step_;
     std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
-    std::vector<double> knots_;  // at which its steps end
     NarrowTerms narrow_;         // likewise, where the motion meets them
+    std::vector<double> knots_;  // of measured values in time, at which its steps end
     std::int64_t looked_ = 0;    // steps of the companion at which that was looked at
     bool is_driven_ = false;     // explicit time
     std::int64_t stride_;        // steps of the run between comparisons

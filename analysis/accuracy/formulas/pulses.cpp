@@ -60,23 +60,30 @@ public:
     }
 
     void look_at(const ex& formula) {
-        for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
-            const bool is_function = GiNaC::is_a<GiNaC::function>(*part);
-            if (!is_function && !GiNaC::is_a<GiNaC::power>(*part)) continue;
-            const bool is_table = is_function && is_table_value(*part);
-            const ex& inner = is_table ? part->op(2) : part->op(0);
-            if (!inner.has(t_) || holds_motion(*part) || !known_.insert(*part).second) continue;
-            const std::string name = is_function ? GiNaC::ex_to<GiNaC::function>(*part).get_name() : "";
-            const bool is_pole = !is_function && GiNaC::is_a<GiNaC::numeric>(part->op(1)) &&
-                                 GiNaC::ex_to<GiNaC::numeric>(part->op(1)).is_negative();
-            const ex u = inner.subs(values_);
-            if (is_table)
-                of_table(spline_of(GiNaC::ex_to<GiNaC::numeric>(part->op(0)).to_int()), u);
+        each_in_time(formula, [this](const ex& part, const ex& u) {
+            const bool is_function = GiNaC::is_a<GiNaC::function>(part);
+            const std::string name = is_function ? GiNaC::ex_to<GiNaC::function>(part).get_name() : "";
+            const bool is_pole = !is_function && GiNaC::is_a<GiNaC::numeric>(part.op(1)) &&
+                                 GiNaC::ex_to<GiNaC::numeric>(part.op(1)).is_negative();
+            if (is_table_value(part))
+                of_table(spline_in(part), u);
             else if (u.is_polynomial(t_))
                 of_polynomial(u.expand(), name, is_pole);
             else
                 of_samples(u, name, is_pole);
-        }
+        });
+    }
+
+    void look_at_tables(const ex& formula) {
+        each_in_time(formula, [this](const ex& part, const ex& u) {
+            const std::vector<double> c = is_table_value(part) ? of_first_degree(u) : std::vector<double>();
+            if (c.empty()) return;
+            const std::vector<cln::cl_R>& x = spline_in(part).x();
+            for (std::size_t i = 2; i + 2 < x.size(); ++i) {  // the second and the last but one are no knots
+                const double time = (cln::double_approx(x[i]) - c[0]) / c[1];
+                if (time > begin_ && time < end_) knots_.push_back(time);
+            }
+        });
     }
 
     // Of a formula that changes sides where u(t) passes zero: two passages that are near each other.
@@ -110,6 +117,17 @@ public:
     }
 
 private:
+    // The functions and powers in a formula, each once, of a u that holds the time and parameters alone; u with the
+    // values of these.
+    template <class Visit>
+    void each_in_time(const ex& formula, const Visit& visit) {
+        for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
+            if (!GiNaC::is_a<GiNaC::function>(*part) && !GiNaC::is_a<GiNaC::power>(*part)) continue;
+            const ex& inner = is_table_value(*part) ? part->op(2) : part->op(0);
+            if (!inner.has(t_) || holds_motion(*part) || !known_.insert(*part).second) continue;
+            visit(*part, inner.subs(values_));
+        }
+    }
     bool holds_motion(const ex& part) const {
         for (auto inner = part.preorder_begin(); inner != part.preorder_end(); ++inner)
             if (GiNaC::is_a<GiNaC::symbol>(*inner) && motion_.contains(*inner)) return true;
@@ -167,17 +185,19 @@ private:
                 if (root.imag() > 0) add(root.real(), root.imag());
     }
 
+    static const Spline& spline_in(const ex& table) {
+        return spline_of(GiNaC::ex_to<GiNaC::numeric>(table.op(0)).to_int());
+    }
+    // Both coefficients of a linear u(t); empty: it is not one.
+    std::vector<double> of_first_degree(const ex& u) const {
+        const std::vector<double> c = u.is_polynomial(t_) ? coefficients_of(u.expand()) : std::vector<double>();
+        return c.size() == 2 ? c : std::vector<double>();
+    }
     void of_table(const Spline& spline, const ex& u) {
-        if (!u.is_polynomial(t_)) return;
-        const std::vector<double> c = coefficients_of(u.expand());
-        if (c.size() != 2) return;
+        const std::vector<double> c = of_first_degree(u);
+        if (c.empty()) return;
         for (const Bend& bend : bends_of(spline))
             if (pulses_.size() < most_pulses) add((bend.place - c[0]) / c[1], bend.width / std::fabs(c[1]));
-        const std::vector<cln::cl_R>& x = spline.x();
-        for (std::size_t i = 2; i + 2 < x.size(); ++i) {  // the second and the last but one are no knots
-            const double time = (cln::double_approx(x[i]) - c[0]) / c[1];
-            if (time > begin_ && time < end_) knots_.push_back(time);
-        }
     }
 
     double time_of_sample(std::size_t i) const { return begin_ + static_cast<double>(i) * ((end_ - begin_) / samples); }
@@ -218,32 +238,27 @@ private:
     std::vector<double> knots_;
 };
 
-bool may_have_any(const Outline& outline) {
-    return !outline.system.autonomous || !outline.scene.switches.empty();
-}
-
-PulseFinder finder_in(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
-                      double widest) {
-    PulseFinder finder(outline.system, parameters, begin, end, widest);
-    finder.look_at(outline.system.lagrangian);
-    for (const ex& force : outline.system.outer_force) finder.look_at(force);
-    return finder;
-}
-
 }  // namespace
 
 std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
                                double widest) {
-    if (!may_have_any(outline)) return {};
-    PulseFinder finder = finder_in(outline, parameters, begin, end, widest);
+    const SystemOutline& system = outline.system;
+    if (system.autonomous && outline.scene.switches.empty()) return {};
+    PulseFinder finder(system, parameters, begin, end, widest);
+    finder.look_at(system.lagrangian);
+    for (const ex& force : system.outer_force) finder.look_at(force);
     for (const Switch& one : outline.scene.switches) finder.look_at_side(one.value);
     return finder.pulses();
 }
 
 std::vector<double> find_knots(const Outline& outline, const std::vector<double>& parameters, double begin,
                                double end) {
-    if (outline.scene.tables.empty() || !may_have_any(outline)) return {};
-    return finder_in(outline, parameters, begin, end, 0).knots();
+    const SystemOutline& system = outline.system;
+    if (system.autonomous || outline.scene.tables.empty()) return {};
+    PulseFinder finder(system, parameters, begin, end, 0);
+    finder.look_at_tables(system.lagrangian);
+    for (const ex& force : system.outer_force) finder.look_at_tables(force);
+    return finder.knots();
 }
 
 }  // namespace lobatto

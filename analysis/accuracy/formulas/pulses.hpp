@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Short events in the explicit time of a Lagrangian or a force: pulses, switches, near poles. Narrower than the
 // distance of a step's nodes they may fall between all of them, and no step tells that they are there; but formulas do.
+// And the knots of measured values in time, across which a step has less than its order.
 #pragma once
 
 #include <vector>
@@ -21,8 +22,8 @@ struct Pulse {
 std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
                                double widest);
 
-// Inner points of tables of a linear u(t), in the order of time: the third derivative jumps there, and only steps that
-// end at them keep their order.
+// The knots of tables of a linear u(t), in the order of time: the third derivative jumps there, and only steps that end
+// at them keep their order.
 std::vector<double> find_knots(const Outline& outline, const std::vector<double>& parameters, double begin, double end);
 
 }  // namespace lobatto
