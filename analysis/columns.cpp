@@ -33,7 +33,7 @@ public:
         for (const GiNaC::symbol& symbol : motion_of(scene)) symbols.push_back(symbol);
         variables_.resize(symbols.size());
         for (const Column& column : scene.outputs.columns) {
-            const std::optional<Tape> tape = Tape::of(column.value, symbols);
+            const std::optional<Tape> tape = Tape::of(scene.along_motion(column.value), symbols);
             if (!tape)
                 throw InputError(
                     fmt::format("{}: the column {} cannot be evaluated along a trajectory", scene.path, column.name));
@@ -64,7 +64,8 @@ public:
         for (std::size_t i = 0; i < scene.parameters.size(); ++i)
             formulas_.set(scene.parameters[i].symbol, number(parameters, i));
         for (const GiNaC::symbol& symbol : motion_) formulas_.set(symbol, 0);
-        for (const Column& column : scene.outputs.columns) columns_.push_back(formulas_.convert({column.value}));
+        for (const Column& column : scene.outputs.columns)
+            columns_.push_back(formulas_.convert({scene.along_motion(column.value)}));
     }
 
     void operator()(const Parts& time, const Parts& q, const Parts& velocity, Parts& values) {

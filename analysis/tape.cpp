@@ -20,6 +20,13 @@ using GiNaC::ex;
 
 namespace {
 
+double positive_part(double x) {
+    return x < 0 ? 0 : x;
+}
+double side_of(double x) {
+    return x < 0 ? -1 : 1;
+}
+
 // GiNaC's order of sums and products changes from process to process, and so would the rounding. This one follows from
 // what the operands are; not from their signs, which it chooses by its own order: (a - b)^3 is -(b - a)^3.
 class Order {
@@ -91,7 +98,8 @@ bool Tape::append(const ex& formula, const Variables& variables, const Operands&
     static const std::map<std::string, double (*)(double)> functions{
         {"sin", std::sin},   {"cos", std::cos},   {"tan", std::tan},   {"exp", std::exp},
         {"log", std::log},   {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh},
-        {"asin", std::asin}, {"acos", std::acos}, {"atan", std::atan}};
+        {"asin", std::asin}, {"acos", std::acos}, {"atan", std::atan}, {"positive_part", positive_part},
+        {"side_of", side_of}};
     Instruction instruction{Operation::number};
     const bool is_function = GiNaC::is_a<GiNaC::function>(formula), is_power = GiNaC::is_a<GiNaC::power>(formula);
     if (GiNaC::is_a<GiNaC::symbol>(formula)) {
@@ -184,7 +192,10 @@ std::string Tape::text(const std::string& result, const std::string& indent) con
         const auto first = stack.end() - instruction.operands;
         std::string value = *first;
         if (instruction.operation == Operation::call)
-            value = fmt::format("LOBATTO_LIBRARY({})({})", instruction.name, *first);
+            value = instruction.function == positive_part ? fmt::format("{0} < 0 ? 0 : {0}", *first)
+                    : instruction.function == side_of
+                        ? fmt::format("{} < 0 ? -1 : 1", *first)
+                        : fmt::format("LOBATTO_LIBRARY({})({})", instruction.name, *first);
         if (instruction.operation == Operation::angle)
             value = fmt::format("LOBATTO_LIBRARY(atan2)({}, {})", first[0], first[1]);
         if (instruction.operation == Operation::power)

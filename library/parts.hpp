@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/accuracy/formulas/domains.hpp"
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/method_choice.hpp"
 #include "analysis/motion.hpp"
@@ -44,6 +45,7 @@ struct Kernel::Parts {
     std::vector<Variable> coordinates, parameters, inputs;
     std::vector<std::string> events;
     std::vector<Required> required;
+    Domains domains;  // of the scene's formulas
 };
 
 // Formulas are not made for several threads.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/accuracy/formulas/stopped_at_formula.hpp"
 #include "analysis/kernel/derived_kernel.hpp"
 #include "generator/mechanics/start.hpp"
 #include "library/parts.hpp"
@@ -68,17 +69,17 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 "run(), which computes in all numbers",
                 changed.path, precision_name(changed.method.numbers)));
         changed.outputs.energy = true;
-        const KernelSource source = derived_kernel(changed, {}).source;
+        const DerivedKernel derived = derived_kernel(changed, {});
         const Overrides overrides = overrides_of(settings);
         apply(overrides, changed);
         if (!overrides.set.empty()) check_values(changed);
         const Steps steps = steps_of(changed, overrides);
-        const lobatto::Kernel kernel = kernel_of(source, Precision::double_);
+        const lobatto::Kernel kernel = kernel_of(derived.source, Precision::double_);
         LoadedStepper<double> stepper(kernel);
         const TrajectoryRequest start = request_of(changed, steps.count, stepper);
         return Kernel(shared_in_algebra(new const Kernel::Parts{
-            changed, kernel, source.digest, start, coordinates_of(changed), parameters_of(changed), inputs_of(changed),
-            events_of(changed), required_of(changed)}));
+            changed, kernel, derived.source.digest, start, coordinates_of(changed), parameters_of(changed),
+            inputs_of(changed), events_of(changed), required_of(changed), Domains(changed, derived.outline.system)}));
     });
 }
 
@@ -123,7 +124,10 @@ struct Stepper::Parts {
         result.q = q;
         result.p = p;
         result.increment_failed = call.increment_failed;
-        throw ComputationError(kernel.parts().scene.path + ": " + explain_stop(result, request));
+        const Kernel::Parts& known = kernel.parts();
+        const std::lock_guard lock(algebra());
+        const std::string why = stopped_at_formula(known.scene, known.domains, known.kernel, request, result);
+        throw ComputationError(known.scene.path + ": " + (why.empty() ? explain_stop(result, request) : why));
     }
 
     // q and p stay where they lie: callers may look at them for as long as the stepper lives.

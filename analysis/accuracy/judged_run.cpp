@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "analysis/accuracy/formulas/stopped_at_formula.hpp"
 #include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/stability/linear_departure.hpp"
 #include "generator/mechanics/clock/automatic_clock.hpp"
@@ -70,90 +71,12 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
     return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
 
-// Velocities where a run stopped; nothing where there are none.
-std::optional<std::vector<double>> velocity_at_stop(const PreparedRun& run, const TrajectoryRequest& request,
-                                                    const TrajectoryResult& result) {
-    LoadedStepper<double> stepper(run.plain);
-    std::vector<double> velocity;
-    if (stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
-        return std::nullopt;
-    return velocity;
-}
-
-// t and q after so long with these velocities.
-std::vector<double> straight_on(const TrajectoryResult& result, const std::vector<double>& velocity, double time) {
-    std::vector<double> ahead{result.time + time};
-    for (std::size_t k = 0; k < velocity.size(); ++k) ahead.push_back(result.q[k] + time * velocity[k]);
-    return ahead;
-}
-
-// Of a step that failed where it would go through a switch that stands in a root, a logarithm or a broken power. Empty:
-// it would not.
-std::string root_beyond_switch(const PreparedRun& run, const TrajectoryRequest& request,
-                               const TrajectoryResult& result) {
-    const Scene& scene = run.scene;
-    const auto velocity = scene.switches.empty() ? std::nullopt : velocity_at_stop(run, request, result);
-    if (!velocity) return "";
-    std::vector<GiNaC::symbol> symbols{scene.time};
-    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
-    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.velocity);
-    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
-    const auto variables_after = [&](double time) {
-        std::vector<double> variables = straight_on(result, *velocity, time);
-        variables.insert(variables.end(), velocity->begin(), velocity->end());
-        variables.insert(variables.end(), request.parameters.begin(), request.parameters.end());
-        return variables;
-    };
-    const auto is_met = [&](const Switch& one) {
-        const std::optional<Tape> value = Tape::of(one.value, symbols);
-        if (!value) return false;
-        const double here = (*value)(variables_after(0)), ahead = (*value)(variables_after(2 * request.step));
-        return here * ahead <= 0 || std::fabs(here) < 1e-9 * std::fabs(ahead);
-    };
-    const auto is_root = [&](const DomainCondition& condition) {
-        using Kind = DomainCondition::Kind;
-        if (condition.kind != Kind::power)
-            return condition.kind == Kind::nonnegative || condition.kind == Kind::positive;
-        const std::optional<Tape> formula = Tape::of(condition.exponent, symbols);
-        const double exponent = formula ? (*formula)(variables_after(0)) : 0;
-        return exponent != std::round(exponent);
-    };
-    for (const DomainCondition& condition : scene.conditions)
-        for (const Switch& one : scene.switches)
-            if (condition.expression.has(one.side) && is_root(condition) && is_met(one))
-                return fmt::format(
-                    "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: {}, line {} column {}, holds a "
-                    "switch, and has no value beyond it, where a step looks before it is cut. Write a smooth formula "
-                    "that is positive everywhere, such as (sqrt(u^2 + 1e-12) + u)/2 for max(u, 0).",
-                    result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), condition.operation,
-                    condition.at.line, condition.at.column);
-    return "";
-}
-
-// Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
-std::string end_of_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
-                         const RunObservers& observers) {
-    const auto velocity = run.scene.tables.empty() ? std::nullopt : velocity_at_stop(run, request, result);
-    if (!velocity) return "";
-    std::vector<double> ahead = straight_on(result, *velocity, request.step);
-    ahead.insert(ahead.end(), result.p.begin(), result.p.end());
-    const std::string what = observers.domains.text(observers.parameters, ahead.data());
-    if (what.empty()) return "";
-    return fmt::format(
-        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, "
-        "and has no value there. Try an earlier end, or measure further.",
-        result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), what);
-}
-
 // Of a run whose steps failed, that left its motion or lost it, or whose energy is no number. Empty: of none.
 std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                        const RunObservers& observers, const std::string& departure) {
     const Scene& scene = run.scene;
-    if (result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED) {
-        if (const std::string why = end_of_table(run, request, result, observers); !why.empty()) return why;
-        if (const std::string why = root_beyond_switch(run, request, result); !why.empty()) return why;
-    }
+    if (const std::string why = stopped_at_formula(scene, observers.domains, run.plain, request, result); !why.empty())
+        return why;
     if (result.status != LOBATTO_OK)
         return explain_stop(result, request, passing_step(run.plain, request, result), clock_advice(scene));
     if (!departure.empty()) return departure;

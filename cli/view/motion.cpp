@@ -72,7 +72,7 @@ public:
     std::size_t of(const GiNaC::ex& formula) {
         for (std::size_t i = 0; i < formulas_.size(); ++i)
             if (formulas_[i].is_equal(formula)) return i;
-        const std::optional<Tape> tape = Tape::of(formula, variables_);
+        const std::optional<Tape> tape = Tape::of(scene_.along_motion(formula), variables_);
         if (!tape) throw InputError(scene_.path + ": a formula of [view] holds a function that pictures do not know");
         formulas_.push_back(formula);
         tapes_.push_back(*tape);

@@ -55,6 +55,9 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
             case Op::table:
                 parts.insert("base/spline.hpp");
                 break;
+            case Op::positive_part:
+                parts.insert("base/positive_part.hpp");
+                break;
             case Op::asin:
             case Op::acos:
             case Op::atan:

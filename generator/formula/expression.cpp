@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "generator/formula/spline.hpp"
+#include "generator/formula/switch.hpp"
 
 namespace lobatto {
 namespace {
@@ -19,6 +20,24 @@ using GiNaC::ex_to;
 using GiNaC::is_a;
 using GiNaC::numeric;
 using Kind = Syntax::Kind;
+
+// Where the power and its derivative are 0 beyond a switch, they may be taken there.
+Operand base_of(const Operand& base, const Operand& exponent, const Arithmetic& arithmetic) {
+    const bool is_broken = !exponent.value || (!exponent.value->is_integer() && *exponent.value > 1);
+    return is_broken ? arithmetic.beyond_switch(base) : base;
+}
+
+// Of `first` where u > 0, `second` elsewhere: 1 for max(u, 0) and max(-u, 0), -1 for their negatives, which have a sign
+// everywhere; 0 for all others.
+int sign_of_pieces(const ex& u, const ex& first, const ex& second) {
+    if (second.is_zero()) return first.is_equal(u) ? 1 : first.is_equal(-u) ? -1 : 0;
+    if (first.is_zero()) return second.is_equal(-u) ? 1 : second.is_equal(u) ? -1 : 0;
+    return 0;
+}
+Operand with_sign(int sign, Operand pieces) {
+    if (sign != 0 && !pieces.value) pieces.beyond_switch = sign * positive_part(sign * pieces.expression);
+    return pieces;
+}
 
 class Evaluator {
 public:
@@ -160,7 +179,9 @@ private:
                 return compute([&] { return arithmetic.invert(a); });
             }
             case Kind::power: {
-                const Operand base = operand(0), exponent = operand(1);
+                const Operand written = operand(0), exponent = operand(1);
+                const Operand base =
+                    computed(formula.at, frame, [&] { return base_of(written, exponent, arithmetic); });
                 require_power(base, exponent, formula);
                 return compute([&] { return arithmetic.raise(base, exponent); });
             }
@@ -203,15 +224,16 @@ private:
                 return arithmetic.angle(parts[0], parts[1]);
             }
             const bool is_of_one = name == "abs" || name == "sign";
-            const Operand side = side_of(is_of_one ? parts[0] : less(parts[0], parts[1]), formula, frame);
+            const Operand u = is_of_one ? parts[0] : less(parts[0], parts[1]), side = side_of(u, formula, frame);
             if (name == "sign") return side;
-            if (name == "abs") return arithmetic.multiply(side, parts[0]);
+            if (name == "abs") return with_sign(1, arithmetic.multiply(side, u));
             const Operand half = operand_of(numeric(1, 2)), one = operand_of(1);
             const Operand above = arithmetic.multiply(half, arithmetic.add(one, side)),
                           below = arithmetic.multiply(half, less(one, side));
             const bool is_if = name == "if", is_min = name == "min";
             const Operand &first = parts[is_if ? 2 : is_min ? 1 : 0], &second = parts[is_if ? 3 : is_min ? 0 : 1];
-            return arithmetic.add(arithmetic.multiply(above, first), arithmetic.multiply(below, second));
+            return with_sign(sign_of_pieces(u.expression, first.expression, second.expression),
+                             arithmetic.add(arithmetic.multiply(above, first), arithmetic.multiply(below, second)));
         });
     }
 
@@ -290,8 +312,8 @@ private:
         if (!exponent.value)
             return require(varies ? Kind::positive : Kind::power, base, "a power", formula, exponent.expression);
         const bool negative = exponent.value->is_negative(), whole = exponent.value->is_integer();
-        require(DomainCondition::of_base(whole, negative), base, whole ? "a negative power" : "a broken power",
-                formula);
+        require(DomainCondition::of_base(whole, negative), base, whole ? "a negative power" : "a broken power", formula,
+                exponent.expression);
     }
 
     void require_call(const std::string& function, const Operand& argument, const Syntax& formula) {

@@ -50,7 +50,7 @@ struct DomainCondition {
     enum class Kind : std::uint8_t { any, nonzero, nonnegative, positive, within_one, power };
     Kind kind = Kind::nonzero;
     GiNaC::ex expression;
-    GiNaC::ex exponent;     // of a power: numbers and parameters
+    GiNaC::ex exponent;     // of a power: of numbers and parameters where its kind is `power`
     std::string operation;  // "a square root"
     Position at;
     bool of_motion = true;  // else of the step or the end time

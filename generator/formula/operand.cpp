@@ -233,22 +233,34 @@ Operand Arithmetic::multiply(const Operand& a, const Operand& b) const {
     Bounds bound = joined(distributed(a.extent, a.expression), distributed(b.extent, b.expression));
     bound.number_bits = a.extent.number_bits + b.extent.number_bits;
     bound.exponent = a.extent.exponent + b.extent.exponent + 2;  // q*q is a square
-    return compute(
+    Operand product = compute(
         "*", {&a, &b}, bound, [&] { return a.expression * b.expression; },
         [&] {
             return real_product({*a.value, *b.value});
         });
+    if (a.beyond_switch || b.beyond_switch)
+        product.beyond_switch = a.beyond_switch.value_or(a.expression) * b.beyond_switch.value_or(b.expression);
+    return product;
 }
 
 Operand Arithmetic::negate(const Operand& a) const {
-    return compute(
+    Operand negative = compute(
         "-", {&a}, distributed(a.extent, a.expression), [&] { return -a.expression; }, [&] { return -*a.value; });
+    if (a.beyond_switch) negative.beyond_switch = -*a.beyond_switch;
+    return negative;
 }
 
 Operand Arithmetic::invert(const Operand& a) const {
     if (a.expression.is_zero() || (a.value && a.value->is_zero()))
         throw Refusal(fmt::format("division by zero in {}", formula_));
     return raise(a, operand_of(-1));
+}
+
+Operand Arithmetic::beyond_switch(Operand a) const {
+    if (!a.beyond_switch) return a;
+    a.expression = *a.beyond_switch;
+    measure(a);
+    return a;
 }
 
 Operand Arithmetic::raise(const Operand& base, const Operand& exponent) const {

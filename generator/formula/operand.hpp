@@ -45,6 +45,9 @@ struct Operand {
     bool moves = false;  // positions or the time
     bool velocities = false;
     bool inputs = false;
+    // Of a product with a factor max(u, 0) or abs(u): the product with the positive part of that factor
+    // (switch.hpp).
+    std::optional<GiNaC::ex> beyond_switch = {};
 };
 
 // What a formula asks for and cannot have, as a sentence without its place.
@@ -78,6 +81,7 @@ public:
     Operand multiply(const Operand& a, const Operand& b) const;
     Operand negate(const Operand& a) const;
     Operand invert(const Operand& a) const;
+    Operand beyond_switch(Operand a) const;  // as the base of a broken power
     Operand raise(const Operand& base, const Operand& exponent) const;
     Operand call(const Function& function, const Operand& argument) const;
     Operand angle(const Operand& y, const Operand& x) const;   // atan2(y, x)

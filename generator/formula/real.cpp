@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "generator/formula/spline.hpp"
+#include "generator/formula/switch.hpp"
 
 namespace lobatto {
 namespace {
@@ -218,6 +219,10 @@ numeric real_value(const ex& expression, const GiNaC::exmap& symbols) {
     if (is_table_value(expression))
         return real_table(ex_to<numeric>(expression.op(0)).to_int(), ex_to<numeric>(expression.op(1)).to_int(),
                           visit(expression.op(2)));
+    if (is_positive_part(expression)) {
+        const numeric u = visit(expression.op(0));
+        return u.is_negative() ? numeric(0) : u;
+    }
     if (is_angle(expression)) return real_angle(visit(expression.op(0)), visit(expression.op(1)));
     const Function* function =
         is_a<GiNaC::function>(expression) ? find_function(ex_to<GiNaC::function>(expression).get_name()) : nullptr;

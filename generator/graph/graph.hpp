@@ -41,9 +41,11 @@ enum class Op : std::uint8_t {
     pair_cosine,  // the two halves of a sincos_pair
     raise,        // first operand ^ second operand, any real exponent
     multiply,
-    add,    // n-ary
-    atan2,  // of two operands, y and x
-    table   // a derivative of a spline; index: 4 times its number plus the order
+    add,            // n-ary
+    atan2,          // of two operands, y and x
+    side,           // -1 where x < 0, 1 elsewhere; of formulas that no kernel holds
+    positive_part,  // x where x > 0, 0 elsewhere (generator/formula/switch.hpp)
+    table           // a derivative of a spline; index: 4 times its number plus the order
 };
 
 // When a value is known; of an operation, the maximum over its operands. Hoisting is a partition by phase.

@@ -3,7 +3,8 @@
 #include <cln/cln.h>
 
 #include <algorithm>
-
+#include <functional>
+#include <numeric>
 #include <optional>
 
 #include "generator/formula/real.hpp"
@@ -28,10 +29,13 @@ cln::cl_R real_part_of(const cln::cl_N& z, const char* what) {
 }
 
 std::optional<Op> function_op(const std::string& name) {
-    static const std::map<std::string, Op> ops = {{"sin", Op::sin},   {"cos", Op::cos},   {"tan", Op::tan},
-                                                  {"exp", Op::exp},   {"log", Op::log},   {"sinh", Op::sinh},
-                                                  {"cosh", Op::cosh}, {"tanh", Op::tanh}, {"asin", Op::asin},
-                                                  {"acos", Op::acos}, {"atan", Op::atan}, {"atan2", Op::atan2}};
+    static const std::map<std::string, Op> ops = {{"sin", Op::sin},      {"cos", Op::cos},
+                                                  {"tan", Op::tan},      {"exp", Op::exp},
+                                                  {"log", Op::log},      {"sinh", Op::sinh},
+                                                  {"cosh", Op::cosh},    {"tanh", Op::tanh},
+                                                  {"asin", Op::asin},    {"acos", Op::acos},
+                                                  {"atan", Op::atan},    {"atan2", Op::atan2},
+                                                  {"side_of", Op::side}, {"positive_part", Op::positive_part}};
     const auto found = ops.find(name);
     return found == ops.end() ? std::nullopt : std::optional<Op>(found->second);
 }
@@ -58,16 +62,10 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
     const bool angle = op == Op::sin || op == Op::pair_sine || op == Op::cos || op == Op::pair_cosine || op == Op::tan;
     if (angle && cln::abs(real(x[0])) > largest_number) throw DomainError("a value beyond all numbers of the kernel");
     switch (op) {
-        case Op::add: {
-            cln::cl_R sum = 0;
-            for (const auto& term : x) sum = sum + term;
-            return sum;
-        }
-        case Op::multiply: {
-            cln::cl_R product = 1;
-            for (const auto& factor : x) product = product * factor;
-            return product;
-        }
+        case Op::add:
+            return std::accumulate(x.begin(), x.end(), cln::cl_R(0));
+        case Op::multiply:
+            return std::accumulate(x.begin(), x.end(), cln::cl_R(1), std::multiplies<>());
         case Op::power:
             if (exponent < 0 && cln::zerop(x[0])) throw DomainError("division by zero");
             if (is_rational(x[0]) && bits_of(cln::the<cln::cl_RA>(x[0])) * std::abs(exponent) > most_bits)
@@ -110,6 +108,10 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
             if (!cln::zerop(x[0])) return cln::atan(real(x[1]), real(x[0]));
             if (cln::zerop(x[1])) throw DomainError("atan2 of 0 and 0");
             return cln::minusp(x[1]) ? cln::cl_R(cln::pi(format())) : cln::cl_R(0);
+        case Op::side:
+            return cln::minusp(x[0]) ? -1 : 1;
+        case Op::positive_part:
+            return cln::minusp(x[0]) ? cln::cl_R(0) : x[0];
         case Op::table:  // beyond its ends as at them: near a start there may be samples that no motion meets
             return spline_of(exponent / 4)(exponent % 4, real(x[0]));
         case Op::raise:

@@ -65,6 +65,8 @@ std::string_view function_name(Op op) {
             return "atan";
         case Op::atan2:
             return "atan2";
+        case Op::positive_part:
+            return "positive_part";
         default:
             return "";
     }
@@ -118,6 +120,12 @@ public:
                 return {call(function_name(node.op), graph_[node.operands[0]].operands), atom};
             case Op::table:
                 return {table_text(node), atom};
+            case Op::positive_part: {
+                if (is_cpp()) return {call(function_name(node.op), node.operands), atom};
+                const auto [begin, end] =
+                    notation_ == Notation::latex ? std::pair("\\max\\left(", ", 0\\right)") : std::pair("max(", ", 0)");
+                return {begin + print(node.operands[0]).text + end, atom};
+            }
             default:
                 return {call(function_name(node.op), node.operands), atom};
         }

@@ -154,7 +154,8 @@ private:
         for (Coordinate& coordinate : scene_.coordinates) put_into(coordinate.force);
         for (Constraint& constraint : scene_.constraints) put_into(constraint.value);
         for (Impact& impact : scene_.impacts) put_into(impact.when.value);
-        for (Switch& one : scene_.switches) put_into(one.value);
+        for (std::vector<Switch>* list : {&scene_.switches, &scene_.seen_switches})
+            for (Switch& one : *list) put_into(one.value);
         for (DomainCondition& condition : scene_.conditions) put_into(condition.expression);
         if (scene_.clock) put_into(scene_.clock->rate);
         put_into(scene_.run.stops);

@@ -138,8 +138,35 @@ void SystemReader::read_reset(const Entry& entry, Impact& impact, const Scope& s
     }
 }
 
-// Their sides become parameters, beside which nothing of the scene is called the same.
+// What a kernel computes of the scene.
+GiNaC::exset SystemReader::symbols_of_kernel() const {
+    GiNaC::exset all;
+    const auto add = [&](const GiNaC::ex& formula) {
+        for (const GiNaC::ex& symbol : symbols_of(formula)) all.insert(symbol);
+    };
+    add(scene_.lagrangian);
+    for (const Coordinate& coordinate : scene_.coordinates) add(coordinate.force);
+    for (const Constraint& constraint : scene_.constraints) {
+        add(constraint.value);
+        add(constraint.solution);
+    }
+    if (scene_.clock) add(scene_.clock->rate);
+    for (const Impact& impact : scene_.impacts) {
+        add(impact.restitution);
+        for (const auto* formulas : {&impact.reset_position, &impact.reset_velocity})
+            for (const GiNaC::ex& formula : *formulas) add(formula);
+    }
+    for (const Event& event : scene_.watched()) add(event.value);
+    for (const Reduction& kept : scene_.outputs.kept) add(kept.crossing.value);
+    return all;
+}
+
+// The sides of those that a kernel knows become parameters, beside which nothing of the scene is called the same.
 void SystemReader::add_switches() {
+    GiNaC::exset held = symbols_of_kernel();
+    for (auto one = names_.switches.rbegin(); one != names_.switches.rend(); ++one)  // it may hold those before it
+        if (held.count(one->side) > 0)
+            for (const GiNaC::ex& symbol : symbols_of(one->value)) held.insert(symbol);
     GiNaC::exmap start = parameter_values_;
     for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
         const bool is_known = scene_.start == Start::velocity;
@@ -149,6 +176,10 @@ void SystemReader::add_switches() {
     }
     start[scene_.time] = 0;
     for (Switch& one : names_.switches) {
+        if (held.count(one.side) == 0) {
+            scene_.seen_switches.push_back(one);
+            continue;
+        }
         const std::string name = one.side.get_name();
         declarations_.declare(name, one.at, "side of " + one.text);
         const GiNaC::numeric value = value_in_range(source_, one.at, one.value, one.text, start);

@@ -2,6 +2,7 @@
 // The keys of a scene file and what they mean: a document in, a Scene out. Every key is described in
 // docs/scene_format.md.
 #include "generator/scene/scene.hpp"
+#include "generator/formula/switch.hpp"
 
 #include <fmt/format.h>
 
@@ -12,6 +13,7 @@
 
 #include "generator/formula/expression.hpp"
 #include "generator/formula/real.hpp"
+#include "generator/formula/switch.hpp"
 #include "generator/formula/token.hpp"
 #include "generator/method/splitting.hpp"
 #include "generator/scene/eliminated.hpp"
@@ -327,6 +329,14 @@ std::vector<Event> Scene::watched() const {
     std::vector<Event> all = reported();
     for (const Switch& one : switches) all.push_back({one.text, one.value, 0, one.at});
     return all;
+}
+
+GiNaC::ex Scene::along_motion(GiNaC::ex formula) const {
+    // The values of switches may hold the sides of those before them.
+    for (const std::vector<Switch>* list : {&seen_switches, &switches})
+        for (auto one = list->rbegin(); one != list->rend(); ++one)
+            if (formula.has(one->side)) formula = formula.subs(one->side == side_of(one->value));
+    return formula;
 }
 
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,

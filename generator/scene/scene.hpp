@@ -203,6 +203,7 @@ struct Scene {
     std::vector<std::string> not_eliminated;
     std::vector<Impact> impacts;
     std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
+    std::vector<Switch> seen_switches;        // of formulas that only look at the motion: no kernel knows them
     std::vector<TableUse> tables;             // measured values in any formula
     std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
     std::vector<Requirement> requirements;    // of masses, inertia, lengths, restitutions
@@ -217,6 +218,9 @@ struct Scene {
     std::vector<Event> watched() const;
     std::vector<Event> reported() const;                                   // without switches, which are no events
     bool is_cut() const { return !impacts.empty() || !switches.empty(); }  // whether steps may be
+
+    // A formula with the sides of switches where the motion is, not where it starts: for evaluation, not derivation.
+    GiNaC::ex along_motion(GiNaC::ex formula) const;
 
     // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
     // order: 60 decimal digits; throws InputError naming `what` when it is not a finite real number.

@@ -100,6 +100,7 @@ private:
     void read_plots(const Entry& entry);
     void name_energy_and_momenta();
     void read_kept(const Source& source, const Text& text);
+    GiNaC::exset symbols_of_kernel() const;
     const Group& group_of(const Subject& subject) const;
     void read_places();
     void read_initial_values();

@@ -15,6 +15,7 @@
 #include "base/grouped.hpp"
 #include "base/numbers.hpp"
 #include "base/pack.hpp"
+#include "base/positive_part.hpp"
 #include "base/registers.hpp"
 #include "base/rows.hpp"
 #include "base/shifts.hpp"

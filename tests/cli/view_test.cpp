@@ -215,3 +215,15 @@ TEST_CASE("a motion that fails on its way is shown as far as it came, with a war
           std::string::npos);
     CHECK(beside.err.find("Lobatto, 4 points") == std::string::npos);
 }
+
+TEST_CASE("curves of formulas of pieces are on the side where the motion is") {
+    const test::TemporaryFolder folder;
+    const std::string scene = folder / "pieces.toml";
+    std::ofstream(scene) << "lagrangian = \"q'^2/2 - q^2/2 - max(q, 0)^3\"\n[coordinates]\nq = { position = 1, "
+                            "velocity = 0 }\n[run]\nstep = 0.1\nuntil = 6\n[view]\nplot = [\"q\", \"max(-q, 0)\"]\n";
+    const nlohmann::json channels = data_of(page_of_scene(scene))["runs"][0]["channels"];
+    bool is_there = false;
+    for (const nlohmann::json& channel : channels)
+        is_there = is_there || (channel.is_object() && channel["least"] == 0.0 && channel["most"] > 1.0);
+    CHECK(is_there);
+}

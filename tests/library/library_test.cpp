@@ -227,6 +227,21 @@ TEST_CASE("a stepper whose step fails stays where it was") {
     CHECK(stepper.t() == t);
 }
 
+TEST_CASE("a stepper at the end of measured values says so") {
+    // Defect once: "the motion runs into a singularity".
+    const lobatto::test::TemporaryFolder folder;
+    lobatto::test::write_text(folder / "push.csv", "0,1\n0.5,2\n1,1\n1.5,0\n");
+    lobatto::test::write_text(
+        folder / "pushed.toml",
+        "time = \"t\"\nlagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+        "[forces]\nx = \'\'\'table(\"push.csv\", t)\'\'\'\n[run]\nstep = 0.1\nuntil = 1.5\n");
+    lob::Stepper stepper(lob::compile(lob::Scene((folder / "pushed.toml").string())));
+    const std::string message = lobatto::test::message_of<lob::ComputationError>([&] { stepper.advance_to(3); });
+    CHECK(lobatto::test::contains(message, "at the end of the step the table push.csv, which goes from 0 to 1.5"));
+    CHECK(lobatto::test::contains(message, "Try an earlier end, or measure further."));
+    CHECK(stepper.t() == doctest::Approx(1.5));
+}
+
 TEST_CASE("events, stops and impacts come out of a stepper") {
     lob::Stepper ball(lob::compile(lob::Scene(scenes + "bouncing_ball.toml")));
     ball.advance(40);

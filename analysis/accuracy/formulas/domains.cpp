@@ -57,7 +57,7 @@ Domains::Domains(const Scene& scene, const SystemOutline& system)
     const GiNaC::exset kept = kept_operands(system);
     for (const DomainCondition& written : scene.conditions) {
         if (!written.of_motion || conditions_.size() == most_conditions) continue;
-        std::optional<Tape> tape = Tape::of(written.expression, numbered);
+        std::optional<Tape> tape = Tape::of(scene.along_motion(written.expression), numbered);
         if (!tape) continue;
         const bool has_velocity = holds_any(written.expression, velocities);
         // Quotients that have no value at a single place have one beside it, as sin(q)/q.

@@ -51,6 +51,8 @@ cln::cl_R slope(const Node& node, const cln::cl_R& x, const cln::cl_R& value) {
             return over(1, cln::sqrt(cln::max(1 - cln::square(x), cln::cl_R(0))));
         case Op::atan:
             return 1 / (1 + cln::square(x));
+        case Op::positive_part:
+            return 1;
         default:
             throw std::logic_error("slope: not an operation with one operand");
     }

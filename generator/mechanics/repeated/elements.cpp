@@ -11,6 +11,7 @@
 
 #include "generator/formula/expansion.hpp"
 #include "generator/formula/spline.hpp"
+#include "generator/formula/switch.hpp"
 #include "generator/graph/graph.hpp"
 #include "generator/mechanics/repeated/all_pairs.hpp"
 
@@ -146,6 +147,8 @@ private:
                 return GiNaC::atan(operands[0]);
             case Op::atan2:
                 return GiNaC::atan2(operands[0], operands[1]);
+            case Op::positive_part:
+                return positive_part(operands[0]);
             case Op::table:
                 return table_value(node.index / 4, node.index % 4, operands[0]);
             default:

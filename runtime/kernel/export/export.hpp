@@ -92,6 +92,17 @@ struct Export {
             return use(of(stepper));
         }
     }
+    // Likewise where the velocity is known.
+    template <class Use>
+    static auto at_motion(const void* stepper, const void* time, const void* q, const void* velocity, const Use& use) {
+        if constexpr (has_switches) {
+            S local = of(stepper);
+            Sides<K>::take_at(local, *in(time), in(q), in(velocity));
+            return use(local);
+        } else {
+            return use(of(stepper));
+        }
+    }
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
         call->steps_done = call->records_written = call->events_written = call->iterations = 0;
         call->chain_steps = 0;
@@ -185,25 +196,23 @@ struct Export {
                         [&](const S& s) { return code(s.energy(*in(time), in(q), in(p), out(energy))); });
     }
     static void momentum(const void* stepper, const void* time, const void* q, const void* velocity, void* p) {
-        if constexpr (has_switches) {
-            S local = of(stepper);
-            Sides<K>::take_at(local, *in(time), in(q), in(velocity));
-            local.momentum(*in(time), in(q), in(velocity), out(p));
-        } else {
-            of(stepper).momentum(*in(time), in(q), in(velocity), out(p));
-        }
+        at_motion(stepper, time, q, velocity, [&](const S& s) { s.momentum(*in(time), in(q), in(velocity), out(p)); });
     }
     static std::int32_t velocity(const void* stepper, const void* time, const void* q, const void* p, void* velocity) {
         return at_state(stepper, time, q, p,
                         [&](const S& s) { return code(s.velocity(*in(time), in(q), in(p), out(velocity))); });
     }
     static void slopes(const void* stepper, const void* time, const void* q, const void* velocity, void* Lv, void* Lq) {
-        of(stepper).slopes(*in(time), in(q), in(velocity), out(Lv), out(Lq));
+        at_motion(stepper, time, q, velocity,
+                  [&](const S& s) { s.slopes(*in(time), in(q), in(velocity), out(Lv), out(Lq)); });
     }
     static void read_constraint(const void* stepper, const void* time, const void* q, void* phi, void* phi_t, void* G) {
         if constexpr (constraint_count > 0) {
             real entries[K::constraint_entries];
-            Formulas<K>::constraint(of(stepper).coefficients, *in(time), in(q), out(phi), out(phi_t), entries);
+            const real at_rest[n] = {};  // no constraint holds a velocity
+            at_motion(stepper, time, q, at_rest, [&](const S& s) {
+                Formulas<K>::constraint(s.coefficients, *in(time), in(q), out(phi), out(phi_t), entries);
+            });
             for (int i = 0; i < constraint_count * n; ++i) out(G)[i] = real(0);
             for (int e = 0; e < K::constraint_entries; ++e)
                 out(G)[K::constraint_row[e] * n + K::constraint_column[e]] = entries[e];
@@ -211,7 +220,9 @@ struct Export {
     }
     static std::int32_t find_multipliers(const void* stepper, const void* time, const void* q, const void* p,
                                          void* lambda) {
-        if constexpr (constraint_count > 0) return code(of(stepper).multipliers(*in(time), in(q), in(p), out(lambda)));
+        if constexpr (constraint_count > 0)
+            return at_state(stepper, time, q, p,
+                            [&](const S& s) { return code(s.multipliers(*in(time), in(q), in(p), out(lambda))); });
         return LOBATTO_UNSUPPORTED;
     }
     static constexpr auto constraint = constraint_count > 0 ? read_constraint : nullptr;

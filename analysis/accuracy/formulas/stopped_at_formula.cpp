@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/formulas/stopped_at_formula.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "analysis/tape.hpp"
+#include "generator/formula/switch.hpp"
+
+namespace lobatto {
+
+namespace {
+
+// Velocities where a run stopped; nothing where there are none.
+std::optional<std::vector<double>> velocity_at_stop(const Kernel& kernel, const TrajectoryRequest& request,
+                                                    const TrajectoryResult& result) {
+    LoadedStepper<double> stepper(kernel);
+    std::vector<double> velocity;
+    if (stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+        stepper.velocity(result.time, result.q, result.p, velocity) != LOBATTO_OK)
+        return std::nullopt;
+    return velocity;
+}
+
+// t and q after so long with these velocities.
+std::vector<double> straight_on(const TrajectoryResult& result, const std::vector<double>& velocity, double time) {
+    std::vector<double> ahead{result.time + time};
+    for (std::size_t k = 0; k < velocity.size(); ++k) ahead.push_back(result.q[k] + time * velocity[k]);
+    return ahead;
+}
+
+// Of a step that failed where it would go through a switch that stands in a root, a logarithm or a broken power. Empty:
+// it would not, or the power and two of its derivatives are finite there (generator/formula/switch.hpp).
+std::string root_at_switch(const Scene& scene, const std::vector<double>& velocity, const TrajectoryRequest& request,
+                           const TrajectoryResult& result) {
+    std::vector<GiNaC::symbol> symbols{scene.time};
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.velocity);
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    const auto variables_after = [&](double time) {
+        std::vector<double> variables = straight_on(result, velocity, time);
+        variables.insert(variables.end(), velocity.begin(), velocity.end());
+        variables.insert(variables.end(), request.parameters.begin(), request.parameters.end());
+        return variables;
+    };
+    const auto is_met = [&](const Switch& one) {
+        const std::optional<Tape> value = Tape::of(one.value, symbols);
+        if (!value) return false;
+        const double here = (*value)(variables_after(0)), ahead = (*value)(variables_after(2 * request.step));
+        return here * ahead <= 0 || std::fabs(here) < 1e-9 * std::fabs(ahead);
+    };
+    const auto exponent_of = [&](const DomainCondition& condition) {
+        const std::optional<Tape> formula = Tape::of(condition.exponent, symbols);
+        return formula ? (*formula)(variables_after(0)) : 0;
+    };
+    const auto what_is_missing = [&](const DomainCondition& condition) -> std::string_view {
+        using Kind = DomainCondition::Kind;
+        if (condition.expression.has(positive_part(GiNaC::wild())))
+            return exponent_of(condition) < 2 ? "and its second derivative is not finite there. Write an exponent of "
+                                                "at least 2 (in a force 1), or"
+                                              : "";
+        const double exponent = condition.kind == Kind::power ? exponent_of(condition) : 0.5;
+        const bool is_root =
+            condition.kind == Kind::nonnegative || condition.kind == Kind::positive || condition.kind == Kind::power;
+        return is_root && exponent != std::round(exponent)
+                   ? "and has no value beyond it, where a step looks before it is cut. Write"
+                   : "";
+    };
+    for (const DomainCondition& condition : scene.conditions)
+        for (const Switch& one : scene.switches) {
+            if (!condition.expression.has(one.side) || !is_met(one)) continue;
+            const std::string_view missing = what_is_missing(condition);
+            if (missing.empty()) continue;
+            return fmt::format(
+                "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: {}, line {} column {}, holds a "
+                "switch, {} a smooth formula that is positive everywhere, such as (sqrt(u^2 + 1e-12) + u)/2 for "
+                "max(u, 0).",
+                result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), condition.operation,
+                condition.at.line, condition.at.column, missing);
+        }
+    return "";
+}
+
+// Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
+std::string end_of_table(const Domains& domains, const std::vector<double>& velocity, const TrajectoryRequest& request,
+                         const TrajectoryResult& result) {
+    std::vector<double> ahead = straight_on(result, velocity, request.step);
+    ahead.insert(ahead.end(), result.p.begin(), result.p.end());
+    const std::string what = domains.text(request.parameters, ahead.data());
+    if (what.empty()) return "";
+    return fmt::format(
+        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, "
+        "and has no value there. Try an earlier end, or measure further.",
+        result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), what);
+}
+
+}  // namespace
+
+std::string stopped_at_formula(const Scene& scene, const Domains& domains, const Kernel& kernel,
+                               const TrajectoryRequest& request, const TrajectoryResult& result) {
+    const bool has_table = !scene.tables.empty(), has_switch = !scene.switches.empty();
+    if ((result.status != LOBATTO_NOT_FINITE && result.status != LOBATTO_NOT_CONVERGED) || (!has_table && !has_switch))
+        return "";
+    const std::optional<std::vector<double>> velocity = velocity_at_stop(kernel, request, result);
+    if (!velocity) return "";
+    const std::string why = has_table ? end_of_table(domains, *velocity, request, result) : "";
+    return why.empty() && has_switch ? root_at_switch(scene, *velocity, request, result) : why;
+}
+
+}  // namespace lobatto

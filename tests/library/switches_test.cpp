@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Formulas of pieces: contact laws with broken powers, and all that is computed of a motion on the side where it is.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <lobatto/lobatto.hpp>
+
+#include <cmath>
+#include <string>
+
+#include "generator/scene/scene.hpp"
+#include "tests/support.hpp"
+
+namespace {
+
+namespace lob = lobatto::api;
+
+lob::Scene scene_of(const std::string& text) {
+    return lob::Scene::from_text(text, "switches.toml");
+}
+
+// A mass that flies to x = 0 with velocity -2, and what `contact` is the potential of.
+std::string collision(const std::string& contact, const std::string& more = "", double step = 0.002) {
+    return fmt::format(
+        "lagrangian = \"m/2*x'^2 - ({})\"\n[parameters]\nm = 3\n[coordinates]\nx = {{ position = 1, velocity = -2 }}\n"
+        "[method]\npoints = 5\n[run]\nstep = {}\nuntil = 1.5\n{}",
+        contact, step, more);
+}
+
+// The time that Hertz's law k x^(5/2) 2/5 holds a mass: x_m^(5/2) = 5 m v^2 / (4 k), and the integral of
+// 2 / sqrt(1 - x^(5/2)) from 0 to 1 times x_m / v.
+double time_of_contact(double m, double v, double k) {
+    const double deepest = std::pow(5 * m * v * v / (4 * k), 0.4);
+    return 2 * std::sqrt(std::acos(-1.0)) * std::tgamma(0.4) / (2.5 * std::tgamma(0.9)) * deepest / v;
+}
+
+std::string failure_of(const lob::Scene& scene) {
+    try {
+        lob::run(scene);
+    } catch (const lob::RunFailure& failure) {
+        return failure.what();
+    }
+    return "";
+}
+
+}  // namespace
+
+TEST_CASE("Hertz's law of contact, in each form that people write it in") {
+    const double exact = 2 * (1.5 - 0.5 - time_of_contact(3, 2, 500));
+    for (const std::string contact : {"200*max(-x, 0)^(5/2)", "200*max(0, -x)^2.5", "200*(-min(x, 0))^2.5",
+                                      "200*if(x < 0, -x, 0)^(5/2)", "200*4^2.5*(max(-x, 0)/4)^2.5"}) {
+        CAPTURE(contact);
+        const lob::Trajectory run = lob::run(scene_of(collision(contact)));
+        CHECK(std::fabs(run.q.back() - exact) < 2e-8);  // 2.6e-9; 1.6e-3 with the smooth form of docs/scene_format.md
+        CHECK(run.error.value() < 1e-6);
+    }
+    // Its exponent and its length as parameters, the length in a definition; in the numbers of every kind.
+    const std::string adjustable =
+        collision("k*R^n*depth^n", "").insert(0, "definitions = { depth = \"max(-x, 0)/R\" }\n");
+    const std::string text = adjustable.substr(0, adjustable.find("m = 3")) + "m = 3\nk = 200\nR = 0.5\nn = 2.5\n" +
+                             adjustable.substr(adjustable.find("[coordinates]"));
+    for (const std::string numbers : {"double", "long double", "double-double", "quadruple", "40 digits"}) {
+        CAPTURE(numbers);
+        lob::RunOptions options;
+        options.numbers = numbers;
+        const lob::Trajectory run = lob::run(scene_of(text), options);
+        CHECK(std::fabs(run.q.back() - exact) < 2e-8);
+    }
+    lob::SweepOptions options;
+    const lob::Sweep sweep = lob::sweep(scene_of(text), {2, {{"k", {200, 300}}}}, options);
+    CHECK(std::fabs(sweep.q[0] - exact) < 2e-8);
+    CHECK(std::fabs(sweep.q[1] - 2 * (1 - time_of_contact(3, 2, 750))) < 2e-8);
+}
+
+TEST_CASE("a force may have a broken power above 1, and a potential one of 2 or more") {
+    // Hunt and Crossley's law.
+    const std::string damped = collision("0*x", "[forces]\nx = \"500*max(-x, 0)^1.5*(1 - 0.2*x')\"\n");
+    const lob::Trajectory run = lob::run(scene_of(damped));
+    // m v dv/dx = f(x) (1 - c v): the integral of f dx is 0 over a contact, so v + log(1 - c v)/c ends as it began.
+    const double c = 0.2, out = run.p.back() / 3, kept = (-2) + std::log(1 + 2 * c) / c;
+    CHECK(std::fabs(out + std::log(1 - c * out) / c - kept) < 1e-6);
+    CHECK(lobatto::test::contains(failure_of(scene_of(collision("200*abs(x)^1.5"))),
+                                  "its second derivative is not finite there. Write an exponent of at least 2"));
+}
+
+TEST_CASE("what is kept of a trajectory is on the side where the motion is") {
+    // Defect once: max(-x, 0) stayed on the side of the start, 0.
+    const std::string output = "[output]\nkeep = [\"max(max(-x, 0))\", \"max(-x)\", \"last(abs(x) + H)\"]\n";
+    for (const std::string contact : {"200*max(-x, 0)^3", "m*(x^2 + 0.3*x^4)/2"}) {
+        CAPTURE(contact);
+        const lob::Scene scene = scene_of(collision(contact, output));
+        const lob::Sweep sweep = lob::sweep(scene, {1, {}}, {});
+        CHECK(sweep.kept[0] == sweep.kept[1]);
+        CHECK(sweep.kept[0] > 0.1);
+        const double energy = contact.front() == '2' ? 6 : 6 + 1.5 * 1.3;
+        CHECK(sweep.kept[2] == doctest::Approx(std::fabs(sweep.q[0]) + energy).epsilon(1e-9));
+    }
+    // And no kernel looks for what only these formulas hold.
+    const lobatto::Scene smooth =
+        lobatto::read_scene(lobatto::Source("smooth.toml", collision("m*(x^2 + 0.3*x^4)/2", output)));
+    CHECK(smooth.switches.empty());
+    CHECK(smooth.seen_switches.size() == 2);
+}
+
+TEST_CASE("multipliers and conditions of formulas are on the side where the motion is") {
+    // Defect once: a rod's multiplier lacked the force of a spring that pushes for x > 0 alone.
+    const lob::Trajectory run =
+        lob::run(scene_of("lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y - 5/2*max(x, 0)^2\"\n[coordinates]\n"
+                          "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0 }\n[constraints]\n"
+                          "rod = \"x^2 + y^2 = 1\"\n[run]\nstep = 0.02\nuntil = 3\n[output]\nmultipliers = true\n"));
+    int above = 0, below = 0;
+    for (std::size_t row = 0; row < run.count; ++row) {
+        const double x = run.q[2 * row], y = run.q[2 * row + 1], px = run.p[2 * row], py = run.p[2 * row + 1];
+        // d^2/dt^2 of the equation, with x'' = -5 max(x, 0) + 2 lambda x, y'' = -9.81 + 2 lambda y
+        const double lambda = (5 * std::fmax(x, 0) * x + 9.81 * y - px * px - py * py) / 2;
+        CHECK(std::fabs(run.columns[row] - lambda) < 1e-12);
+        ++(x > 0 ? above : below);
+    }
+    CHECK(above > 20);
+    CHECK(below > 20);
+
+    // Defect once: "the run left its Lagrangian", where 1 + 3 x of the first side was negative.
+    CHECK(failure_of(scene_of("lagrangian = \"x'^2/2 - sqrt(1 + 3*abs(x))^2\"\n[coordinates]\n"
+                              "x = { position = 2, velocity = 0 }\n[run]\nstep = 0.02\nuntil = 10\n"))
+              .empty());
+}
