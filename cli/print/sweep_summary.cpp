@@ -190,6 +190,7 @@ std::string json_of_sweep(const SweepStudy& study, const SweepTally& tally, cons
                                                  : "done"},
                  {"asked", table.asked},
                  {"trajectories", tally.trajectories()},
+                 {"read_back", tally.read_back()},
                  {"failed", tally.failed()}};
     json["failures"] = Json::array();
     for (std::size_t status = 1; status < sweep_statuses.size(); ++status)

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <chrono>
 #include <random>
@@ -325,6 +326,9 @@ TEST_CASE("where rows do not tell the states, a sweep that goes on says that it 
         REQUIRE(at != std::string::npos);
         CHECK(resumed.substr(at, resumed.find('\n', at) - at).ends_with("; of those computed now"));
     }
+    words.push_back("--json");
+    CHECK(nlohmann::json::parse(place.sweep("kept.csv", words).out)["read_back"] ==
+          4);  // the last row is computed anew
 }
 
 TEST_CASE("an interrupted sweep goes on from its table, and says of all what a whole one says") {
