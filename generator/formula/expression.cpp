@@ -39,6 +39,21 @@ Operand with_sign(int sign, Operand pieces) {
     return pieces;
 }
 
+// Whether u is 0 over stretches of a motion, where formulas of pieces in it are constant.
+bool stays_zero(const ex& u, const std::vector<Switch>& switches) {
+    constexpr std::size_t most = 8;
+    std::vector<GiNaC::symbol> sides;
+    for (const Switch& one : switches)
+        if (u.has(one.side)) sides.push_back(one.side);
+    if (sides.empty() || sides.size() > most) return false;
+    for (std::size_t choice = 0; choice >> sides.size() == 0; ++choice) {
+        GiNaC::exmap chosen;
+        for (std::size_t i = 0; i < sides.size(); ++i) chosen[sides[i]] = (choice >> i & 1) != 0 ? 1 : -1;
+        if (u.subs(chosen).expand().is_zero()) return true;
+    }
+    return false;
+}
+
 class Evaluator {
 public:
     Evaluator(const Source& source, Work& work, Names* names, bool motion_allowed)
@@ -224,7 +239,17 @@ private:
                 return arithmetic.angle(parts[0], parts[1]);
             }
             const bool is_of_one = name == "abs" || name == "sign";
-            const Operand u = is_of_one ? parts[0] : less(parts[0], parts[1]), side = side_of(u, formula, frame);
+            const Operand u = is_of_one ? parts[0] : less(parts[0], parts[1]);
+            if ((name == "sign" || name == "if") && names_ != nullptr && stays_zero(u.expression, names_->switches))
+                fail(
+                    formula.at, frame,
+                    fmt::format("{} over whole stretches of the motion, where this formula is undecided; write it with "
+                                "what goes through 0, such as x > 0 in place of max(x, 0) > 0",
+                                name == "if" ? "the sides of the condition are equal" : "the argument of sign is 0"));
+            const Operand side = side_of(u, formula, frame);
+            if (name == "sign" && !u.moves && !u.velocities)  // 0 may be its value for good
+                return arithmetic.multiply(operand_of(numeric(1, 2)),
+                                           less(side, side_of(arithmetic.negate(u), formula, frame)));
             if (name == "sign") return side;
             if (name == "abs") return with_sign(1, arithmetic.multiply(side, u));
             const Operand half = operand_of(numeric(1, 2)), one = operand_of(1);
@@ -284,9 +309,9 @@ private:
         return number;
     }
 
-    // 1 where u > 0, -1 where it is below: a number where that is known, else the side of a switch.
+    // 1 where u > 0, -1 elsewhere: a number where that is known, else the side of a switch.
     Operand side_of(const Operand& u, const Syntax& formula, const Frame& frame) {
-        if (u.value) return operand_of(u.value->is_negative() ? -1 : 1);
+        if (u.value) return operand_of(u.value->is_positive() ? 1 : -1);
         if (names_ == nullptr || !motion_allowed_)
             fail(formula.at, frame,
                  fmt::format("{} needs a number here: numbers, indices and parameters declared constant",

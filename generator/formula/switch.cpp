@@ -15,7 +15,7 @@ ex positive_part_slope(const ex& /*u*/, unsigned /*argument*/) {
 }
 ex side_value(const ex& u) {
     if (!GiNaC::is_a<GiNaC::numeric>(u)) return side_of(u).hold();
-    return GiNaC::ex_to<GiNaC::numeric>(u).is_negative() ? -1 : 1;
+    return GiNaC::ex_to<GiNaC::numeric>(u).is_positive() ? 1 : -1;
 }
 
 bool is_call(const ex& expression, unsigned function) {

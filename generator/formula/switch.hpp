@@ -6,7 +6,7 @@
 // that the power is 0 beyond. Its derivative is given as 1: it stands in powers above 1 alone, whose derivatives are 0
 // beyond, too.
 //
-// side_of(u), -1 where u < 0 and 1 elsewhere, is for formulas that are evaluated along a motion and not derived.
+// side_of(u), 1 where u > 0 and -1 elsewhere, is for formulas that are evaluated along a motion and not derived.
 #pragma once
 
 #include <ginac/ginac.h>

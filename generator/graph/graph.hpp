@@ -43,7 +43,7 @@ enum class Op : std::uint8_t {
     multiply,
     add,            // n-ary
     atan2,          // of two operands, y and x
-    side,           // -1 where x < 0, 1 elsewhere; of formulas that no kernel holds
+    side,           // 1 where x > 0, -1 elsewhere; of formulas that no kernel holds
     positive_part,  // x where x > 0, 0 elsewhere (generator/formula/switch.hpp)
     table           // a derivative of a spline; index: 4 times its number plus the order
 };

@@ -109,7 +109,7 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
             if (cln::zerop(x[1])) throw DomainError("atan2 of 0 and 0");
             return cln::minusp(x[1]) ? cln::cl_R(cln::pi(format())) : cln::cl_R(0);
         case Op::side:
-            return cln::minusp(x[0]) ? -1 : 1;
+            return cln::plusp(x[0]) ? 1 : -1;
         case Op::positive_part:
             return cln::minusp(x[0]) ? cln::cl_R(0) : x[0];
         case Op::table:  // beyond its ends as at them: near a start there may be samples that no motion meets

@@ -183,7 +183,7 @@ void SystemReader::add_switches() {
         const std::string name = one.side.get_name();
         declarations_.declare(name, one.at, "side of " + one.text);
         const GiNaC::numeric value = value_in_range(source_, one.at, one.value, one.text, start);
-        const int side = value.is_negative() ? -1 : 1;
+        const int side = value.is_positive() ? 1 : -1;
         start[one.side] = side;
         scene_.parameters.push_back({name, "", side, one.side, name});
         scene_.switches.push_back(one);

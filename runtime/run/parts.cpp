@@ -44,6 +44,16 @@ double difference(const double* x, const double* y, std::size_t parts) {
     return rounded_sum(terms, parts);
 }
 
+std::vector<double> less(const std::vector<double>& x, double y) {
+    std::vector<double> terms(x.rbegin(), x.rend()), result;
+    terms.push_back(-y);
+    for (std::size_t j = 0; j < x.size(); ++j) {
+        result.push_back(rounded_sum(terms, x.size()));
+        terms.push_back(-result.back());
+    }
+    return result;
+}
+
 std::vector<double> times_fraction(const std::vector<double>& x, std::int64_t numerator, std::int64_t denominator) {
     const auto up = static_cast<double>(numerator), down = static_cast<double>(denominator);
     std::vector<double> terms, result;

@@ -272,7 +272,7 @@ private:
             case Op::atan2:
                 return std::atan2(x(0), x(1));
             case Op::side:
-                return x(0) < 0 ? real(-1) : real(1);
+                return x(0) > 0 ? real(1) : real(-1);
             case Op::positive_part:
                 return std::fmax(x(0), real(0));
             case Op::raise:

@@ -192,36 +192,39 @@ bool Companion::can_halve(double from, double step) const {
 }
 
 // Steps shorter and shorter towards a pulse, each on one side of all knots.
-void Companion::take_finely(Place& place, double from, double step) {
+void Companion::take_finely(Place& place, double from, const std::vector<double>& step) {
     if (place.status != LOBATTO_OK || cancelled_) return;
-    if (const std::optional<double> knot = knot_within(from, step)) {
-        take_finely(place, from, *knot - from);
-        take_finely(place, *knot, from + step - *knot);
+    const double size = step.front();
+    if (const std::optional<double> knot = knot_within(from, size)) {
+        take_finely(place, from, as_parts({*knot - from}, parts_));
+        take_finely(place, *knot, less(step, *knot - from));
         return;
     }
-    if (is_near_pulse(from, step) && can_halve(from, step)) {
-        take_finely(place, from, step / 2);
-        take_finely(place, from + step / 2, step / 2);
+    if (is_near_pulse(from, size) && can_halve(from, size)) {
+        const std::vector<double> half = times_fraction(step, 1, 2);
+        take_finely(place, from, half);
+        take_finely(place, from + size / 2, half);
         return;
     }
     take_one(place, from, step);
 }
 
 // One step; shorter ones in its place, if the motion met something narrow in it.
-void Companion::take_one(Place& place, double from, double step) {
+void Companion::take_one(Place& place, double from, const std::vector<double>& step) {
     const Place::State before = place.state();
-    place.set_step(as_parts({step}, parts_), request_.whole_parameters);
+    place.set_step(step, request_.whole_parameters);
     place.advance(1, request_.tolerance);
     if (narrow_.empty() || place.status != LOBATTO_OK || looked_ >= most_looked) return;
     ++looked_;
-    NarrowTerms::State begin{from, rounded(before.q, parts_), {}}, end{from + step, rounded(place.q, parts_), {}};
+    NarrowTerms::State begin{from, rounded(before.q, parts_), {}},
+        end{from + step.front(), rounded(place.q, parts_), {}};
     if (place.stepper.velocity(before.time, before.q, before.p, begin.v) != LOBATTO_OK ||
         place.stepper.velocity(place.time, place.q, place.p, end.v) != LOBATTO_OK)
         return;
     begin.v = rounded(begin.v, parts_);
     end.v = rounded(end.v, parts_);
     const std::optional<Pulse> met = narrow_.on_the_way(begin, end);
-    if (!met || !can_halve(from, step)) return;
+    if (!met || !can_halve(from, step.front())) return;
     pulses_.insert(std::upper_bound(pulses_.begin(), pulses_.end(), *met,
                                     [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
                    *met);
@@ -244,7 +247,7 @@ void Companion::take(Place& place, const Segment& part) {
                (is_even || !needs_parts(here + static_cast<double>(count) * size, size)))
             count = is_even ? std::min(piece, part.taken - done) : count + 1;
         if (count == 0) {
-            take_finely(place, here, size);
+            take_finely(place, here, whole_size);
             ++done;
             if (parts_ == 1 && place.status == LOBATTO_OK)  // the roundings of its parts do not add up
                 place.time[0] = from + static_cast<double>(done) * size;

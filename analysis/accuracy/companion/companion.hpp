@@ -87,8 +87,9 @@ private:
     double ratio_of(const Segment& part) const;
     void compute();
     void take(Place& place, const Segment& part);
-    void take_finely(Place& place, double from, double step);
-    void take_one(Place& place, double from, double step);
+    // `step` has all digits: steps and the parts of them end at the times of the run.
+    void take_finely(Place& place, double from, const std::vector<double>& step);
+    void take_one(Place& place, double from, const std::vector<double>& step);
     bool has_caught_up() const;
     bool can_halve(double from, double step) const;
     bool is_near_pulse(double from, double step) const;

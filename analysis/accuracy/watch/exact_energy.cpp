@@ -30,7 +30,7 @@ std::optional<ExactEnergy::Energy> ExactEnergy::at(const std::vector<double>& q,
         try {
             if (moving && !same_sides)  // at rest they are where the motion is
                 for (std::size_t i = 0; i < sides_.size(); ++i)
-                    formulas_.set(sides_[i], cln::minusp(formulas_.evaluate({switched_[i]}).front()) ? -1 : 1);
+                    formulas_.set(sides_[i], cln::plusp(formulas_.evaluate({switched_[i]}).front()) ? 1 : -1);
             return formulas_.evaluate_sized(energy_).front();
         } catch (const DomainError&) {
             return std::nullopt;

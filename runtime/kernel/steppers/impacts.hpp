@@ -97,7 +97,8 @@ private:
     void look_at_impacts(S& stepper) {
         Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution);
         for (int w = 0; w < impacts; ++w) {
-            real along = rate[w], speed = fabs(rate[w]), moved = fabs(rate[w] * stepper.step_size);
+            const real step = fabs(stepper.step_size), passed = fabs(time) > step ? fabs(time) : step;
+            real along = rate[w], speed = fabs(rate[w]), moved = speed * passed;
             for (int c = 0; c < n; ++c) {
                 const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
                 along += slope * velocity[c];
@@ -123,7 +124,7 @@ struct Sides {
             real values[K::events];
             Formulas<K>::event(stepper.coefficients, time, q, velocity, values);
             for (int i = 0; i < switches_of<K>(); ++i)
-                stepper.side(i) = values[K::events - switches_of<K>() + i] < real(0) ? real(-1) : real(1);
+                stepper.side(i) = values[K::events - switches_of<K>() + i] > real(0) ? real(1) : real(-1);
             stepper.prepare(stepper.parameters, stepper.step_size);
         }
     }
@@ -138,6 +139,7 @@ struct Sides {
     static Status of_walls(S& stepper, real time, const real* q, const real* p) {
         Walls<K> wall;
         for (real& scale : stepper.wall_scale) scale = real(0);
+        for (real& size : stepper.scaled_at) size = real(0);
         if constexpr (switches_of<K>() > 0) scale_switches(stepper, time, q, p);
         const Status status = wall.look(stepper, time, q, p);
         for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
@@ -145,10 +147,15 @@ struct Sides {
         return status;
     }
     // sum |du/dx x| over the time, positions and velocities: what a rounding of these does to a switch u, over epsilon.
+    // Where that is known of an earlier place, anew if one of them has grown to more than twice of what it was there.
     static void scale_switches(S& stepper, real time, const real* q, const real* p) {
-        real x[1 + 2 * n] = {time}, here[K::events], there[K::events];
+        real x[1 + 2 * n] = {time}, here[K::events], there[K::events], scale[switches_of<K>()] = {};
         for (int k = 0; k < n; ++k) x[1 + k] = q[k];
         if (stepper.velocity(time, q, p, x + 1 + n) != Status::ok) return;
+        bool has_grown = false;
+        for (int k = 0; k <= 2 * n; ++k) has_grown = has_grown || fabs(x[k]) > real(2) * stepper.scaled_at[k];
+        if (!has_grown) return;
+        for (int k = 0; k <= 2 * n; ++k) stepper.scaled_at[k] = fabs(x[k]);
         Formulas<K>::event(stepper.coefficients, x[0], x + 1, x + 1 + n, here);
         for (real& moved : x) {
             const real kept = moved;
@@ -158,9 +165,11 @@ struct Sides {
             for (int i = 0; i < switches_of<K>(); ++i) {
                 const real change =
                     fabs(there[K::events - switches_of<K>() + i] - here[K::events - switches_of<K>() + i]);
-                if (is_finite(change)) stepper.wall_scale[impacts_of<K>() + i] += change / Limits<real>::root_epsilon;
+                if (is_finite(change)) scale[i] += change / Limits<real>::root_epsilon;
             }
         }
+        for (int i = 0; i < switches_of<K>(); ++i)
+            if (scale[i] > stepper.wall_scale[impacts_of<K>() + i]) stepper.wall_scale[impacts_of<K>() + i] = scale[i];
     }
     static Status start(S& stepper, real time, const real* q, const real* p) {
         take(stepper, time, q, p);
@@ -292,6 +301,8 @@ private:
             const KnownEvents<S> known(*step);
             real row[1 + 2 * n];
             status = events.state(theta, row);
+            if constexpr (switches_of<K>() > 0)
+                if (status == Status::ok) Sides<K>::scale_switches(stepper, row[0], row + 1, row + 1 + n);
             if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
             if (status == Status::ok) status = pass(stepper, wall, number - first_wall, rows, count);
             if (status != Status::ok) break;

@@ -69,7 +69,8 @@ struct WatchedStepper : Stepper<K> {
     using real = typename K::real;
     typename K::Parameters parameters{};
     static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
-    real wall_scale[wall_room]{};  // the most that went into each wall's function so far
+    real wall_scale[wall_room]{};              // the most that went into each wall's function so far
+    real scaled_at[1 + 2 * K::coordinates]{};  // the time, positions and velocities, as large, that this is known of
 
     // At a state at one of its own times.
     Status restart(const real* position, const real* momentum, std::int64_t steps_since) {
