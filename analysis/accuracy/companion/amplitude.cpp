@@ -76,6 +76,27 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
     }
 }
 
+void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
+                        double steps, double epsilon,
+                        const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
+    constexpr double each = 16;  // roundings of a step
+    const std::size_t n = amplitudes.size() / 2;
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+        if (!(amplitudes[i] > 0 && amplitudes[i] < each * epsilon * steps * place[i])) continue;
+        for (std::size_t j = 0; j < comparisons && amplitudes[i] > 0; ++j) {
+            const auto [run, companion] = pair(j, i);
+            if (std::fabs(run - companion) > out_of_step * amplitudes[i]) amplitudes[i] = 0;
+        }
+        if (i < n && amplitudes[i] == 0) amplitudes[n + i] = 0;
+    }
+}
+
+std::vector<double> sizes_of(const std::vector<double>& least, const std::vector<double>& most) {
+    std::vector<double> sizes;
+    for (std::size_t i = 0; i < least.size(); ++i) sizes.push_back(std::fmax(std::fabs(least[i]), std::fabs(most[i])));
+    return sizes;
+}
+
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
                                   const std::vector<int>& groups) {
     const std::size_t n = groups.size();

@@ -12,8 +12,10 @@
 namespace lobatto {
 
 constexpr double by_chance = 0.1;  // of an amplitude: what is apart by more may meet again, and is no small error then
-constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
-constexpr double noise = 1e-10;      // of what moves a number: where that cancels, rounding leaves less
+constexpr double out_of_step = 0.5;     // of an amplitude: two motions of which each knows nothing of the other
+constexpr double momenta_alone = 0.01;  // likewise: where positions agree to this, momenta alone lose no motion. They
+                                        // may turn within a moment, as at the pericentre of a long orbit
+constexpr double noise = 1e-10;         // of what moves a number: where that cancels, rounding leaves less
 
 // Where a companion begins: a few units in the last place beside the start, so that it leaves it where nearby
 // trajectories diverge, also when the motion itself stands still in rounding.
@@ -36,6 +38,15 @@ std::vector<double> noise_levels(const std::vector<double>& sizes);
 // first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion.
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
+
+// An amplitude becomes 0 if the run and its companion differ by more than half of it, and it is no larger than what
+// roundings of a place add up to in so many steps: what rests moves by that. `place`: the largest size of each number.
+void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
+                        double steps, double epsilon,
+                        const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
+
+// The largest size of numbers in a range.
+std::vector<double> sizes_of(const std::vector<double>& least, const std::vector<double>& most);
 
 // Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding.
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,

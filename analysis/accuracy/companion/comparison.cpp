@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the difference between a run and its companion says of the error.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "analysis/accuracy/companion/amplitude.hpp"
 #include "analysis/accuracy/companion/companion.hpp"
@@ -13,7 +16,38 @@ namespace lobatto {
 namespace {
 
 constexpr int most_coupled = 16;    // coordinates of which that is looked for
-constexpr double exponential = 30;  // times more than errors that grow with the square of the time
+constexpr std::size_t windows = 8;  // in time, between the first error and the first that is as large as it can be
+// Doublings of errors that grow exponentially, from the first window to the last: more than errors have that grow with
+// a power of the time. Those that grow unevenly have more; those that jump, once a long orbit comes near a pole, have
+// none.
+constexpr double exponential = 14, certain = 25;
+constexpr double largest_jump = 0.45;  // of all doublings, from one window to the next
+
+using ErrorCourse = std::vector<std::pair<double, double>>;  // time, largest error until then
+
+// The time in which errors double, if they grow exponentially: all the way, not in jumps.
+std::optional<double> doubling_of(const ErrorCourse& course) {
+    const auto first = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > 0; });
+    auto last = std::find_if(first, course.end(), [](const auto& c) { return c.second > out_of_step / 2; });
+    if (last == course.end() && first != course.end()) last = std::prev(course.end());
+    if (first == course.end() || last - first < static_cast<std::ptrdiff_t>(windows)) return std::nullopt;
+    const double window = (last->first - first->first) / static_cast<double>(windows);
+    std::array<double, windows> largest{};
+    auto place = first;
+    for (std::size_t i = 0; i < windows; ++i)
+        for (; place <= last && place->first <= first->first + window * static_cast<double>(i + 1); ++place)
+            largest[i] = std::log2(place->second);
+    const double growth = largest.back() - largest.front(), mean = growth / static_cast<double>(windows - 1);
+    double spread = 0;
+    for (std::size_t i = 1; i < windows; ++i) {
+        const double step = largest[i] - largest[i - 1];
+        if (step > largest_jump * growth) return std::nullopt;
+        spread += (step - mean) * (step - mean) / static_cast<double>(windows - 1);
+    }
+    const bool is_even = std::sqrt(spread) < mean;
+    if (!(growth > (is_even ? exponential : certain))) return std::nullopt;
+    return window * static_cast<double>(windows - 1) / growth;
+}
 
 // `row`: q, p.
 void lose(MeasuredError& error, double time, const std::vector<double>& row) {
@@ -45,9 +79,12 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
                 if (i % n != j % n && found[i] > 0)
                     shared[i] = std::fmax(shared[i], noise * std::fabs(T[i * 2 * n + j]) * found[j]);
     }
-    leave_out_noise(shared, comparisons, [&](std::size_t j, std::size_t i) {
+    const auto pair = [&](std::size_t j, std::size_t i) {
         return std::pair(run_[j].row[i * parts_], companion_[j].row[i * parts_]);
-    });
+    };
+    leave_out_noise(shared, comparisons, pair);
+    leave_out_rounding(shared, comparisons, sizes_of(all.least, all.most), static_cast<double>(request_.steps),
+                       kernel_->epsilon, pair);
     return shared;
 }
 
@@ -60,7 +97,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const bool is_beyond = stopped_ && (*stopped_ - result.time) * request_.step >= 0;
     const std::optional<double> stopped = is_beyond ? std::nullopt : stopped_;
     error.companion_stopped = stopped;
-    std::vector<std::pair<double, double>> course;  // time, largest error until then
+    ErrorCourse course;
     struct {
         double end = 0, absolute = 0;
         std::size_t coordinate = 0;
@@ -70,16 +107,19 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.until = time_after(request_, run_[j].steps);
         error.end = 0;
         double apart = 0;
+        bool agree = true;  // positions
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;
             const double distance =
                 std::fabs(difference(run_[j].row.data() + i * parts_, companion_[j].row.data() + i * parts_, parts_));
             apart = std::fmax(apart, distance / amplitude[i]);
+            agree = agree && (i >= n || distance < momenta_alone * amplitude[i]);
             if (i >= n || !(of_run * distance / amplitude[i] > error.end)) continue;
             error.end = of_run * distance / amplitude[i];
             error.coordinate = i;
             error.absolute = of_run * distance;
         }
+        if (agree) apart = std::fmin(apart, momenta_alone);
         if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
         error.largest = std::fmax(error.largest, error.end);
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
@@ -93,18 +133,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.lost_p = request_.p;
     }
     error.complete = count == run_.size();
-    // Exponential growth: from the first error that is there to the first that is as large as it can be.
-    const auto first = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > 0; });
-    auto last = std::find_if(first, course.end(), [](const auto& c) { return c.second > out_of_step / 2; });
-    if (last == course.end() && first != course.end()) last = std::prev(course.end());
-    if (first != course.end() && last > first) {
-        const double growth = last->second / first->second, times = last->first / first->first;
-        // Half of the way in half of the time: a jump is no growth.
-        const auto middle = first + (last - first) / 2;
-        const double part = std::log(middle->second / first->second) / std::log(growth);
-        if (growth > exponential * times * times && part > 0.2 && part < 0.8)
-            error.doubling = (last->first - first->first) / std::log2(growth);
-    }
+    error.doubling = doubling_of(course);
     // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
     if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {

@@ -232,10 +232,13 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
     };
     std::vector<double> amplitude = amplitudes_of(least, most, groups_);
-    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), [&](std::size_t j, std::size_t i) {
+    const auto pair = [&](std::size_t j, std::size_t i) {
         const auto at = static_cast<std::int64_t>(j);
         return std::pair(run_at(at)[i * parts_], companion_at(at)[i * parts_]);
-    });
+    };
+    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), pair);
+    leave_out_rounding(amplitude, static_cast<std::size_t>(comparisons), sizes_of(least, most),
+                       static_cast<double>(request_.steps), kernel_->epsilon, pair);
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
@@ -246,12 +249,16 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     for (std::int64_t j = 0; j < comparisons; ++j) {
         const double *const run = run_at(j), *const companion = companion_at(j);
         error.relative = 0;
+        bool is_apart = false, agree = true;  // agree: positions
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;
             const double apart = std::fabs(difference(run + i * parts_, companion + i * parts_, parts_)) / amplitude[i];
-            if (i < n) error.relative = std::fmax(error.relative, of_run * apart);
-            error.lost = error.lost || !(apart < out_of_step);
+            is_apart = is_apart || !(apart < out_of_step);
+            if (i >= n) continue;
+            error.relative = std::fmax(error.relative, of_run * apart);
+            agree = agree && apart < momenta_alone;
         }
+        error.lost = error.lost || (is_apart && !agree);
         largest = std::fmax(largest, error.relative);
     }
     if (largest > by_chance) error.relative = largest;
