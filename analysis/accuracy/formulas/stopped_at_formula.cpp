@@ -10,6 +10,7 @@
 
 #include "analysis/tape.hpp"
 #include "generator/formula/switch.hpp"
+#include "generator/mechanics/clock/clock.hpp"
 
 namespace lobatto {
 
@@ -98,15 +99,45 @@ std::string end_of_table(const Domains& domains, const std::vector<double>& velo
         result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), what);
 }
 
+// Of a motion that escapes with a clock whose rate grows with the distance: the clock comes to infinity in a finite
+// time of its own, and steps grow beyond all bounds. Empty: it does not.
+std::string escape_of(const Scene& scene, const std::vector<double>& velocity, const TrajectoryRequest& request,
+                      const TrajectoryResult& result) {
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
+    const std::optional<Tape> rate = Tape::of(in_clock_time(scene).clock->rate, symbols);
+    if (!rate) return "";
+    std::vector<double> variables = request.parameters;
+    variables.insert(variables.end(), result.q.begin(), result.q.end());
+    const double lasts = std::fabs(request.step) * (*rate)(variables);
+    double speed = 0, distance = 0, at_start = 0, outwards = 0;
+    for (std::size_t k = 0; k < velocity.size(); ++k) {
+        speed = std::hypot(speed, velocity[k]);
+        distance = std::hypot(distance, result.q[k]);
+        at_start = std::hypot(at_start, request.q[k]);
+        outwards += result.q[k] * velocity[k];
+    }
+    if (!(lasts * speed > distance && distance > 3 * at_start && outwards > 0)) return "";
+    return fmt::format(
+        "the run stopped after t = {:.6g}, from q = {}, p = {}: a step of the clock {} lasts {:.3g} there, in which "
+        "the "
+        "motion would go {:.2g} times as far as it is from 0. It escapes, and the steps grow beyond all bounds. Try an "
+        "earlier end, a smaller step, equal steps (--clock none), or a clock that grows less, such as "
+        "r^(3/2)/(1 + sqrt(r)).",
+        result.time, list_text(result.q), list_text(result.p), scene.clock->text, lasts, lasts * speed / distance);
+}
+
 }  // namespace
 
 std::string stopped_at_formula(const Scene& scene, const Domains& domains, const Kernel& kernel,
                                const TrajectoryRequest& request, const TrajectoryResult& result) {
     const bool has_table = !scene.tables.empty(), has_switch = !scene.switches.empty();
-    if ((result.status != LOBATTO_NOT_FINITE && result.status != LOBATTO_NOT_CONVERGED) || (!has_table && !has_switch))
-        return "";
+    const bool has_failed = result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED;
+    if (!has_failed || !(has_table || has_switch || scene.clock)) return "";
     const std::optional<std::vector<double>> velocity = velocity_at_stop(kernel, request, result);
     if (!velocity) return "";
+    if (scene.clock) return escape_of(scene, *velocity, request, result);
     const std::string why = has_table ? end_of_table(domains, *velocity, request, result) : "";
     return why.empty() && has_switch ? root_at_switch(scene, *velocity, request, result) : why;
 }

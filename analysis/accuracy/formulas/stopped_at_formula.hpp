@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Why a step failed, where a formula has no value ahead: beyond the end of measured values, or of a root at a switch.
+// Why a step failed, where a formula has no value ahead (beyond the end of measured values, or of a root at a switch),
+// or where that of the clock grows beyond all bounds.
 #pragma once
 
 #include <string>
