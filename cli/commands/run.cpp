@@ -149,11 +149,14 @@ void print_table(const PreparedRun& run, const TrajectoryRequest& request, const
     print_row("time per step", duration(result.seconds / static_cast<double>(steps)));
     print_row("iterations", iterations_text(kernel, result, steps));
     const bool conserves = run.outline.conserves_energy();
+    const std::string at_most = request.dense > 0   ? "at most, at the ends of steps"
+                                : request.every > 1 ? "at most, of the states that are kept"
+                                                    : "at most";
     if (scene.outputs.energy) {
         const double H0 = std::fabs(result.energy_start);
         const bool relative = conserves && H0 > result.energy_error_largest;
         print_row(conserves ? "energy error" : "energy change",
-                  fmt::format("{:.2g} at most{}", result.energy_error_largest,
+                  fmt::format("{:.2g} {}{}", result.energy_error_largest, at_most,
                               relative ? fmt::format(", relative {:.2g}", result.energy_error_largest / H0) : ""));
     }
     if (const auto error = conserves ? watch.discrete_error() : std::nullopt)
@@ -161,12 +164,13 @@ void print_table(const PreparedRun& run, const TrajectoryRequest& request, const
     if (has_defect(run))
         print_row("symplectic defect",
                   request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
-                                        : defect_text(run));
+                  : scene.impacts.empty() ? defect_text(run)
+                                          : defect_text(run) + ", of a step without impacts");
     if (const auto error = watch.position_error()) {
         const std::string& unit = scene.coordinates.front().unit;
         print_row("position error",
-                  fmt::format("{:.2g}{} at most, against the exact {}solution", *error, unit.empty() ? "" : " " + unit,
-                              watch.is_elliptic() ? "elliptic " : ""));
+                  fmt::format("{:.2g}{} {}, against the exact {}solution", *error, unit.empty() ? "" : " " + unit,
+                              at_most, watch.is_elliptic() ? "elliptic " : ""));
     }
 }
 
@@ -278,8 +282,8 @@ api::RunOptions wish_of(const RunOptions& options) {
 void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, const RunVerdict& verdict,
                           const Files& files) {
     if (!verdict.failure.empty())
-        throw ComputationError(
-            fmt::format("{}: {} What was computed is in {}.", scene.path, verdict.failure, files.path()));
+        throw ComputationError(fmt::format("{}: {} What was computed {}.", scene.path, verdict.failure,
+                                           files.path() == standard_output ? "was written" : "is in " + files.path()));
     if (result.interrupted) {
         tell("lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, files.path(),
              files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");

@@ -39,6 +39,15 @@ Operand with_sign(int sign, Operand pieces) {
     return pieces;
 }
 
+// The side of a switch of u, which changes with what u holds.
+Operand as_side(const GiNaC::symbol& symbol, const Operand& u) {
+    Operand side = operand_of(symbol);
+    side.moves = u.moves;
+    side.velocities = u.velocities;
+    side.inputs = u.inputs;
+    return side;
+}
+
 // Whether u is 0 over stretches of a motion, where formulas of pieces in it are constant.
 bool stays_zero(const ex& u, const std::vector<Switch>& switches) {
     constexpr std::size_t most = 8;
@@ -272,8 +281,8 @@ private:
             const std::string what = fmt::format("the table {}, which goes from {:.6g} to {:.6g},", spline.file(),
                                                  first.value->to_double(), last.value->to_double());
             const auto least = DomainCondition::Kind::nonnegative;
-            require(least, arithmetic.add(argument, arithmetic.negate(first)), what, formula);
-            require(least, arithmetic.add(last, arithmetic.negate(argument)), what, formula);
+            require(least, arithmetic.add(argument, arithmetic.negate(first)), what, formula, 0, argument.expression);
+            require(least, arithmetic.add(last, arithmetic.negate(argument)), what, formula, 0, argument.expression);
             return arithmetic.table(number, argument);
         });
     }
@@ -317,17 +326,17 @@ private:
                  fmt::format("{} needs a number here: numbers, indices and parameters declared constant",
                              formula.at.text));
         for (const Switch& known : names_->switches)
-            if (known.value.is_equal(u.expression)) return operand_of(known.side);
+            if (known.value.is_equal(u.expression)) return as_side(known.side, u);
         names_->switches.push_back({u.expression, GiNaC::symbol(fmt::format("side_{}", names_->switches.size() + 1)),
                                     fmt::format("{} in {}", formula.at.text, frame.formula), formula.at.at});
-        return operand_of(names_->switches.back().side);
+        return as_side(names_->switches.back().side, u);
     }
 
     // Of constants the arithmetic itself finds what has no value.
     void require(DomainCondition::Kind kind, const Operand& part, const std::string& operation, const Syntax& formula,
-                 const GiNaC::ex& exponent = 0) {
+                 const GiNaC::ex& exponent = 0, const GiNaC::ex& argument = 0) {
         if (kind != DomainCondition::Kind::any && names_ != nullptr && names_->records && !part.value)
-            names_->conditions.push_back({kind, part.expression, exponent, operation, formula.at.at});
+            names_->conditions.push_back({kind, part.expression, exponent, argument, operation, formula.at.at});
     }
 
     // Of x^n with a parameter n that is whole, x may be negative; x^q has a logarithm in its derivative.

@@ -50,8 +50,9 @@ struct DomainCondition {
     enum class Kind : std::uint8_t { any, nonzero, nonnegative, positive, within_one, power };
     Kind kind = Kind::nonzero;
     GiNaC::ex expression;
-    GiNaC::ex exponent;     // of a power: of numbers and parameters where its kind is `power`
-    std::string operation;  // "a square root"
+    GiNaC::ex exponent;      // of a power: of numbers and parameters where its kind is `power`
+    GiNaC::ex argument = 0;  // of a table, which is asked for it; else 0
+    std::string operation;   // "a square root"
     Position at;
     bool of_motion = true;  // else of the step or the end time
 

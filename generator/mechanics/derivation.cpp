@@ -18,7 +18,11 @@ bool conserves_energy(const Scene& scene, const SystemOutline& system) {
     const auto gives_all_back = [&](const Impact& impact) {
         return impact.reset_position.empty() && impact.restitution.is_equal(1) && !impact.when.value.has(system.t);
     };
-    return system.autonomous && !system.has_forces() &&
+    // Events may hold the time: they only look at the motion.
+    const auto holds_time = [&](const auto& of) { return of.value.has(system.t); };
+    return !system.lagrangian.has(system.t) && !system.has_forces() &&
+           std::none_of(scene.constraints.begin(), scene.constraints.end(), holds_time) &&
+           std::none_of(scene.switches.begin(), scene.switches.end(), holds_time) &&
            std::all_of(scene.impacts.begin(), scene.impacts.end(), gives_all_back);
 }
 

@@ -156,7 +156,10 @@ private:
         for (Impact& impact : scene_.impacts) put_into(impact.when.value);
         for (std::vector<Switch>* list : {&scene_.switches, &scene_.seen_switches})
             for (Switch& one : *list) put_into(one.value);
-        for (DomainCondition& condition : scene_.conditions) put_into(condition.expression);
+        for (DomainCondition& condition : scene_.conditions) {
+            put_into(condition.expression);
+            put_into(condition.argument);
+        }
         if (scene_.clock) put_into(scene_.clock->rate);
         put_into(scene_.run.stops);
         put_into(scene_.outputs.events);

@@ -25,9 +25,12 @@ struct Reason {
 Reason off_constraints(bool on_the_way) {
     if (on_the_way)
         return {
-            "the motion goes on from an impact, or beyond a switch, with positions or momenta that do not keep the "
-            "constraints: a reset leads elsewhere, or the constraints have a corner there",
-            "a reset that keeps them, a restitution, which does, or constraints without corners"};
+            "the motion goes on, from an impact, beyond a switch or with another input, with positions or momenta that "
+            "do "
+            "not keep the constraints, or behind a wall: a reset leads elsewhere, an input has moved a wall past the "
+            "motion, or the constraints have a corner there",
+            "a reset that keeps them, a restitution, which does, inputs that change less at a time, or constraints "
+            "without corners"};
     return {"the start does not keep the constraints, or is behind a wall",
             "positions and velocities that keep them, or assemble = true under [run] of a scene with constraints"};
 }

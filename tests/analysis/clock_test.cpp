@@ -339,6 +339,25 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
     CHECK(swept.err.find("2 of 4 trajectories failed: 2 t + h equals t or the clock is 0.") != std::string::npos);
 }
 
+TEST_CASE("a clock that runs away with an escaping motion is told, and one that grows less goes on") {
+    const test::TemporaryFolder folder;
+    const auto run = [&](const std::string& clock) {
+        test::write_text(
+            folder / "scene.toml",
+            "lagrangian = \"(x'^2 + y'^2)/2 + 1/r\"\ndefinitions = { r = \"sqrt(x^2 + y^2)\" }\n[coordinates]\n"
+            "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 2 }\n[method]\npoints = 9\n"
+            "clock = \"" +
+                clock + "\"\n[run]\nstep = 0.3\nuntil = 1000\n");
+        return test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
+    };
+    const test::Finished away = run("auto");
+    CHECK(away.exit_code == 3);
+    CHECK(away.err.find("It escapes, and the steps grow beyond all bounds. Try an earlier end") != std::string::npos);
+    const test::Finished slower = run("r^(3/2)/(1 + sqrt(r))");
+    CHECK(slower.exit_code == 0);
+    CHECK(slower.err.empty());
+}
+
 TEST_CASE("a motion with a clock that fails tells the last state of its file") {
     const test::TemporaryFolder folder;
     for (const double step : {0.05, 0.1}) {

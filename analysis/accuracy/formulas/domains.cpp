@@ -65,8 +65,11 @@ Domains::Domains(const Scene& scene, const SystemOutline& system)
                             !kept.contains(written.expression);
         std::optional<Tape> exponent;
         if (written.kind == Kind::power && !(exponent = Tape::of(written.exponent, numbered))) continue;
+        std::optional<Tape> argument;
+        if (!written.argument.is_zero()) argument = Tape::of(scene.along_motion(written.argument), numbered);
         watches_ = watches_ || of_way;
-        conditions_.push_back({written, std::move(*tape), std::move(exponent), has_velocity, of_way});
+        conditions_.push_back(
+            {written, std::move(*tape), std::move(exponent), std::move(argument), has_velocity, of_way});
     }
 }
 
@@ -128,8 +131,11 @@ std::string Domains::text(const std::vector<double>& parameters, const double* r
         const DomainCondition& written = condition.written;
         std::string operation = written.operation;  // "the table a.csv, which goes from 0 to 2,"
         if (operation.ends_with(',')) operation.pop_back();
-        return fmt::format("{}, line {} column {}, is of {} = {:.6g}", operation, written.at.line, written.at.column,
-                           short_text(written.expression), condition.tape(variables));
+        return condition.argument
+                   ? fmt::format("{}, line {} column {}, is asked for {} = {:.6g}", operation, written.at.line,
+                                 written.at.column, short_text(written.argument), (*condition.argument)(variables))
+                   : fmt::format("{}, line {} column {}, is of {} = {:.6g}", operation, written.at.line,
+                                 written.at.column, short_text(written.expression), condition.tape(variables));
     }
     return "";
 }

@@ -33,6 +33,7 @@ private:
         DomainCondition written;
         Tape tape;
         std::optional<Tape> exponent;  // of a power
+        std::optional<Tape> argument;  // of a table
         bool has_velocity, of_way;     // of_way: kernels pass where it does not hold
     };
     bool holds(const Condition& condition, const std::vector<double>& variables) const;
