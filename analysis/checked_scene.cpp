@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "generator/describe/explain.hpp"
@@ -44,8 +45,11 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
     };
     if (!stops.empty()) all.push_back({"stops", true, stops, 0});
     if (!impacts.empty()) all.push_back({"impacts", true, impacts, 0});
+    std::map<std::string, int> places;  // of each text
+    for (const Switch& one : derivation.scene.switches) ++places[one.text];
     std::string switches;
-    for (const Switch& one : derivation.scene.switches) switches += (switches.empty() ? "" : ", ") + one.text;
+    for (const auto& [text, count] : places)
+        switches += (switches.empty() ? "" : ", ") + text + (count > 1 ? fmt::format(" ({} times)", count) : "");
     if (!switches.empty())
         all.push_back(
             {"not smooth", true, switches + ": steps are cut where it changes, so that the order is kept", 0});

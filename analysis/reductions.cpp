@@ -49,11 +49,12 @@ Reductions::Reductions(const Scene& scene) : n_(scene.coordinates.size()), param
     for (const Reduction& kept : scene.outputs.kept) {
         Part part{kept_of(kept.of), kept.event, std::nullopt};
         if (part.of != Kept::first && part.of != Kept::count) {
-            part.formula = Tape::of(scene.along_motion(kept.value), variables);
+            const GiNaC::ex value = scene.along_motion(kept.value);
+            part.formula = Tape::of(value, variables);
             if (!part.formula) throw InputError(fmt::format("{}: cannot be evaluated along a trajectory", kept.text));
-            needs_energy_ = needs_energy_ || kept.value.has(scene.outputs.energy_of_kept);
+            needs_energy_ = needs_energy_ || value.has(scene.outputs.energy_of_kept);
             for (const Coordinate& coordinate : scene.coordinates)
-                needs_velocity_ = needs_velocity_ || kept.value.has(coordinate.velocity);
+                needs_velocity_ = needs_velocity_ || value.has(coordinate.velocity);
         }
         parts_.push_back(part);
     }

@@ -24,7 +24,7 @@ double positive_part(double x) {
     return x < 0 ? 0 : x;
 }
 double side_of(double x) {
-    return x > 0 ? 1 : -1;
+    return x > 0 ? 1 : x <= 0 ? -1 : x;  // of what is no number none
 }
 
 // GiNaC's order of sums and products changes from process to process, and so would the rounding. This one follows from
@@ -194,7 +194,7 @@ std::string Tape::text(const std::string& result, const std::string& indent) con
         if (instruction.operation == Operation::call)
             value = instruction.function == positive_part ? fmt::format("{0} < 0 ? 0 : {0}", *first)
                     : instruction.function == side_of
-                        ? fmt::format("{} > 0 ? 1 : -1", *first)
+                        ? fmt::format("{0} > 0 ? 1 : {0} <= 0 ? -1 : {0}", *first)
                         : fmt::format("LOBATTO_LIBRARY({})({})", instruction.name, *first);
         if (instruction.operation == Operation::angle)
             value = fmt::format("LOBATTO_LIBRARY(atan2)({}, {})", first[0], first[1]);

@@ -88,7 +88,7 @@ struct Stepper::Parts {
     LoadedStepper<double> stepper;
     std::vector<double> parameters;
     double step, time = 0;
-    std::vector<double> q, p;
+    std::vector<double> q, p, start_q;
     double last_step = 0;    // of the last step taken; 0: none yet
     std::int64_t taken = 0;  // steps, or with a clock arrivals, since the start
     std::vector<double> event_rows;
@@ -125,8 +125,10 @@ struct Stepper::Parts {
         result.p = p;
         result.increment_failed = call.increment_failed;
         const Kernel::Parts& known = kernel.parts();
+        TrajectoryRequest from_start = request;
+        from_start.q = start_q;
         const std::lock_guard lock(algebra());
-        const std::string why = stopped_at_formula(known.scene, known.domains, known.kernel, request, result);
+        const std::string why = stopped_at_formula(known.scene, known.domains, known.kernel, from_start, result);
         throw ComputationError(known.scene.path + ": " + (why.empty() ? explain_stop(result, request) : why));
     }
 
@@ -135,6 +137,7 @@ struct Stepper::Parts {
         time = t;
         q.assign(position.begin(), position.end());
         p.assign(momentum.begin(), momentum.end());
+        start_q = q;
         last_step = 0;
         taken = 0;
         restart();

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "analysis/accuracy/formulas/jumps.hpp"
 #include "analysis/accuracy/formulas/stopped_at_formula.hpp"
 #include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/stability/linear_departure.hpp"
@@ -142,6 +143,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
         for (const std::string& warning :
              StepJudge::warnings(observers.judge.judge(run.outline, run.plain, request, result)))
             verdict.warnings.push_back(warning);
+    for (const std::string& jump : jumps_of(scene, request.parameters)) verdict.warnings.push_back(jump);
     verdict.failure = failure_of(run, request, result, observers, departure);
     return verdict;
 }

@@ -57,7 +57,7 @@ public:
         if (!measures) return;
         TrajectoryRequest beside = request;
         if (run.finer) add_digits(beside, run.scene, *run.finer);
-        companion.emplace(run.outline, run.finer.value_or(run.kernel), beside, run.finer.has_value());
+        companion.emplace(run.outline, run.finer.value_or(run.kernel), beside, run.kernel->epsilon);
     }
 
     void observe(const Records& records) {

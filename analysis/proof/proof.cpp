@@ -241,8 +241,8 @@ ProofRow order(const Convergence& convergence, const Kernel& kernel, const Quadr
         return not_decided("order of convergence",
                            fmt::format("{:.2f} where {} is promised: the motion is not smooth enough to tell",
                                        convergence.order, kernel->order));
-    // Orders of symmetric methods are even: this one is not two lower, nor does it fall short by an error of the
-    // kernel.
+    // Orders of symmetric methods are even: this one is not two lower, and the kernel is not
+    // the reason.
     constexpr int high_order = 12;
     if (!holds && kernel->order > high_order && convergence.order > kernel->order - 1.5 &&
         convergence.order < kernel->order + 2.5)
@@ -422,7 +422,10 @@ Proof prove(const Scene& written, const MethodChoice& method,
     }));
     say("checking momenta and energy over long runs", 0.97);
     momenta(rows, kernel, start, scene);
-    energies(rows, kernel, exact_kernel, start, states, forced ? "forces" : derivation.system.autonomous ? "" : "time");
+    energies(rows, kernel, exact_kernel, start, states,
+             forced                                        ? "forces"
+             : changes_with_time(scene, derivation.system) ? "time"
+                                                           : "");
 
     if (numbers != Precision::double_ && numbers != Precision::quadruple) {
         say("compiling and checking numbers in " + precision_name(numbers), 0.98);

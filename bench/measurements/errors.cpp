@@ -97,7 +97,7 @@ Row row_of(const Experiment& experiment, const Kernel& kernel, const std::option
         beside.whole_step =
             times_fraction(as_parts({experiment.until()}, static_cast<std::size_t>((*finer)->parts)), 1, steps);
     }
-    Companion companion(derivation, finer.value_or(kernel), beside, finer.has_value());
+    Companion companion(derivation, finer.value_or(kernel), beside, kernel->epsilon);
     request.sink = [&](const Records& records) { companion.observe(records); };
     companion.start();
     const TrajectoryResult result = integrate(kernel, request);

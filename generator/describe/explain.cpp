@@ -72,6 +72,7 @@ std::string kind_of(const Derivation& derivation) {
                             : "Kinetic minus potential energy, with constant masses";
     if (linear_terms && !holds_any(system.momentum_v, system.v))
         text += ", and terms linear in them, as of magnetic fields and rotating frames";
+    if (derivation.scene.clock) text += ", in the time of the clock";
     if (!system.autonomous) text += "; the time itself occurs";
     std::vector<int> forced;
     for (std::size_t k = 0; k < system.outer_force.size(); ++k)
@@ -157,7 +158,8 @@ std::string solver_text(const Derivation& derivation) {
     const auto words = [](const GroupSolve& solve) {
         const std::string equations =
             solve.unknowns == 1 ? "one equation" : fmt::format("{} equations", solve.unknowns);
-        if (solve.method == "nothing to solve") return std::string("nothing to solve: the motion is uniform");
+        if (solve.method == "nothing to solve")
+            return std::string("nothing to solve: no force depends on the positions inside a step");
         if (solve.method == "closed formula") return equations + ", by a closed formula";
         if (solve.method == "full matrix") return equations + ", as a full matrix";
         return fmt::format("{}, as a band of {} diagonals", equations, 2 * solve.band + 1);

@@ -48,17 +48,40 @@ Operand as_side(const GiNaC::symbol& symbol, const Operand& u) {
     return side;
 }
 
-// Whether u is 0 over stretches of a motion, where formulas of pieces in it are constant.
+std::string idle_text(bool is_condition) {
+    return fmt::format(
+        "{} over whole stretches of the motion, where this formula is undecided; write it with what goes "
+        "through 0, such as x > 0 in place of max(x, 0) > 0",
+        is_condition ? "both sides of this condition stay equal" : "the argument of this sign stays 0");
+}
+
+// Whether u is 0 over stretches of a motion, where formulas of pieces in it are constant: with some choice of their
+// sides, at places by chance.
 bool stays_zero(const ex& u, const std::vector<Switch>& switches) {
     constexpr std::size_t most = 8;
+    constexpr int places = 3;
     std::vector<GiNaC::symbol> sides;
     for (const Switch& one : switches)
         if (u.has(one.side)) sides.push_back(one.side);
     if (sides.empty() || sides.size() > most) return false;
+    GiNaC::exset symbols;
+    for (auto part = u.preorder_begin(); part != u.preorder_end(); ++part)
+        if (is_a<GiNaC::symbol>(*part)) symbols.insert(*part);
+    const auto is_zero = [&](std::size_t choice, int place) {
+        GiNaC::exmap values;
+        long chance = 1 + place;
+        for (const ex& symbol : symbols) values[symbol] = numeric(chance = chance * 7919 % 10007, 5003);
+        for (std::size_t i = 0; i < sides.size(); ++i) values[sides[i]] = (choice >> i & 1) != 0 ? 1 : -1;
+        try {
+            return abs(real_value(u, values)) < numeric("1e-40");
+        } catch (const NoValue&) {
+            return false;
+        }
+    };
     for (std::size_t choice = 0; choice >> sides.size() == 0; ++choice) {
-        GiNaC::exmap chosen;
-        for (std::size_t i = 0; i < sides.size(); ++i) chosen[sides[i]] = (choice >> i & 1) != 0 ? 1 : -1;
-        if (u.subs(chosen).expand().is_zero()) return true;
+        bool is_idle = true;
+        for (int place = 0; place < places && is_idle; ++place) is_idle = is_zero(choice, place);
+        if (is_idle) return true;
     }
     return false;
 }
@@ -249,12 +272,9 @@ private:
             }
             const bool is_of_one = name == "abs" || name == "sign";
             const Operand u = is_of_one ? parts[0] : less(parts[0], parts[1]);
-            if ((name == "sign" || name == "if") && names_ != nullptr && stays_zero(u.expression, names_->switches))
-                fail(
-                    formula.at, frame,
-                    fmt::format("{} over whole stretches of the motion, where this formula is undecided; write it with "
-                                "what goes through 0, such as x > 0 in place of max(x, 0) > 0",
-                                name == "if" ? "the sides of the condition are equal" : "the argument of sign is 0"));
+            if ((name == "sign" || name == "if") && (u.moves || u.velocities) &&
+                stays_zero(u.expression, names_->switches))
+                fail(formula.at, frame, idle_text(name == "if"));
             const Operand side = side_of(u, formula, frame);
             if (name == "sign" && !u.moves && !u.velocities)  // 0 may be its value for good
                 return arithmetic.multiply(operand_of(numeric(1, 2)),

@@ -94,10 +94,10 @@ void Parser::refuse_emptiness() const {
     if (has_direction_ && is_unknown && !suggestion(std::string(right), {"rising", "falling"}).empty())
         fail(token(), fmt::format("'{}' is no direction: write rising or falling", right.substr(0, 40)));
     if (has_direction_ && token().kind == Token::Kind::name && !at_direction() && find(right) == nullptr)
-        fail(token(),
-             fmt::format("'{}' is no direction: after an event stands rising or falling", right.substr(0, 40)));
+        fail(token(), fmt::format("'{}' is no direction: after an event write rising or falling, or nothing",
+                                  right.substr(0, 40)));
     if (find(right) == nullptr && (right == "and" || right == "or" || right == "not"))
-        fail(token(), fmt::format("there is no '{}' in formulas: put one if into another", right));
+        fail(token(), fmt::format("there is no '{}' in formulas: write one if inside another", right));
     fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
 }
 
@@ -290,8 +290,8 @@ Syntax Parser::read_pieced(const Token& name) {
         if (!token().is('<') && !token().is('>')) fail(token(), "a condition is written if(a > b, c, d)");
         const bool is_less = tokens_[next_++].is('<');
         if (token().is('='))
-            fail(token(),
-                 fmt::format("write {0} without =: sides are equal at single moments only", is_less ? '<' : '>'));
+            fail(token(), is_less ? "there is no <=: write if(a > b, d, c) in place of if(a <= b, c, d)"
+                                  : "there is no >=: write if(a < b, d, c) in place of if(a >= b, c, d)");
         pieced.operands.push_back(read_sum());
         if (is_less) std::swap(pieced.operands[0], pieced.operands[1]);
     }

@@ -3,8 +3,7 @@
 //
 // A step that is to be cut at u = 0 looks beyond it first, with the piece that it comes from. There a piece such as
 // max(u, 0) is negative, and a broken power of it has no value. positive_part(u) is u where u > 0 and 0 elsewhere, so
-// that the power is 0 beyond. Its derivative is given as 1: it stands in powers above 1 alone, whose derivatives are 0
-// beyond, too.
+// that the power is 0 beyond. Its derivative is given as 1: derivatives of powers above 1 are 0 beyond, too.
 //
 // side_of(u), 1 where u > 0 and -1 elsewhere, is for formulas that are evaluated along a motion and not derived.
 #pragma once

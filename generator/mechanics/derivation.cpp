@@ -14,15 +14,18 @@ const Discretisation& Derivation::discretisation() const {
     return *discretisation_;
 }
 
+bool changes_with_time(const Scene& scene, const SystemOutline& system) {
+    const auto holds_time = [&](const auto& of) { return of.value.has(system.t); };
+    return system.lagrangian.has(system.t) ||
+           std::any_of(scene.constraints.begin(), scene.constraints.end(), holds_time) ||
+           std::any_of(scene.switches.begin(), scene.switches.end(), holds_time);
+}
+
 bool conserves_energy(const Scene& scene, const SystemOutline& system) {
     const auto gives_all_back = [&](const Impact& impact) {
         return impact.reset_position.empty() && impact.restitution.is_equal(1) && !impact.when.value.has(system.t);
     };
-    // Events may hold the time: they only look at the motion.
-    const auto holds_time = [&](const auto& of) { return of.value.has(system.t); };
-    return !system.lagrangian.has(system.t) && !system.has_forces() &&
-           std::none_of(scene.constraints.begin(), scene.constraints.end(), holds_time) &&
-           std::none_of(scene.switches.begin(), scene.switches.end(), holds_time) &&
+    return !changes_with_time(scene, system) && !system.has_forces() &&
            std::all_of(scene.impacts.begin(), scene.impacts.end(), gives_all_back);
 }
 

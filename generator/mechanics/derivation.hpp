@@ -15,6 +15,8 @@ namespace lobatto {
 
 // Whether the motion keeps its energy: no time, no forces, and walls that give all of it back.
 bool conserves_energy(const Scene& scene, const SystemOutline& system);
+// Whether the time itself matters to the motion; to events that only look at it, it may.
+bool changes_with_time(const Scene& scene, const SystemOutline& system);
 
 struct Derivation {
     Scene scene;

@@ -31,16 +31,19 @@ public:
         : scene_(scene), system_(system), start_(start) {}
 
     void require_all() {
-        std::vector<const DomainCondition*> conditions;
-        for (const DomainCondition& condition : scene_.conditions) {
+        std::vector<DomainCondition> conditions;
+        for (DomainCondition condition : scene_.conditions) {
+            // Kernels need not know all switches that they hold.
+            condition.expression = scene_.along_motion(condition.expression);
+            condition.exponent = scene_.along_motion(condition.exponent);
             const bool moves = scene_.start == Start::momentum &&
                                std::any_of(system_.v.begin(), system_.v.end(),
                                            [&](const auto& v) { return condition.expression.has(v); });
-            if (!moves) conditions.push_back(&condition);  // else velocities are not known yet
+            if (!moves) conditions.push_back(std::move(condition));  // else velocities are not known yet
         }
         for (const auto& [begin, end] : portions_of(conditions.size())) {
             if (all_hold(conditions, begin, end)) continue;
-            for (std::size_t i = begin; i < end; ++i) require_domain(*conditions[i]);
+            for (std::size_t i = begin; i < end; ++i) require_domain(conditions[i]);
         }
     }
 
@@ -52,13 +55,13 @@ private:
         return value_is(DomainCondition::of_base(exponent == cln::round1(exponent), cln::minusp(exponent)), value);
     }
 
-    bool all_hold(const std::vector<const DomainCondition*>& conditions, std::size_t begin, std::size_t end) {
+    bool all_hold(const std::vector<DomainCondition>& conditions, std::size_t begin, std::size_t end) {
         std::vector<ex> expressions;
-        for (std::size_t i = begin; i < end; ++i) expressions.push_back(conditions[i]->expression);
+        for (std::size_t i = begin; i < end; ++i) expressions.push_back(conditions[i].expression);
         try {
             const std::vector<Sized> values = start_.evaluate_sized(start_.convert(expressions));
             for (std::size_t i = begin; i < end; ++i)
-                if (!holds(*conditions[i], values[i - begin])) return false;
+                if (!holds(conditions[i], values[i - begin])) return false;
             return true;
         } catch (const DomainError&) {
             return false;

@@ -158,6 +158,7 @@ private:
             for (Switch& one : *list) put_into(one.value);
         for (DomainCondition& condition : scene_.conditions) {
             put_into(condition.expression);
+            put_into(condition.exponent);
             put_into(condition.argument);
         }
         if (scene_.clock) put_into(scene_.clock->rate);

@@ -2,7 +2,6 @@
 // The keys of a scene file and what they mean: a document in, a Scene out. Every key is described in
 // docs/scene_format.md.
 #include "generator/scene/scene.hpp"
-#include "generator/formula/switch.hpp"
 
 #include <fmt/format.h>
 

@@ -25,10 +25,8 @@ struct Reason {
 Reason off_constraints(bool on_the_way) {
     if (on_the_way)
         return {
-            "the motion goes on, from an impact, beyond a switch or with another input, with positions or momenta that "
-            "do "
-            "not keep the constraints, or behind a wall: a reset leads elsewhere, an input has moved a wall past the "
-            "motion, or the constraints have a corner there",
+            "after an impact, a switch or a new input the motion does not keep the constraints, or is behind a wall: a "
+            "reset leads elsewhere, an input has moved a wall past the motion, or the constraints have a corner there",
             "a reset that keeps them, a restitution, which does, inputs that change less at a time, or constraints "
             "without corners"};
     return {"the start does not keep the constraints, or is behind a wall",

@@ -204,6 +204,36 @@ TEST_CASE("two motions that diverged and meet again by chance are not taken for 
     CHECK((is_lost || is_warned));
 }
 
+TEST_CASE("regular motions whose errors jump, and motions at rest, are neither exponential nor lost") {
+    const auto kepler = [](const std::string& e, const std::string& until) {
+        return Place("lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[parameters]\ne = " + e +
+                     "\n[coordinates]\nx = { position = \"1 - e\", velocity = 0 }\n"
+                     "y = { position = 0, velocity = \"sqrt((1 + e)/(1 - e))\" }\n[method]\npoints = 9\n"
+                     "clock = \"auto\"\n[run]\nstep = \"0.7*(1 - e)^(3/2)\"\nuntil = \"" +
+                     until + "\"\n");
+    };
+    // Defect once: errors were said to double every 1.8 of 10 pi, and every 7.2 of 40 pi.
+    for (const std::string until : {"2*pi", "10*pi", "40*pi"})
+        CHECK(kepler("0.99", until).run().out.find("double every") == std::string::npos);
+    // Defect once: exit code 3, because p_x turns within 1e-8 of the time.
+    CHECK(kepler("0.99999", "20*pi").run().exit_code == 0);
+    // Defect once: likewise at rest at L4, a stable equilibrium, after roundings had added up to 1e-12.
+    const test::Finished resting =
+        Place(
+            "lagrangian = \"(x'^2 + y'^2)/2 + x*y' - y*x' + (x^2 + y^2)/2 + (1 - mu)/r1 + mu/r2\"\n"
+            "definitions = { r1 = \"sqrt((x + mu)^2 + y^2)\", r2 = \"sqrt((x - 1 + mu)^2 + y^2)\" }\n[parameters]\n"
+            "mu = 0.01\n[coordinates]\nx = { position = \"0.5 - mu\", velocity = 0 }\n"
+            "y = { position = \"sqrt(3)/2\", velocity = 0 }\n[method]\npoints = 8\n[run]\nstep = 0.1\nuntil = 3000\n")
+            .run();
+    CHECK(resting.exit_code == 0);
+    CHECK(resting.out.find("measured error          0.0e+00 of the amplitude at the end") != std::string::npos);
+    // What is chaotic is told all the same.
+    const test::TemporaryFolder folder;
+    const test::Finished chaotic = test::run({LOBATTO_PROGRAM, "run", LOBATTO_SOURCE_DIR "/scenes/double_pendulum.toml",
+                                              "--until", "60", "-o", folder / "run.csv"});
+    CHECK(chaotic.out.find("errors double every 2.") != std::string::npos);
+}
+
 TEST_CASE("a run of which nothing is left returns 3 and says so, also when it is quiet") {
     struct Row {
         std::string lagrangian, coordinates, method;

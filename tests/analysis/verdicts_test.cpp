@@ -75,9 +75,17 @@ TEST_CASE("a Lagrangian that jumps has no motion there, and a run says so") {
         CHECK(done.err.find("The Lagrangian jumps where it goes from one piece to another (if in the Lagrangian)") !=
               std::string::npos);
     }
-    for (const std::string lagrangian : {"x'^2/2 - x^2*if(x > 0, 1, 4)", "x'^2/2 - abs(abs(x) - 0.5)"}) {
+    for (const std::string lagrangian : {"x'^2/2 - x^2*if(x > 0, 1, 4)", "x'^2/2 - abs(abs(x) - 0.5)",
+                                         "x'^2/2 - if(x > 1/3, 0.333333 - x, 0)"}) {  // jumps by a rounded constant
         CAPTURE(lagrangian);
         const test::Finished done = run(jumping(lagrangian));
         CHECK_MESSAGE(done.exit_code == 0, done.err);
+        CHECK(done.err.empty());
     }
+    // A jump that takes no half of the energy is warned of.
+    const test::Finished small = run(jumping("x'^2/2 - x^4/4 - 0.001*if(x > 0, 1, 0)"));
+    CHECK(small.exit_code == 0);
+    CHECK(small.err.find(
+              "the Lagrangian jumps, by some 0.001, where if in the Lagrangian (line 1 column 38) goes from one "
+              "piece to the other") != std::string::npos);
 }

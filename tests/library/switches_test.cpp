@@ -51,7 +51,7 @@ TEST_CASE("Hertz's law of contact, in each form that people write it in") {
                                       "200*if(x < 0, -x, 0)^(5/2)", "200*4^2.5*(max(-x, 0)/4)^2.5"}) {
         CAPTURE(contact);
         const lob::Trajectory run = lob::run(scene_of(collision(contact)));
-        CHECK(std::fabs(run.q.back() - exact) < 2e-8);  // 2.6e-9; 1.6e-3 with the smooth form of docs/scene_format.md
+        CHECK(std::fabs(run.q.back() - exact) < 2e-8);  // 2.6e-9; the form ((sqrt(x^2 + 1e-12) - x)/2)^2.5 has 1.6e-3
         CHECK(run.error.value() < 1e-6);
     }
     // Its exponent and its length as parameters, the length in a definition; in the numbers of every kind.
@@ -95,6 +95,12 @@ TEST_CASE("what is kept of a trajectory is on the side where the motion is") {
         const double energy = contact.front() == '2' ? 6 : 6 + 1.5 * 1.3;
         CHECK(sweep.kept[2] == doctest::Approx(std::fabs(sweep.q[0]) + energy).epsilon(1e-9));
     }
+    // Velocities and H that stand in conditions alone; and a piece that a factor 0 takes out of the kernel.
+    const lob::Sweep there_and_back = lob::sweep(
+        scene_of(collision("200*max(-x, 0)^3 + 0*max(x, 0)^2.5",
+                           "[output]\nkeep = [\"max(sign(x'))\", \"min(sign(x'))\", \"mean(if(H > 5, 2, 3))\"]\n")),
+        {1, {}}, {});
+    CHECK(there_and_back.kept == std::vector<double>{1, -1, 2});
     // And no kernel looks for what only these formulas hold.
     const lobatto::Scene smooth =
         lobatto::read_scene(lobatto::Source("smooth.toml", collision("m*(x^2 + 0.3*x^4)/2", output)));
@@ -150,6 +156,7 @@ TEST_CASE("where both sides are equal a condition does not hold, and sign is 0")
         CHECK(lobatto::test::contains(lobatto::test::message_of<lob::InputError>([&] { end_of(force); }),
                                       "over whole stretches of the motion, where this formula is undecided"));
     }
+    CHECK(end_of("if(max(none, 0) > 0, 1, 0)") == doctest::Approx(free).epsilon(1e-10));  // of what does not move
     CHECK(end_of("if(if(x > 0, 1, 0) > 0.5, 0.3, 0)") != doctest::Approx(free).epsilon(1e-3));
 }
 

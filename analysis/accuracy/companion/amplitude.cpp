@@ -79,10 +79,9 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
                         double steps, double epsilon,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
-    constexpr double each = 16;  // roundings of a step
     const std::size_t n = amplitudes.size() / 2;
     for (std::size_t i = 0; i < 2 * n; ++i) {
-        if (!(amplitudes[i] > 0 && amplitudes[i] < each * epsilon * steps * place[i])) continue;
+        if (!(amplitudes[i] > 0 && amplitudes[i] < epsilon * steps * place[i])) continue;
         for (std::size_t j = 0; j < comparisons && amplitudes[i] > 0; ++j) {
             const auto [run, companion] = pair(j, i);
             if (std::fabs(run - companion) > out_of_step * amplitudes[i]) amplitudes[i] = 0;

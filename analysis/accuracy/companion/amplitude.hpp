@@ -39,8 +39,8 @@ std::vector<double> noise_levels(const std::vector<double>& sizes);
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
-// An amplitude becomes 0 if the run and its companion differ by more than half of it, and it is no larger than what
-// roundings of a place add up to in so many steps: what rests moves by that. `place`: the largest size of each number.
+// An amplitude becomes 0 if the run and its companion differ by more than half of it, and it is no larger than one
+// rounding of the place a step: what rests moves by that. `place`: the largest size of each number.
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
                         double steps, double epsilon,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);

@@ -42,10 +42,11 @@ std::int64_t companion_steps(std::int64_t steps) {
     return taken;
 }
 
-Companion::Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, bool is_finer)
+Companion::Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, double run_epsilon)
     : kernel_(kernel),
       parts_(static_cast<std::size_t>(kernel->parts)),
-      is_finer_(is_finer),
+      run_epsilon_(run_epsilon),
+      is_finer_(kernel->epsilon < run_epsilon),
       groups_(amplitude_groups(outline.scene)),
       rows_a_step_(1 + request.dense),
       narrow_(outline.system) {

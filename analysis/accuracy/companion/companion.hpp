@@ -48,8 +48,8 @@ inline constexpr double finer_iteration = 1e-3;
 class Companion {
 public:
     // What is handed over is copied, but for what the kernel needs. `request`: the run's; its whole numbers are those
-    // of `kernel`, which are the run's too, or finer.
-    Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, bool is_finer = false);
+    // of `kernel`, which are the run's too, or finer. `run_epsilon`: of the run's.
+    Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, double run_epsilon);
     ~Companion();
 
     // The kept states of the run go by.
@@ -100,8 +100,9 @@ private:
     MeasuredError compare(const TrajectoryResult& result) const;
 
     Kernel kernel_;
-    std::size_t parts_;  // of its numbers
-    bool is_finer_;      // than those of the run
+    std::size_t parts_;   // of its numbers
+    double run_epsilon_;  // of those of the run
+    bool is_finer_;       // than those
     TrajectoryRequest request_;
     std::vector<int> groups_;
     int rows_a_step_;

@@ -18,12 +18,12 @@ namespace {
 constexpr int most_coupled = 16;    // coordinates of which that is looked for
 constexpr std::size_t windows = 8;  // in time, between the first error and the first that is as large as it can be
 // Doublings of errors that grow exponentially, from the first window to the last: more than errors have that grow with
-// a power of the time. Those that grow unevenly have more; those that jump, once a long orbit comes near a pole, have
-// none.
+// a power of the time. Those that grow unevenly need more; those that jump once, as when a long orbit passes a pole, do
+// not count.
 constexpr double exponential = 14, certain = 25;
 constexpr double largest_jump = 0.45;  // of all doublings, from one window to the next
 
-using ErrorCourse = std::vector<std::pair<double, double>>;  // time, largest error until then
+using ErrorCourse = std::vector<std::pair<double, double>>;  // time, how far the motions are apart
 
 // The time in which errors double, if they grow exponentially: all the way, not in jumps.
 std::optional<double> doubling_of(const ErrorCourse& course) {
@@ -32,11 +32,15 @@ std::optional<double> doubling_of(const ErrorCourse& course) {
     if (last == course.end() && first != course.end()) last = std::prev(course.end());
     if (first == course.end() || last - first < static_cast<std::ptrdiff_t>(windows)) return std::nullopt;
     const double window = (last->first - first->first) / static_cast<double>(windows);
-    std::array<double, windows> largest{};
+    std::array<double, windows> largest{};  // until the end of each, in powers of 2
     auto place = first;
-    for (std::size_t i = 0; i < windows; ++i)
-        for (; place <= last && place->first <= first->first + window * static_cast<double>(i + 1); ++place)
-            largest[i] = std::log2(place->second);
+    double most = 0;
+    for (std::size_t i = 0; i < windows; ++i) {
+        const double end = first->first + window * static_cast<double>(i + 1);
+        for (; place <= last && (i + 1 == windows || place->first <= end); ++place)
+            most = std::fmax(most, place->second);
+        largest[i] = std::log2(most);
+    }
     const double growth = largest.back() - largest.front(), mean = growth / static_cast<double>(windows - 1);
     double spread = 0;
     for (std::size_t i = 1; i < windows; ++i) {
@@ -84,7 +88,7 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     };
     leave_out_noise(shared, comparisons, pair);
     leave_out_rounding(shared, comparisons, sizes_of(all.least, all.most), static_cast<double>(request_.steps),
-                       kernel_->epsilon, pair);
+                       run_epsilon_, pair);
     return shared;
 }
 
@@ -107,19 +111,20 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.until = time_after(request_, run_[j].steps);
         error.end = 0;
         double apart = 0;
-        bool agree = true;  // positions
+        bool agree = true, any = false;  // positions
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;
             const double distance =
                 std::fabs(difference(run_[j].row.data() + i * parts_, companion_[j].row.data() + i * parts_, parts_));
             apart = std::fmax(apart, distance / amplitude[i]);
+            any = any || i < n;
             agree = agree && (i >= n || distance < momenta_alone * amplitude[i]);
             if (i >= n || !(of_run * distance / amplitude[i] > error.end)) continue;
             error.end = of_run * distance / amplitude[i];
             error.coordinate = i;
             error.absolute = of_run * distance;
         }
-        if (agree) apart = std::fmin(apart, momenta_alone);
+        if (any && agree) apart = std::fmin(apart, momenta_alone);
         if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
         error.largest = std::fmax(error.largest, error.end);
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));

@@ -189,7 +189,7 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     request.steps = request_.steps;
     request.every = request_.every == 0 ? request_.steps : request_.every;
     request.tolerance = request_.tolerance;
-    Companion companion(outline_, kernel_, request);
+    Companion companion(outline_, kernel_, request, kernel_->epsilon);
     Records kept = trajectory.kept;
     if (trajectory.stop >= 0) --kept.count;  // where it was stopped, between two steps
     companion.observe(kept);
@@ -249,16 +249,18 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     for (std::int64_t j = 0; j < comparisons; ++j) {
         const double *const run = run_at(j), *const companion = companion_at(j);
         error.relative = 0;
-        bool is_apart = false, agree = true;  // agree: positions
+        bool is_apart = false, agree = true, any = false;  // any that agree: positions
         for (std::size_t i = 0; i < 2 * n; ++i) {
             if (!(amplitude[i] > 0)) continue;
             const double apart = std::fabs(difference(run + i * parts_, companion + i * parts_, parts_)) / amplitude[i];
             is_apart = is_apart || !(apart < out_of_step);
+            error.lost = error.lost || std::isnan(apart);
             if (i >= n) continue;
             error.relative = std::fmax(error.relative, of_run * apart);
             agree = agree && apart < momenta_alone;
+            any = true;
         }
-        error.lost = error.lost || (is_apart && !agree);
+        error.lost = error.lost || (is_apart && !(any && agree));
         largest = std::fmax(largest, error.relative);
     }
     if (largest > by_chance) error.relative = largest;

@@ -49,7 +49,7 @@ std::string root_at_switch(const Scene& scene, const std::vector<double>& veloci
         return variables;
     };
     const auto is_met = [&](const Switch& one) {
-        const std::optional<Tape> value = Tape::of(one.value, symbols);
+        const std::optional<Tape> value = Tape::of(scene.along_motion(one.value), symbols);
         if (!value) return false;
         const double here = (*value)(variables_after(0)), ahead = (*value)(variables_after(2 * request.step));
         return here * ahead <= 0 || std::fabs(here) < 1e-9 * std::fabs(ahead);
@@ -58,12 +58,16 @@ std::string root_at_switch(const Scene& scene, const std::vector<double>& veloci
         const std::optional<Tape> formula = Tape::of(condition.exponent, symbols);
         return formula ? (*formula)(variables_after(0)) : 0;
     };
+    const auto is_broken_power = [](const DomainCondition& condition) {
+        return condition.kind == DomainCondition::Kind::power || condition.operation == "a broken power";
+    };
     const auto what_is_missing = [&](const DomainCondition& condition) -> std::string_view {
         using Kind = DomainCondition::Kind;
         if (condition.expression.has(positive_part(GiNaC::wild())))
-            return exponent_of(condition) < 2 ? "and its second derivative is not finite there. Write an exponent of "
-                                                "at least 2 (in a force 1), or"
-                                              : "";
+            return is_broken_power(condition) && exponent_of(condition) < 2
+                       ? "and its second derivative is not finite there. Write an exponent of "
+                         "at least 2 (in a force 1), or"
+                       : "";
         const double exponent = condition.kind == Kind::power ? exponent_of(condition) : 0.5;
         const bool is_root =
             condition.kind == Kind::nonnegative || condition.kind == Kind::positive || condition.kind == Kind::power;
@@ -73,7 +77,9 @@ std::string root_at_switch(const Scene& scene, const std::vector<double>& veloci
     };
     for (const DomainCondition& condition : scene.conditions)
         for (const Switch& one : scene.switches) {
+            // Of powers in forces no second derivative is asked for.
             if (!condition.expression.has(one.side) || !is_met(one)) continue;
+            if (is_broken_power(condition) && !scene.lagrangian.has(one.side)) continue;
             const std::string_view missing = what_is_missing(condition);
             if (missing.empty()) continue;
             return fmt::format(

@@ -53,6 +53,8 @@ cln::cl_R slope(const Node& node, const cln::cl_R& x, const cln::cl_R& value) {
             return 1 / (1 + cln::square(x));
         case Op::positive_part:
             return 1;
+        case Op::side:
+            return 0;
         default:
             throw std::logic_error("slope: not an operation with one operand");
     }

@@ -75,7 +75,8 @@ public:
         for (const auto& [degree, sum] : of_degree) action += sum * GiNaC::pow(g_, 1 - degree);
         result.lagrangian = action;
         result.outputs.energy = true;  // kernels take E from it
-        for (DomainCondition& condition : result.conditions) condition.expression = in_clock_time(condition.expression);
+        for (DomainCondition& condition : result.conditions)
+            for (ex* formula : {&condition.expression, &condition.argument}) *formula = in_clock_time(*formula);
         for (Eliminated& x : result.eliminated) x.velocity = in_clock_time(x.velocity);
         const std::string name = clock.energy.get_name();
         result.parameters.push_back(

@@ -34,7 +34,7 @@ public:
         separable_.is_explicit = quadrature_.is_explicit();
         separable_.clean = scene_.method.arithmetic == StepArithmetic::clean && !general_.full;
         result_.linear = system_.linear && !general_.full && !separable_.clean;
-        result_.closed_solution = find_closed_solution(system_);
+        if (!scene_.is_cut()) result_.closed_solution = find_closed_solution(system_);
         findings_ = elimination_findings(scene_);
         choose_form();
         if (form_ == Form::general)

@@ -176,8 +176,8 @@ TEST_CASE("missing operators and parentheses are named with their mend") {
     check_error("m(q + 1)", 2, "missing operator: write m*(");
     check_error("(q)(q)", 4, "missing operator: write )*(");
     check_error("2e", 2, "missing operator: write 2*e");
-    check_error("if(q >= 1, q, 1)", 7, "write > without =: sides are equal at single moments only");
-    check_error("if(q > 1 and q < 2, q, 1)", 10, "there is no 'and' in formulas: put one if into another");
+    check_error("if(q >= 1, q, 1)", 7, "there is no >=: write if(a < b, d, c) in place of if(a >= b, c, d)");
+    check_error("if(q > 1 and q < 2, q, 1)", 10, "there is no 'and' in formulas: write one if inside another");
     check_error("sin q", 1, "sin needs parentheses: write sin(q)");
     check_error("2*cos", 3, "cos needs parentheses: write cos(...)");
     check_error("sin^2(q)", 4, "write sin(...)^2 instead of sin^2(...)");

@@ -627,7 +627,7 @@ TEST_CASE("events have two sides and may have a direction") {
     check("[1]", 11, "an event must be a text such as \"x = 0 rising\", not a whole number");
     check("[\"q\"]", 13, "an event is written x = 0, x = 0 rising or x = y falling");
     check("[\"q = 0 risng\"]", 18, "'risng' is no direction: write rising or falling");
-    check("[\"q = 0 fast\"]", 18, "'fast' is no direction: after an event stands rising or falling");
+    check("[\"q = 0 fast\"]", 18, "'fast' is no direction: after an event write rising or falling, or nothing");
     check("[\"q < 0\"]", 14, "unexpected character '<' in the event: a comparison stands only in if(a < b, c, d)");
     check("[\"q = 0 = m\"]", 18, "an event has one =");
     check("[\"q = 0 rising falling\"]", 25, "missing operator: write rising*falling");

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "analysis/accuracy/formulas/jumps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+
+#include "analysis/tape.hpp"
+
+namespace lobatto {
+
+namespace {
+
+constexpr int tried_places = 8;             // of each switch, at random
+constexpr double notable = 1e-4;            // of the pieces: constants that people round jump by less
+constexpr std::size_t most_switches = 256;  // switches that are looked at
+
+class Jumps {
+public:
+    Jumps(const Scene& scene, const std::vector<double>& parameters) : scene_(scene), parameters_(parameters.size()) {
+        for (const Parameter& parameter : scene.parameters) symbols_.push_back(parameter.symbol);
+        for (const Coordinate& coordinate : scene.coordinates) symbols_.push_back(coordinate.position);
+        for (const Coordinate& coordinate : scene.coordinates) symbols_.push_back(coordinate.velocity);
+        symbols_.push_back(scene.time);
+        variables_ = parameters;
+        variables_.resize(symbols_.size());
+    }
+
+    // The median jump where u = 0, and the size of the pieces there; nothing where that is not known.
+    std::optional<std::pair<double, double>> of(const Switch& one) {
+        const auto piece = [&](int side) {
+            return Tape::of(scene_.along_motion(scene_.lagrangian.subs(one.side == side)), symbols_);
+        };
+        const std::optional<Tape> above = piece(1), below = piece(-1),
+                                  u = Tape::of(scene_.along_motion(one.value), symbols_);
+        std::size_t k = 0;
+        const std::optional<Tape> slope = slope_of(one, k);
+        if (!above || !below || !u || !slope) return std::nullopt;
+        std::vector<std::pair<double, double>> found;
+        for (int place = 0; place < tried_places; ++place) {
+            for (std::size_t i = parameters_; i < variables_.size(); ++i) variables_[i] = random();
+            const double rate = (*slope)(variables_);
+            variables_[k] -= (*u)(variables_) / rate;
+            const double a = (*above)(variables_), b = (*below)(variables_), jump = std::fabs(a - b);
+            if (std::isfinite(jump)) found.emplace_back(jump, std::fmax(std::fabs(a), std::fabs(b)));
+        }
+        if (found.size() < tried_places / 2) return std::nullopt;
+        std::sort(found.begin(), found.end());
+        return found[found.size() / 2];
+    }
+
+private:
+    // du/dx of the first position, else velocity, in which u is linear: number k.
+    std::optional<Tape> slope_of(const Switch& one, std::size_t& k) const {
+        for (k = parameters_; k + 1 < symbols_.size(); ++k) {
+            const GiNaC::ex slope = one.value.diff(symbols_[k]);
+            if (!slope.is_zero() && !slope.has(symbols_[k])) return Tape::of(scene_.along_motion(slope), symbols_);
+        }
+        return std::nullopt;
+    }
+    double random() { return 2 * static_cast<double>(generator_() >> 11) * 0x1p-53 - 1; }
+
+    const Scene& scene_;
+    std::size_t parameters_;
+    std::vector<GiNaC::symbol> symbols_;
+    std::vector<double> variables_;
+    std::mt19937_64 generator_{1};
+};
+
+}  // namespace
+
+std::vector<std::string> jumps_of(const Scene& scene, const std::vector<double>& parameters) {
+    std::vector<std::string> sentences;
+    Jumps jumps(scene, parameters);
+    for (std::size_t i = 0; i < std::min(scene.switches.size(), most_switches); ++i) {
+        const Switch& one = scene.switches[i];
+        if (!scene.lagrangian.has(one.side)) continue;
+        const auto jump = jumps.of(one);
+        if (jump && jump->first > notable * jump->second)
+            sentences.push_back(
+                fmt::format("the Lagrangian jumps, by some {:.2g}, where {} (line {} column {}) goes from one piece to "
+                            "the other. No "
+                            "motion follows that: write both pieces so that they have one value there",
+                            jump->first, one.text, one.at.line, one.at.column));
+    }
+    return sentences;
+}
+
+}  // namespace lobatto
