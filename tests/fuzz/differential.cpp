@@ -289,8 +289,9 @@ private:
             }
             case Op::sincos_pair:
             case Op::pair_sine:
-            case Op::pair_cosine:
-                break;  // made by a pass only
+            case Op::pair_cosine:  // made by a pass only
+            case Op::table:        // no formula here has one
+                break;
         }
         return std::nanl("");
     }
