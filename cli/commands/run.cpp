@@ -381,9 +381,9 @@ void add_run(CommandLine& program) {
     command.option("--every", options->overrides.every, "Keep every N-th state; with a clock the time between two")
         .shown_as("N");
     add_set_option(command, options->overrides);
-    command.flag(
-        "--resume", options->resume,
-        "Continue the same run where it was interrupted or killed; its files are then the same, byte for byte");
+    command.flag("--resume", options->resume,
+                 "Continue the same run where it was interrupted or killed, in a .csv; its files are then the same, "
+                 "byte for byte");
     command.flag("--unmeasured", options->unmeasured,
                  "Do not measure the error by a companion, the same run with 2/3 of the step on another processor");
     command
