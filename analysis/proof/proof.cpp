@@ -241,8 +241,7 @@ ProofRow order(const Convergence& convergence, const Kernel& kernel, const Quadr
         return not_decided("order of convergence",
                            fmt::format("{:.2f} where {} is promised: the motion is not smooth enough to tell",
                                        convergence.order, kernel->order));
-    // Orders of symmetric methods are even: this one is not two lower, and the kernel is not
-    // the reason.
+    // A symmetric method of a lower order would show two less: this is neither that order nor clearly the one promised.
     constexpr int high_order = 12;
     if (!holds && kernel->order > high_order && convergence.order > kernel->order - 1.5 &&
         convergence.order < kernel->order + 2.5)

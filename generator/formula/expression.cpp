@@ -21,69 +21,11 @@ using GiNaC::is_a;
 using GiNaC::numeric;
 using Kind = Syntax::Kind;
 
-// Where the power and its derivative are 0 beyond a switch, they may be taken there.
-Operand base_of(const Operand& base, const Operand& exponent, const Arithmetic& arithmetic) {
-    const bool is_broken = !exponent.value || (!exponent.value->is_integer() && *exponent.value > 1);
-    return is_broken ? arithmetic.beyond_switch(base) : base;
-}
-
-// Of `first` where u > 0, `second` elsewhere: 1 for max(u, 0) and max(-u, 0), -1 for their negatives, which have a sign
-// everywhere; 0 for all others.
-int sign_of_pieces(const ex& u, const ex& first, const ex& second) {
-    if (second.is_zero()) return first.is_equal(u) ? 1 : first.is_equal(-u) ? -1 : 0;
-    if (first.is_zero()) return second.is_equal(-u) ? 1 : second.is_equal(u) ? -1 : 0;
-    return 0;
-}
-Operand with_sign(int sign, Operand pieces) {
-    if (sign != 0 && !pieces.value) pieces.beyond_switch = sign * positive_part(sign * pieces.expression);
-    return pieces;
-}
-
-// The side of a switch of u, which changes with what u holds.
-Operand as_side(const GiNaC::symbol& symbol, const Operand& u) {
-    Operand side = operand_of(symbol);
-    side.moves = u.moves;
-    side.velocities = u.velocities;
-    side.inputs = u.inputs;
-    return side;
-}
-
 std::string idle_text(bool is_condition) {
     return fmt::format(
-        "{} over whole stretches of the motion, where this formula is undecided; write it with what goes "
-        "through 0, such as x > 0 in place of max(x, 0) > 0",
+        "{} over whole stretches of the motion, where this formula is undecided; write one that changes its sign at "
+        "single moments, such as x > 0 in place of max(x, 0) > 0",
         is_condition ? "both sides of this condition stay equal" : "the argument of this sign stays 0");
-}
-
-// Whether u is 0 over stretches of a motion, where formulas of pieces in it are constant: with some choice of their
-// sides, at places by chance.
-bool stays_zero(const ex& u, const std::vector<Switch>& switches) {
-    constexpr std::size_t most = 8;
-    constexpr int places = 3;
-    std::vector<GiNaC::symbol> sides;
-    for (const Switch& one : switches)
-        if (u.has(one.side)) sides.push_back(one.side);
-    if (sides.empty() || sides.size() > most) return false;
-    GiNaC::exset symbols;
-    for (auto part = u.preorder_begin(); part != u.preorder_end(); ++part)
-        if (is_a<GiNaC::symbol>(*part)) symbols.insert(*part);
-    const auto is_zero = [&](std::size_t choice, int place) {
-        GiNaC::exmap values;
-        long chance = 1 + place;
-        for (const ex& symbol : symbols) values[symbol] = numeric(chance = chance * 7919 % 10007, 5003);
-        for (std::size_t i = 0; i < sides.size(); ++i) values[sides[i]] = (choice >> i & 1) != 0 ? 1 : -1;
-        try {
-            return abs(real_value(u, values)) < numeric("1e-40");
-        } catch (const NoValue&) {
-            return false;
-        }
-    };
-    for (std::size_t choice = 0; choice >> sides.size() == 0; ++choice) {
-        bool is_idle = true;
-        for (int place = 0; place < places && is_idle; ++place) is_idle = is_zero(choice, place);
-        if (is_idle) return true;
-    }
-    return false;
 }
 
 class Evaluator {
@@ -228,7 +170,7 @@ private:
             case Kind::power: {
                 const Operand written = operand(0), exponent = operand(1);
                 const Operand base =
-                    computed(formula.at, frame, [&] { return base_of(written, exponent, arithmetic); });
+                    computed(formula.at, frame, [&] { return power_base(written, exponent, arithmetic); });
                 require_power(base, exponent, formula);
                 return compute([&] { return arithmetic.raise(base, exponent); });
             }
@@ -280,14 +222,14 @@ private:
                 return arithmetic.multiply(operand_of(numeric(1, 2)),
                                            less(side, side_of(arithmetic.negate(u), formula, frame)));
             if (name == "sign") return side;
-            if (name == "abs") return with_sign(1, arithmetic.multiply(side, u));
+            if (name == "abs") return with_one_sign(1, arithmetic.multiply(side, u));
             const Operand half = operand_of(numeric(1, 2)), one = operand_of(1);
             const Operand above = arithmetic.multiply(half, arithmetic.add(one, side)),
                           below = arithmetic.multiply(half, less(one, side));
             const bool is_if = name == "if", is_min = name == "min";
             const Operand &first = parts[is_if ? 2 : is_min ? 1 : 0], &second = parts[is_if ? 3 : is_min ? 0 : 1];
-            return with_sign(sign_of_pieces(u.expression, first.expression, second.expression),
-                             arithmetic.add(arithmetic.multiply(above, first), arithmetic.multiply(below, second)));
+            return with_one_sign(sign_of_pieces(u.expression, first.expression, second.expression),
+                                 arithmetic.add(arithmetic.multiply(above, first), arithmetic.multiply(below, second)));
         });
     }
 

@@ -51,7 +51,7 @@ struct DomainCondition {
     Kind kind = Kind::nonzero;
     GiNaC::ex expression;
     GiNaC::ex exponent;      // of a power: of numbers and parameters where its kind is `power`
-    GiNaC::ex argument = 0;  // of a table, which is asked for it; else 0
+    GiNaC::ex argument = 0;  // of a table: where its value is asked for; else 0
     std::string operation;   // "a square root"
     Position at;
     bool of_motion = true;  // else of the step or the end time

@@ -37,4 +37,56 @@ bool is_side(const ex& expression) {
     return is_call(expression, side_of_SERIAL::serial);
 }
 
+Operand power_base(const Operand& base, const Operand& exponent, const Arithmetic& arithmetic) {
+    const bool is_broken = !exponent.value || (!exponent.value->is_integer() && *exponent.value > 1);
+    return is_broken ? arithmetic.beyond_switch(base) : base;
+}
+
+int sign_of_pieces(const ex& u, const ex& first, const ex& second) {
+    if (second.is_zero()) return first.is_equal(u) ? 1 : first.is_equal(-u) ? -1 : 0;
+    if (first.is_zero()) return second.is_equal(-u) ? 1 : second.is_equal(u) ? -1 : 0;
+    return 0;
+}
+Operand with_one_sign(int sign, Operand pieces) {
+    if (sign != 0 && !pieces.value) pieces.beyond_switch = sign * positive_part(sign * pieces.expression);
+    return pieces;
+}
+
+Operand as_side(const GiNaC::symbol& symbol, const Operand& u) {
+    Operand side = operand_of(symbol);
+    side.moves = u.moves;
+    side.velocities = u.velocities;
+    side.inputs = u.inputs;
+    return side;
+}
+
+bool stays_zero(const ex& u, const std::vector<Switch>& switches) {
+    constexpr std::size_t most = 8;
+    constexpr int places = 3;
+    std::vector<GiNaC::symbol> sides;
+    for (const Switch& one : switches)
+        if (u.has(one.side)) sides.push_back(one.side);
+    if (sides.empty() || sides.size() > most) return false;
+    GiNaC::exset symbols;
+    for (auto part = u.preorder_begin(); part != u.preorder_end(); ++part)
+        if (GiNaC::is_a<GiNaC::symbol>(*part)) symbols.insert(*part);
+    const auto is_zero = [&](std::size_t choice, int place) {
+        GiNaC::exmap values;
+        long chance = 1 + place;
+        for (const ex& symbol : symbols) values[symbol] = GiNaC::numeric(chance = chance * 7919 % 10007, 5003);
+        for (std::size_t i = 0; i < sides.size(); ++i) values[sides[i]] = (choice >> i & 1) != 0 ? 1 : -1;
+        try {
+            return abs(real_value(u, values)) < GiNaC::numeric("1e-40");
+        } catch (const NoValue&) {
+            return false;
+        }
+    };
+    for (std::size_t choice = 0; choice >> sides.size() == 0; ++choice) {
+        bool is_idle = true;
+        for (int place = 0; place < places && is_idle; ++place) is_idle = is_zero(choice, place);
+        if (is_idle) return true;
+    }
+    return false;
+}
+
 }  // namespace lobatto

@@ -44,7 +44,7 @@ double difference(const double* x, const double* y, std::size_t parts) {
     return rounded_sum(terms, parts);
 }
 
-std::vector<double> less(const std::vector<double>& x, double y) {
+std::vector<double> minus(const std::vector<double>& x, double y) {
     std::vector<double> terms(x.rbegin(), x.rend()), result;
     terms.push_back(-y);
     for (std::size_t j = 0; j < x.size(); ++j) {

@@ -14,8 +14,8 @@ std::vector<double> as_parts(const std::vector<double>& x, std::size_t parts);
 std::vector<double> rounded(const std::vector<double>& whole, std::size_t parts);
 // x - y.
 double difference(const double* x, const double* y, std::size_t parts);
-// One number, less a double.
-std::vector<double> less(const std::vector<double>& x, double y);
+// One number minus a double.
+std::vector<double> minus(const std::vector<double>& x, double y);
 // One number times a fraction, |numerator| and denominator below 2^53.
 std::vector<double> times_fraction(const std::vector<double>& x, std::int64_t numerator, std::int64_t denominator);
 

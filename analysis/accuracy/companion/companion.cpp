@@ -198,7 +198,7 @@ void Companion::take_finely(Place& place, double from, const std::vector<double>
     const double size = step.front();
     if (const std::optional<double> knot = knot_within(from, size)) {
         take_finely(place, from, as_parts({*knot - from}, parts_));
-        take_finely(place, *knot, less(step, *knot - from));
+        take_finely(place, *knot, minus(step, *knot - from));
         return;
     }
     if (is_near_pulse(from, size) && can_halve(from, size)) {

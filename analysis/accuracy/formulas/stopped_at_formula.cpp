@@ -127,9 +127,8 @@ std::string escape_of(const Scene& scene, const std::vector<double>& velocity, c
     if (!(lasts * speed > distance && distance > 3 * at_start && outwards > 0)) return "";
     return fmt::format(
         "the run stopped after t = {:.6g}, from q = {}, p = {}: a step of the clock {} lasts {:.3g} there, in which "
-        "the "
-        "motion would go {:.2g} times as far as it is from 0. It escapes, and the steps grow beyond all bounds. Try an "
-        "earlier end, a smaller step, equal steps (--clock none), or a clock that grows less, such as "
+        "the motion would go {:.2g} times as far as it is from 0. It escapes, and the steps grow beyond all bounds. "
+        "Try an earlier end, a smaller step, equal steps (--clock none), or a clock that grows less, such as "
         "r^(3/2)/(1 + sqrt(r)).",
         result.time, list_text(result.q), list_text(result.p), scene.clock->text, lasts, lasts * speed / distance);
 }
@@ -143,9 +142,10 @@ std::string stopped_at_formula(const Scene& scene, const Domains& domains, const
     if (!has_failed || !(has_table || has_switch || scene.clock)) return "";
     const std::optional<std::vector<double>> velocity = velocity_at_stop(kernel, request, result);
     if (!velocity) return "";
-    if (scene.clock) return escape_of(scene, *velocity, request, result);
-    const std::string why = has_table ? end_of_table(domains, *velocity, request, result) : "";
-    return why.empty() && has_switch ? root_at_switch(scene, *velocity, request, result) : why;
+    std::string why = has_table ? end_of_table(domains, *velocity, request, result) : "";
+    if (why.empty() && has_switch) why = root_at_switch(scene, *velocity, request, result);
+    if (why.empty() && scene.clock) why = escape_of(scene, *velocity, request, result);
+    return why;
 }
 
 }  // namespace lobatto

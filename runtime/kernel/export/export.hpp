@@ -81,27 +81,26 @@ struct Export {
         return LOBATTO_UNSUPPORTED;
     }
     static constexpr auto inputs_taken = inputs > 0 ? take_inputs : nullptr;
-    // What `use` makes of the stepper as it is at a state.
-    template <class Use>
-    static auto at_state(const void* stepper, const void* time, const void* q, const void* p, const Use& use) {
+    // What `use` makes of the stepper, on the side of all switches that `take` gives it.
+    template <class Take, class Use>
+    static auto on_a_side(const void* stepper, const Take& take, const Use& use) {
         if constexpr (has_switches) {
             S local = of(stepper);
-            Sides<K>::take(local, *in(time), in(q), in(p));
+            take(local);
             return use(local);
         } else {
             return use(of(stepper));
         }
     }
-    // Likewise where the velocity is known.
+    template <class Use>
+    static auto at_state(const void* stepper, const void* time, const void* q, const void* p, const Use& use) {
+        return on_a_side(
+            stepper, [&](auto& s) { Sides<K>::take(s, *in(time), in(q), in(p)); }, use);
+    }
     template <class Use>
     static auto at_motion(const void* stepper, const void* time, const void* q, const void* velocity, const Use& use) {
-        if constexpr (has_switches) {
-            S local = of(stepper);
-            Sides<K>::take_at(local, *in(time), in(q), in(velocity));
-            return use(local);
-        } else {
-            return use(of(stepper));
-        }
+        return on_a_side(
+            stepper, [&](auto& s) { Sides<K>::take_at(s, *in(time), in(q), in(velocity)); }, use);
     }
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
         call->steps_done = call->records_written = call->events_written = call->iterations = 0;

@@ -64,7 +64,7 @@ TEST_CASE("a fraction of a sum of doubles is right to all its parts") {
     const std::vector<double> tenth = parts_of("0.1", 2), third = times_fraction({1.0, 0.0}, 1, 3);
     CHECK(times_fraction(tenth, 10, 1)[0] == 1);
     CHECK(std::fabs(times_fraction(tenth, 10, 1)[1]) < 1e-31);
-    CHECK(less({1.0, 0.0}, 1e-20) == std::vector<double>{1.0, -1e-20});
+    CHECK(minus({1.0, 0.0}, 1e-20) == std::vector<double>{1.0, -1e-20});
     CHECK(third == parts_of("0.33333333333333333333333333333333333333333333", 2));
     CHECK(std::fabs(difference(third.data(), parts_of("0.3333333333333333333333", 2).data(), 2) - 1.0 / 3 * 1e-22) <
           1e-32);
