@@ -35,10 +35,10 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
          cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
         {"momenta", asked.momenta, "columns p_... of the trajectory", 0},
         {"tangent", asked.tangent,
-         derivation.structure.is_explicit() ? "the derivative of a step, kick by kick and drift by drift"
+         derivation.structure.is_explicit() ? "the derivative of a step, one kick and drift after another"
                                             : "the derivative of a step, from the matrix of its equations",
          cost(asked.tangent, [](Outputs& outputs) { outputs.tangent = false; })},
-        {"dense", asked.dense > 0, fmt::format("{} states between two steps, on the step's polynomial", asked.dense),
+        {"dense", asked.dense > 0, fmt::format("{} states inside each step, from the step's polynomial", asked.dense),
          0},
         {"events", !asked.events.empty(), events,
          cost(!asked.events.empty(), [](Outputs& outputs) { outputs.events.clear(); })},
@@ -51,8 +51,7 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
     for (const auto& [text, count] : places)
         switches += (switches.empty() ? "" : ", ") + text + (count > 1 ? fmt::format(" ({} times)", count) : "");
     if (!switches.empty())
-        all.push_back(
-            {"not smooth", true, switches + ": steps are cut where it changes, so that the order is kept", 0});
+        all.push_back({"not smooth", true, switches + ": a step ends where it changes, so that the order is kept", 0});
     return all;
 }
 

@@ -5,8 +5,8 @@
 // Lagrangian   L = m*q'^2/2 - m*omega^2*(1 - cos(q))
 // Method       Lobatto, 4 points: order 6, symplectic, symmetric
 // Coordinates  q[0] = q [rad]
-// Structure    constant mass matrix: the masses are the same everywhere, so the end of a step needs no equations
-// Structure    no explicit time: nothing depends on the time itself: no formula takes it
+// Structure    constant mass matrix: M is the same everywhere, so the end of a step follows without equations
+// Structure    no explicit time: t appears nowhere, so no formula takes it
 // Structure    no forces: all forces come from L, so every step is symplectic
 // Structure    solution in closed form: q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = omega^2
 // Operations   16 in all, 18 as derived: 2 additions, 10 multiplications, 1 divisions, 3 functions

@@ -65,14 +65,14 @@ void print(const Checked& checked) {
     print_finding("Lagrangian", scene.lagrangian_text.size() <= 400
                                     ? scene.lagrangian_text
                                     : fmt::format("a formula of {} characters", scene.lagrangian_text.size()));
-    print_finding("its kind", kind_of(derivation));
-    print_findings("Found, and put to use", derivation.findings, true);
+    print_finding("kind", kind_of(derivation));
+    print_findings("Found and used", derivation.findings, true);
     print_findings("Looked for, not found", derivation.findings, false);
 
-    fmt::print(std::cout, "\nA step of {} (order {})\n", scene.method.name(), scene.method.order());
-    print_finding("its form", form_of(derivation));
+    fmt::print(std::cout, "\nOne step: {} (order {})\n", scene.method.name(), scene.method.order());
+    print_finding("equations", form_of(derivation));
     const auto compared = [](long here, long without) {
-        return here == without ? std::string() : fmt::format("; {} without what was found", without);
+        return here == without ? std::string() : fmt::format(" ({} without these findings)", without);
     };
     const int unknowns = unknowns_of(derivation);
     print_finding("unknowns", (unknowns == 0 ? "none" : std::to_string(unknowns)) +
@@ -80,19 +80,20 @@ void print(const Checked& checked) {
     if (const std::string solver = solver_text(derivation); !solver.empty()) print_finding("solved", solver);
     const long elimination = elimination_of(derivation);
     if (!derivation.structure.is_explicit())
-        print_finding("elimination", fmt::format("some {} multiplications{}", elimination,
-                                                 compared(elimination, elimination_of(checked.without))));
+        print_finding("elimination",
+                      (elimination == 0 ? "no multiplications" : fmt::format("about {} multiplications", elimination)) +
+                          compared(elimination, elimination_of(checked.without)));
 
     fmt::print(std::cout, "\nThe kernel\n");
     for (const CheckedOutput& output : checked.outputs)
-        print_finding(output.name, !output.asked ? "not asked for, left out"
+        print_finding(output.name, !output.asked ? "not requested, left out"
                                    : output.operations == 0
                                        ? output.text
                                        : fmt::format("{}: {} operations", output.text, output.operations));
     // One function serves all points of a step.
-    print_finding("operations", fmt::format("{} in all its formulas, each counted once{}", checked.operations,
+    print_finding("operations", fmt::format("{} in all formulas, each counted once{}", checked.operations,
                                             compared(checked.operations, checked.operations_without)));
-    print_finding("derived and written in", fmt::format("{:.2f} s", checked.seconds));
+    print_finding("derived and emitted in", fmt::format("{:.2f} s", checked.seconds));
 }
 
 void check(const CheckCommand& options) {

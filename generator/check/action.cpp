@@ -95,7 +95,7 @@ private:
             directions.push_back(joined(seeded_direction(v_, noise), seeded_direction(q_, noise)));
             products.push_back(times(slope, directions.back())[0]);
         }
-        compare_with_differences("momentum and force are slopes of L", "dL/dq' or dL/dq is wrong", products,
+        compare_with_differences("momentum and force are derivatives of L", "dL/dq' or dL/dq is wrong", products,
                                  [&](const cln::cl_R& e) {
                                      Numbers quotients;
                                      for (const Numbers& d : directions)
@@ -175,7 +175,7 @@ private:
             for (std::size_t i = 0; i < x.size(); ++i) moved[i / n_][i % n_] = x[i];
             return Numbers{action(moved)};
         };
-        compare_with_differences("residual is the slope of the action",
+        compare_with_differences("the residual is the derivative of the action",
                                  "the equations of the step are not those of the discrete action", products,
                                  [&](const cln::cl_R& e) {
                                      Numbers quotients;
@@ -294,7 +294,7 @@ private:
                 other.push_back(all[j][static_cast<std::size_t>(routhian.cyclic[c])]);
             }
         }
-        compare("cyclic coordinates follow from momenta", identity_bound,
+        compare("cyclic coordinates follow from their momenta", identity_bound,
                 "the system without its cyclic coordinates is not the same system", one, other);
     }
 
@@ -428,7 +428,7 @@ private:
                 other.push_back(h_ * sum);
             }
         }
-        compare("stage equations combine these", identity_bound,
+        compare("the stage equations combine these", identity_bound,
                 "what the kernel solves does not follow from the discrete action", one, other);
     }
 

@@ -172,8 +172,8 @@ private:
         by_derivative.insert(by_derivative.end(), right_.begin(), right_.end());
         add("interior equations are dL_d/dQ = 0", flat(interior_), flat(d_.interior),
             "the equations inside the step are not those of the discrete action");
-        add("border equations are dL_d/dq = 0", border, d_.border, "the discrete equations of motion are wrong");
-        add("momenta are slopes of L_d", by_derivative, momenta, "the momenta at the ends of a step are wrong");
+        add("equations at the ends are dL_d/dq = 0", border, d_.border, "the discrete equations of motion are wrong");
+        add("momenta are derivatives of L_d", by_derivative, momenta, "the momenta at the ends of a step are wrong");
     }
 
     // sum_j (B G)_ij e_j of the stages, and the positions at the nodes along the polynomial.
@@ -239,8 +239,9 @@ private:
         }
         for (ex& equation : reduced_form) equation = put(equation, path);
         if (nodes_are_unknowns_)
-            add("full system combines these", d_.full_system, combined, "F_L does not follow from the discrete action");
-        add("reduced system combines these", reduced_form, reduced,
+            add("the full system F_L combines these", d_.full_system, combined,
+                "F_L does not follow from the discrete action");
+        add("the reduced system combines these", reduced_form, reduced,
             "what the kernel solves does not follow from the discrete action");
     }
 
@@ -264,9 +265,8 @@ private:
             add("dF_L is the derivative of F_L", derivatives(d_.full_system, d_.full_unknowns),
                 entries_of(d_.full_jacobian), "an entry of the full Jacobian is wrong");
         if (stages_ > 0)
-            add(nodes_are_unknowns_ ? "and so is the reduced Jacobian" : "reduced Jacobian is the derivative",
-                derivatives(d_.reduced_system, unknowns), entries_of(d_.reduced_jacobian),
-                "an entry of the reduced Jacobian is wrong");
+            add("the reduced Jacobian is the derivative", derivatives(d_.reduced_system, unknowns),
+                entries_of(d_.reduced_jacobian), "an entry of the reduced Jacobian is wrong");
         if (nodes_are_unknowns_)
             checks_.push_back(differences(derivation_, "dF_L against central differences", d_.full_system,
                                           d_.full_unknowns, d_.full_jacobian));

@@ -126,10 +126,10 @@ private:
         const ex sum = lobatto_ ? numeric(1, degree) : numeric(0);
         const ex leading = GiNaC::binomial(numeric(2 * degree), numeric(degree));
         claim(
-            "and not beyond degree " + std::to_string(highest),
+            "the quadrature is not exact beyond degree " + std::to_string(highest),
             moment_errors(2 * d, numeric(1, 2 * degree + 1) + (sum - numeric(1, 2 * degree + 1)) / (leading * leading)),
             "the error at the next degree is not the rule's");
-        claim("its weights sum to 1", moment_errors(0, 1), "constants are not integrated exactly");
+        claim("the weights sum to 1", moment_errors(0, 1), "constants are not integrated exactly");
     }
 
     void lagrange() {
@@ -160,7 +160,7 @@ private:
             }
             zeros.push_back(row);
         }
-        claim("K integrates products of slopes", zeros, "K is not the rigidity matrix of the basis");
+        claim("K is the integral of products of basis derivatives", zeros, "K is not the rigidity matrix of the basis");
         inverse_of_K();
     }
     void inverse_of_K() {
@@ -191,7 +191,7 @@ private:
         ex arrival = -numeric(1, 2);
         for (std::size_t j = 0; j < c.size(); ++j) arrival += b[j] * (1 - c[j]);
         zeros.push_back(arrival);
-        claim("forces bend paths as they must", zeros, "the stage matrix A is inconsistent");
+        claim("the stage matrix A integrates accelerations", zeros, "the stage matrix A is inconsistent");
         symplecticity();
     }
     void symplecticity() {
@@ -230,7 +230,7 @@ private:
                 sum += q_.weights[i] * q_.legendre[i] * q_.D(static_cast<unsigned>(i), static_cast<unsigned>(j));
             zeros.push_back(sum);
         }
-        claim("the highest Legendre polynomial is orthogonal to slopes", zeros,
+        claim("the highest Legendre polynomial is orthogonal to velocities", zeros,
               "the momenta of cyclic coordinates vary wrongly inside the step");
     }
 
@@ -287,7 +287,7 @@ private:
         }
         claim("K is that of paths straight from node to node", zeros, "K is not the rigidity matrix of the basis");
         inverse_of_K();
-        claim("its weights sum to 1", moment, "constants are not integrated exactly");
+        claim("the weights sum to 1", moment, "constants are not integrated exactly");
         claim("a step backwards undoes a step", mirror, "the coefficients are no palindrome");
     }
 

@@ -71,13 +71,13 @@ std::string kind_of(const Derivation& derivation) {
         text = linear_terms ? "Quadratic in the velocities, with constant masses"
                             : "Kinetic minus potential energy, with constant masses";
     if (linear_terms && !holds_any(system.momentum_v, system.v))
-        text += ", and terms linear in them, as of magnetic fields and rotating frames";
-    if (derivation.scene.clock) text += ", in the time of the clock";
-    if (!system.autonomous) text += "; the time itself occurs";
+        text += ", and with terms linear in the velocities, as in magnetic fields and rotating frames";
+    if (derivation.scene.clock) text += ", in the clock's time";
+    if (!system.autonomous) text += "; t appears explicitly";
     std::vector<int> forced;
     for (std::size_t k = 0; k < system.outer_force.size(); ++k)
         if (!system.outer_force[k].is_zero()) forced.push_back(static_cast<int>(k));
-    if (!forced.empty()) text += "; beside L, forces act on " + names_of(derivation, forced);
+    if (!forced.empty()) text += "; forces outside L act on " + names_of(derivation, forced);
     return text + ".";
 }
 
@@ -85,16 +85,16 @@ std::string form_of(const Derivation& derivation) {
     const int points = unknown_points(derivation);
     switch (derivation.structure.form()) {
         case Form::linear_map:
-            return "one matrix takes positions and momenta from one step to the next; nothing is solved for";
+            return "none: one matrix maps positions and momenta to those of the next step";
         case Form::separable:
-            if (points == 0) return "explicit: the end of a step follows from its beginning without equations";
-            return fmt::format("the positions at {} inside it are solved for; its end follows from them",
+            if (points == 0) return "none: the end of a step follows explicitly from its start";
+            return fmt::format("for the positions at {} inside the step; its end follows from them",
                                points_text(points));
         case Form::general:
-            return points == 1 ? "the positions at its end are solved for"
+            return points == 1 ? "for the positions at the end of the step"
                                : fmt::format(
-                                     "the positions at {} after its beginning are solved for, the last of them "
-                                     "its end",
+                                     "for the positions at {} after the start of the step, the last of them its "
+                                     "end",
                                      points_text(points));
     }
     throw std::logic_error("form_of: no such form");
@@ -159,7 +159,7 @@ std::string solver_text(const Derivation& derivation) {
         const std::string equations =
             solve.unknowns == 1 ? "one equation" : fmt::format("{} equations", solve.unknowns);
         if (solve.method == "nothing to solve")
-            return std::string("nothing to solve: no force depends on the positions inside a step");
+            return std::string("no equations, because no force depends on the positions inside a step");
         if (solve.method == "closed formula") return equations + ", by a closed formula";
         if (solve.method == "full matrix") return equations + ", as a full matrix";
         return fmt::format("{}, as a band of {} diagonals", equations, 2 * solve.band + 1);
@@ -175,19 +175,19 @@ std::string solver_text(const Derivation& derivation) {
         !derivation.structure.full() && (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
         (derivation.structure.form() == Form::separable || derivation.system.n <= most_iterated ||
          has_light_mass(derivation.scene, derivation.system, derivation.structure));
-    std::string text = derivation.structure.linear ? "once a step, without iteration; "
+    std::string text = derivation.structure.linear ? "once per step, without iteration: "
                        : has_fixed_point
-                           ? "by fixed-point iteration over all points at once; where it does not contract, "
+                           ? "by fixed-point iteration over all points at once; where it does not converge, "
                            : "";
     if (!derivation.structure.linear)
-        text += derivation.structure.absorbed() ? "by iterations with one matrix for all steps; "
-                                                : "by Newton's iteration; ";
+        text += derivation.structure.absorbed() ? "by iterations with one matrix for all steps: "
+                                                : "by Newton's iteration: ";
     if (solves.size() == 1) return text + kinds.front().first;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
         const auto& [how, list] = kinds[i];
         text += i == 0 ? "" : "; ";
-        text += list.size() == 1 ? "for the group of " + names_of(derivation, list) + " "
-                                 : fmt::format("for each of {} groups ", list.size());
+        text += list.size() == 1 ? "in the group of " + names_of(derivation, list) + " "
+                                 : fmt::format("in each of {} groups ", list.size());
         text += how;
     }
     return text;

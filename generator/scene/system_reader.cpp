@@ -185,7 +185,9 @@ void SystemReader::read_lagrangian() {
              fmt::format("the Lagrangian must be a formula in quotes, not {}", entry.value.kind_name()));
     scene_.lagrangian_at = entry.value.text.at.front();
     scene_.lagrangian += parse_expression(source_, entry.value.text, {&names_, "the Lagrangian", true, {}});
-    scene_.lagrangian_text += (kinetic_text_.empty() ? "" : " + ") + collapsed(entry.value.text.value);
+    const std::string written = collapsed(entry.value.text.value);
+    const bool subtracts = !kinetic_text_.empty() && written.starts_with('-');
+    scene_.lagrangian_text += subtracts ? " - " + written.substr(1) : (kinetic_text_.empty() ? "" : " + ") + written;
 }
 
 void SystemReader::require_velocities() const {

@@ -47,39 +47,39 @@ TEST_CASE("check says what it found, what that saves, and what it looked for in 
               ")\n"
               "\n"
               "  Lagrangian                  m*q'^2/2 - m*omega^2*(1 - cos(q))\n"
-              "  its kind                    Kinetic minus potential energy, with constant masses.\n"
+              "  kind                        Kinetic minus potential energy, with constant masses.\n"
               "\n"
-              "Found, and put to use\n"
-              "  constant mass matrix        the masses are the same everywhere, so the end of a step needs "
-              "no equations\n"
-              "  no explicit time            nothing depends on the time itself: no formula takes it\n"
+              "Found and used\n"
+              "  constant mass matrix        M is the same everywhere, so the end of a step follows "
+              "without equations\n"
+              "  no explicit time            t appears nowhere, so no formula takes it\n"
               "  no forces                   all forces come from L, so every step is symplectic\n"
               "  solution in closed form     q'' = -w2*sin(q), by Jacobi elliptic functions with w2 = "
               "omega^2\n"
               "\n"
               "Looked for, not found\n"
               "  linear system               d2V/dqdq = m*omega^2*cos(q) depends on the position\n"
-              "  cyclic coordinates          no coordinate is without a force\n"
+              "  cyclic coordinates          a force acts on every coordinate\n"
               "  quadratic part absorbed     V has no quadratic part\n"
               "\n"
-              "A step of Lobatto, 4 points (order 6)\n"
-              "  its form                    the positions at the 2 points inside it are solved for; its end "
+              "One step: Lobatto, 4 points (order 6)\n"
+              "  equations                   for the positions at the 2 points inside the step; its end "
               "follows from them\n"
-              "  unknowns                    2; 3 without what was found\n"
+              "  unknowns                    2 (3 without these findings)\n"
               "  solved                      by fixed-point iteration over all points at once; where it does not "
-              "contract, by\n"
-              "                              Newton's iteration; 2 equations, as a full matrix\n"
-              "  elimination                 some 6 multiplications; 18 without what was found\n"
+              "converge, by\n"
+              "                              Newton's iteration: 2 equations, as a full matrix\n"
+              "  elimination                 about 6 multiplications (18 without these findings)\n"
               "\n"
               "The kernel\n"
               "  energy                      H at every kept state: 7 operations\n"
               "  momenta                     columns p_... of the trajectory\n"
               "  tangent                     the derivative of a step, from the matrix of its equations\n"
-              "  dense                       not asked for, left out\n"
-              "  events                      not asked for, left out\n"
-              "  operations                  16 in all its formulas, each counted once; 24 without what was "
-              "found\n"
-              "  derived and written in      TIME s\n");
+              "  dense                       not requested, left out\n"
+              "  events                      not requested, left out\n"
+              "  operations                  16 in all formulas, each counted once (24 without these "
+              "findings)\n"
+              "  derived and emitted in      TIME s\n");
 }
 
 TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
@@ -90,18 +90,17 @@ TEST_CASE("the kind of a Lagrangian is named, with what is unusual in it") {
     };
     CHECK(kind("(x'^2 + y'^2)/2 - x^4 - y^4") == "Kinetic minus potential energy, with constant masses.");
     CHECK(kind("(x'^2 + y'^2)/2 - x^4*cos(t)", "time = \"t\"\n") ==
-          "Kinetic minus potential energy, with constant masses; the time itself occurs.");
+          "Kinetic minus potential energy, with constant masses; t appears explicitly.");
     CHECK(kind("(x'^2 + (1 + x^2)*y'^2)/2 - x^4") ==
           "Quadratic in the velocities, with masses that depend on the position.");
     CHECK(kind("(x'^2 + y'^2)/2 + x*y' - y*x'") ==
-          "Quadratic in the velocities, with constant masses, and terms linear in them, as of magnetic fields and "
-          "rotating frames.");
+          "Quadratic in the velocities, with constant masses, and with terms linear in the velocities, as in "
+          "magnetic fields and rotating frames.");
     // No value at rest.
     CHECK(kind("y'^2/2 + (1 + y^2)*x'^2/2 - 1e-70/x'") == "Not quadratic in the velocities, as in relativity.");
     CHECK(kind("-sqrt(1 - x'^2 - y'^2) - x^2") == "Not quadratic in the velocities, as in relativity.");
-    CHECK(
-        report_of(scene_path("driven_damped_pendulum")).at("kind") ==
-        "Kinetic minus potential energy, with constant masses; the time itself occurs; beside L, forces act on theta.");
+    CHECK(report_of(scene_path("driven_damped_pendulum")).at("kind") ==
+          "Kinetic minus potential energy, with constant masses; t appears explicitly; forces outside L act on theta.");
 }
 
 TEST_CASE("what was found shrinks the equations of a step, and --general undoes it" * doctest::test_suite("slow")) {
@@ -140,7 +139,7 @@ TEST_CASE("coordinates that do not act on one another are solved each by itself"
     CHECK(groups.at(1).at("coordinates") == nlohmann::json{"y"});
     const std::string text = check(scene).out;
     CHECK(std::regex_replace(text, std::regex("\\s+"), " ")
-              .find("by Newton's iteration; for each of 2 groups 2 equations, as a full matrix") != std::string::npos);
+              .find("by Newton's iteration: in each of 2 groups 2 equations, as a full matrix") != std::string::npos);
 }
 
 TEST_CASE("outputs that are not asked for are left out of the kernel, and what the others add is counted") {
@@ -162,5 +161,5 @@ TEST_CASE("the method on the command line takes the place of the scene's") {
     CHECK(gauss.at("step").at("unknowns") == 3);
     const nlohmann::json verlet = report_of(scene_path("pendulum"), {"--points", "2"});
     CHECK(verlet.at("step").at("unknowns") == 0);
-    CHECK(verlet.at("step").at("form") == "explicit: the end of a step follows from its beginning without equations");
+    CHECK(verlet.at("step").at("form") == "none: the end of a step follows explicitly from its start");
 }

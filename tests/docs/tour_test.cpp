@@ -82,7 +82,7 @@ std::string tour() {
         "\n## 3. What the scene needs\n\n`generator/mechanics/structure/structure.cpp` looks for what the kernel may "
         "leave out. "
         "`lobatto check` says what it found.\n\n";
-    text += block("", excerpt(output_of({"check", scene}), "Found,", "The kernel"));
+    text += block("", excerpt(output_of({"check", scene}), "Found and used", "The kernel"));
     const std::string emitted = output_of({"emit", scene, "--no-support", "-o", folder.string()});
     text +=
         "\n## 4. The graph and its passes\n\n`generator/programs/` writes down what the kernel computes, as one graph. "

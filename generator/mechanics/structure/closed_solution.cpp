@@ -26,7 +26,7 @@ std::optional<ClosedSolution> find_closed_solution(const System& system) {
 Finding solution_finding(const std::optional<ClosedSolution>& solution) {
     if (!solution)
         return {"solution in closed form", false,
-                "this is neither a harmonic oscillator nor a plane pendulum, or has walls, switches or explicit time"};
+                "known only for a harmonic oscillator or a plane pendulum, without walls, switches and explicit time"};
     const bool is_harmonic = solution->kind == ClosedSolution::Kind::harmonic;
     return {"solution in closed form", true,
             std::string(is_harmonic ? "q'' = -w2*q" : "q'' = -w2*sin(q), by Jacobi elliptic functions") +

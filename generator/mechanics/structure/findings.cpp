@@ -57,10 +57,11 @@ Finding constraint_finding(const Scene& scene, const System& system) {
     for (const Constraint& constraint : scene.constraints)
         if (list.size() < 200) list += (list.empty() ? "" : ", ") + constraint.written;
     const std::size_t count = scene.constraints.size();
-    return {"constraints", true,
-            fmt::format("{} ({}): {} of {} coordinates are free, and multipliers at the nodes of a step keep the rest",
-                        count == 1 ? "one" : std::to_string(count), list, static_cast<std::size_t>(system.n) - count,
-                        system.n)};
+    return {
+        "constraints", true,
+        fmt::format(
+            "{} ({}): {} of {} degrees of freedom remain, and multipliers at the nodes of each step hold the rest",
+            count == 1 ? "one" : std::to_string(count), list, static_cast<std::size_t>(system.n) - count, system.n)};
 }
 
 namespace {
@@ -82,8 +83,8 @@ void add_measured_values(const System& system, std::vector<Finding>& findings) {
         findings.push_back(
             {"measured values", true,
              fmt::format("{}: cubic polynomials between {} knots, smooth to the second derivative (C2). A step "
-                         "across a knot errs by h^4 where a force is this table, by h^3 where a potential is; steps "
-                         "that end at knots keep the order of the method",
+                         "across a knot has an error of h^4 where a force is this table, and of h^3 where a "
+                         "potential is; steps that end at knots keep the order of the method",
                          spline_of(number).file(), spline_of(number).x().size())});
     if (has_angle)
         findings.push_back({"angles of atan2", true,
@@ -98,25 +99,25 @@ std::vector<Finding> scene_findings(const Scene& scene, const System& system) {
         findings.push_back({name, holds, reason});
     };
     find("no explicit time", system.autonomous,
-         system.autonomous ? "nothing depends on the time itself: no formula takes it"
-                           : "L, a force or an event depends on the time: every formula is given it");
+         system.autonomous ? "t appears nowhere, so no formula takes it"
+                           : "t appears in L, a force or an event, so every formula takes it");
     std::vector<int> driven;
     for (int k = 0; k < system.n; ++k)
         if (!system.outer_force[static_cast<std::size_t>(k)].is_zero()) driven.push_back(k);
     find("no forces", driven.empty(),
          driven.empty() ? "all forces come from L, so every step is symplectic"
-                        : "forces beside L act on " + names_of(system, driven) + ", so energy is gained or lost");
+                        : "forces outside L act on " + names_of(system, driven) + ", so energy is gained or lost");
     if (!system.inputs.empty()) {
         std::string list;
         for (const GiNaC::symbol& input : system.inputs) list += (list.empty() ? "" : ", ") + input.get_name();
         find("inputs", true,
-             list + ": a program may change them before each step with set_inputs(), and the energy with them");
+             list + ": a program may change them before each step with set_inputs(); the energy changes with them");
     }
     add_measured_values(system, findings);
     if (!scene.constants.empty()) {
         std::string list;
         for (const Parameter& parameter : scene.constants) list += (list.empty() ? "" : ", ") + parameter.name;
-        find("constant parameters", true, list + ": numbers in the formulas, not arguments of them");
+        find("constant parameters", true, list + ": written into the formulas as numbers, not passed as arguments");
     }
     return findings;
 }

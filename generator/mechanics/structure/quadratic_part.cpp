@@ -73,7 +73,7 @@ QuadraticPart find_quadratic_part(const Scene& scene, const System& system, cons
     const auto& curvatures = system.hessian.entries();
     if (std::any_of(curvatures.begin(), curvatures.end(),
                     [&](const auto& entry) { return has_any(entry.second, system.inputs); })) {
-        part.reason = "the second derivatives of V change with inputs";
+        part.reason = "V'' changes with inputs";
         return part;
     }
     std::vector<GiNaC::symbol> variables = system.q;
@@ -104,21 +104,20 @@ QuadraticPart find_quadratic_part(const Scene& scene, const System& system, cons
     part.diagonal = diagonal && with < without;
     part.absorbed = !part.diagonal && with < 0.1;
     part.reason = fmt::format(
-        "without its quadratic part V bends the forces as much at the start, so nothing is taken out of the "
+        "at the start the rest of V'' is as large without the quadratic part, so nothing is taken out of the "
         "iteration");
     if (part.diagonal)
         part.reason = fmt::format(
             "the constant part of V'' is diagonal and taken into the stage map: at the start an iteration "
-            "leaves {:.1g} of the error, not {:.1g}",
+            "leaves {:.1g} of the error instead of {:.1g}",
             with, without);
     else if (part.absorbed)
         part.reason = fmt::format(
-            "V is nearly quadratic at the start, so that where the fixed-point iteration does not contract one "
-            "matrix serves "
-            "all iterations: one leaves {:.1g} of the error there",
+            "V is nearly quadratic at the start: where the fixed-point iteration does not converge, one constant "
+            "matrix serves all iterations, and each leaves {:.1g} of the error",
             with);
     else if (!diagonal)
-        part.reason = "the constant part of V'' couples coordinates, and the rest is no small part of the forces";
+        part.reason = "the constant part of V'' couples coordinates, and the rest of V'' is not small beside it";
     return part;
 }
 

@@ -67,15 +67,14 @@ private:
         if (general_.full) {
             form_ = Form::general;
             find("general path", true,
-                 "asked for: nothing is looked for, all nodes of a step are solved for with full matrices");
+                 "asked for: no structure is used, and all nodes of a step are solved for with full matrices");
             return;
         }
         find("constant mass matrix", system_.constant_mass,
-             system_.separable ? "the masses are the same everywhere, so the end of a step needs no equations"
+             system_.separable ? "M is the same everywhere, so the end of a step follows without equations"
              : system_.constant_mass
-                 ? "the masses are the same everywhere, so a step corrects multipliers without a matrix of all its "
-                   "points"
-                 : system_.not_separable + ", so the end of a step is solved for with the points inside");
+                 ? "M is the same everywhere, so multipliers are corrected without a matrix of all points of a step"
+                 : system_.not_separable + ", so the end of a step is solved for together with its interior points");
         const bool diagonal = std::all_of(system_.mass.entries().begin(), system_.mass.entries().end(),
                                           [](const auto& entry) { return entry.first.first == entry.first.second; });
         separable_.diagonal_mass = system_.separable && diagonal;
@@ -96,7 +95,7 @@ private:
         if (!separable_.is_explicit) return;
         result_.linear = form_ == Form::linear_map;
         find("explicit steps", true,
-             "asked for: positions and velocities move in turn, straight from node to node, and nothing is solved for");
+             "asked for: positions and velocities are updated in turn from node to node, without equations");
     }
 
     // Where V has second derivatives, row by row.
@@ -112,13 +111,11 @@ private:
         std::string coupling;
         for (const auto& [place, value] : system_.mass.entries())
             if (place.first < place.second && coupling.empty())
-                coupling = fmt::format("L holds {}'*{}' with the factor {}", name(place.first), name(place.second),
+                coupling = fmt::format("L contains {}'*{}' with the factor {}", name(place.first), name(place.second),
                                        canonical_text(value));
         if (n_ > 1)
             find("diagonal mass matrix", separable_.diagonal_mass,
-                 separable_.diagonal_mass
-                     ? "no two velocities are multiplied: each momentum is its own mass times velocity"
-                     : coupling);
+                 separable_.diagonal_mass ? "each momentum is one mass times its own velocity" : coupling);
         linearity();
         // M^-1 V'' has an entry (i, j) where row i of M^-1 meets column j of V''; for a diagonal mass, where V'' has
         // one.
@@ -134,8 +131,8 @@ private:
         const bool full = separable_.entries.size() == static_cast<std::size_t>(n_) * static_cast<std::size_t>(n_);
         if (n_ > 1)
             find("sparse second derivatives", !full,
-                 full ? fmt::format("all {} entries of M^-1 V'' occur", n_ * n_)
-                      : fmt::format("{} of {} entries of M^-1 V'' are not zero, and only they are computed",
+                 full ? fmt::format("none of the {} entries of M^-1 V'' is always zero", n_ * n_)
+                      : fmt::format("{} of {} entries of M^-1 V'' are not always zero, and only they are computed",
                                     separable_.entries.size(), n_ * n_));
         std::set<int> free;
         for (int k = 0; k < n_; ++k) free.insert(k);
@@ -147,9 +144,10 @@ private:
             if (!system_.gradient[static_cast<std::size_t>(k)].is_zero()) free.erase(k);
         if (!separable_.diagonal_mass) free.clear();
         find("cyclic coordinates", !free.empty(),
-             free.empty() ? "no coordinate is without a force"
-                          : names_of(system_, {free.begin(), free.end()}) +
-                                ": without a force, so the motion is uniform and nothing is solved for");
+             !separable_.diagonal_mass ? "not looked for with a mass matrix that is not diagonal"
+             : free.empty()            ? "a force acts on every coordinate"
+                                       : names_of(system_, {free.begin(), free.end()}) +
+                                  ": no force acts on them, so their motion is uniform and needs no equations");
         Couplings couplings(static_cast<std::size_t>(n_));
         for (const auto& [row, column] : separable_.entries) couplings.add(row, column);
         result_.groups = couplings.groups();
@@ -177,12 +175,12 @@ private:
         }
         linearity();
         find("cyclic coordinates", !cyclic.empty(),
-             constrained ? "none is looked for beside constraints"
-             : cyclic.empty()
-                 ? "every coordinate itself occurs, or its velocity more than squared, or its mass may vanish"
-                 : names_of(system_, cyclic) +
-                       ": L holds only the velocity, so the momentum is constant and the motion "
-                       "follows from it without equations");
+             constrained      ? "not looked for in systems with constraints"
+             : cyclic.empty() ? "of each coordinate, L contains the position, or a higher power of the velocity than "
+                                "the second, or a mass that may vanish"
+                              : names_of(system_, cyclic) +
+                                    ": L contains only the velocity, so the momentum is constant and the motion "
+                                    "follows from it without equations");
         Couplings couplings(static_cast<std::size_t>(blocks));
         const auto block_of = [&](int slot) { return slot < active ? slot : slot - active; };
         for (const auto& [place, value] : general_.routhian.second.entries())
@@ -200,9 +198,9 @@ private:
         const std::size_t present = general_.routhian.second.entries().size();
         find("sparse second derivatives", present < size * size,
              present == size * size
-                 ? fmt::format("all {} second derivatives of L occur", present)
-                 : fmt::format("{} of {} second derivatives of L are not zero, and only they are computed", present,
-                               size * size));
+                 ? fmt::format("none of the {} second derivatives of L is always zero", present)
+                 : fmt::format("{} of {} second derivatives of L are not always zero, and only they are computed",
+                               present, size * size));
         describe_groups();
         if (cyclic.empty() && !constrained) repetition();
         velocities_of_momenta();
@@ -214,12 +212,11 @@ private:
         if (n_ == 1 || general_.hamiltonian) return;
         const bool scaled = has_scaled_mass(scene_, system_);
         find("scaled mass matrix", scaled,
-             scaled ? "all masses change alike: M is one function times a constant matrix, so an "
-                      "iteration divides by that function and solves nothing"
+             scaled ? "M is one function of the state times a constant matrix, so an iteration divides by "
+                      "that function and factors nothing"
              : has_diagonal_mass(system_)
-                 ? "each mass changes in its own way; no two velocities are multiplied, so an "
-                   "iteration divides by each"
-                 : "the masses change in different ways, so an iteration factors M at every node");
+                 ? "M is diagonal and each mass changes in its own way, so an iteration divides by each"
+                 : "the entries of M change in different ways, so an iteration factors M at every node");
     }
 
     void velocities_of_momenta() {
@@ -269,7 +266,7 @@ private:
         find("repeated terms", result_.looped,
              result_.looped ? fmt::format("{} of {} terms of L are {}, computed in loops over tables", count - single,
                                           count, formulas == 1 ? "one formula" : fmt::format("{} formulas", formulas))
-                            : fmt::format("of {} terms of L {} are unlike all others", count, single));
+                            : fmt::format("of {} terms of L, {} share their formula with no other", count, single));
     }
 
     void absorption() {
@@ -286,24 +283,25 @@ private:
         if (!result_.looped || result_.linear || separable_.clean) return;
         separable_.neighbours = !general_.full && !separable_.diagonal_part && are_neighbours(result_.elements);
         find("neighbouring coordinates", separable_.neighbours,
-             separable_.neighbours ? "formulas go along coordinates that stand side by side: vector lanes hold these"
-             : separable_.diagonal_part ? "lanes hold nodes, for which the quadratic part is taken into the stage map"
-                                        : "formulas jump from coordinate to coordinate: vector lanes hold nodes");
+             separable_.neighbours ? "formulas link consecutive coordinates, so SIMD lanes hold consecutive coordinates"
+             : separable_.diagonal_part
+                 ? "SIMD lanes hold nodes, because the quadratic part is taken into the stage map"
+                 : "formulas link coordinates that are not consecutive, so SIMD lanes hold nodes");
         if (!separable_.neighbours) return;
         separable_.fixed_ends = fixed_ends_of(result_.elements, system_.q);
         const bool before = separable_.fixed_ends.before, behind = separable_.fixed_ends.behind;
         if (before || behind)
             find("fixed ends", true,
-                 (before && behind ? "both ends are"
-                  : before         ? name(0) + " is"
-                                   : name(static_cast<int>(system_.q.size()) - 1) + " is") +
-                     std::string(" held by the formula of neighbours; one loop computes all of them"));
+                 (before && behind ? "both ends have"
+                  : before         ? name(0) + " has"
+                                   : name(static_cast<int>(system_.q.size()) - 1) + " has") +
+                     std::string(" the formula of the coordinates between, so one loop computes all of them"));
     }
 
     void linearity() {
-        std::string reason = "all forces are linear, so a step is one matrix: nothing is iterated";
+        std::string reason = "all forces are linear, so a step is a product with one matrix, without iteration";
         if (result_.linear && form_ != Form::linear_map)
-            reason = "all forces are linear, so one solve a step is exact, its matrix factored once for all steps";
+            reason = "all forces are linear, so one solve per step is exact, with a matrix that is factored once";
         if (separable_.is_explicit && system_.linear && !result_.linear) return;  // of no use
         if (!result_.linear) reason = curvature_text(system_);
         find("linear system", result_.linear, reason);
@@ -322,12 +320,12 @@ private:
         };
         std::string reason;
         if (count == 1) {
-            reason = "all coordinates act on one another";
+            reason = "all coordinates are coupled";
         } else {
             for (std::size_t g = 0; g < count && g < 4; ++g)
                 reason += (g == 0 ? "{" : ", {") + listed(result_.groups[g]) + "}";
             reason += count > 4 ? fmt::format(" and {} more", count - 4) : "";
-            reason += " do not act on one another: each is solved by itself";
+            reason += " are not coupled, so each group is solved by itself";
         }
         find("independent groups", count > 1, reason);
         int widest = 0;
@@ -339,8 +337,10 @@ private:
         if (largest == 1) return;
         const bool banded = 3 * widest + 3 < static_cast<int>(largest);
         find("banded equations", banded,
-             fmt::format("in a good order only coordinates at most {} apart, of {}, act on one another{}", widest,
-                         largest, banded ? ": only this band is stored and solved" : ""));
+             banded ? fmt::format("reordered, only coordinates at most {} apart (of {}) are coupled; only this band is "
+                                  "stored and solved",
+                                  widest, largest)
+                    : fmt::format("even reordered, coordinates up to {} apart (of {}) are coupled", widest, largest));
     }
 
     const Scene& scene_;

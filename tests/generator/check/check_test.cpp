@@ -145,8 +145,8 @@ TEST_CASE("a chain too long to be written out is checked by the action's slopes"
         const auto checks = check_equations(chain);
         CHECK(failures(checks) == Claims{});
         CHECK(claims_of(checks) ==
-              "momentum and force are slopes of L\nsecond derivatives against differences\n"
-              "residual is the slope of the action\nstage equations combine these\n");
+              "momentum and force are derivatives of L\nsecond derivatives against differences\n"
+              "the residual is the derivative of the action\nthe stage equations combine these\n");
     }
 }
 
@@ -160,19 +160,19 @@ TEST_CASE("a wrong force, second derivative, Routhian or stage matrix fails the 
     const Derivation right = driven("family = \"lobatto\"\npoints = 4");
     CHECK(failed_after(right, [](Derivation&) {}) == Claims{});
     CHECK(failed_after(right, [&](Derivation& d) { d.system.force[1] += tiny; }) ==
-          Claims{"momentum and force are slopes of L", "residual is the slope of the action"});
+          Claims{"momentum and force are derivatives of L", "the residual is the derivative of the action"});
     CHECK(failed_after(right, [&](Derivation& d) {
               std::get<GeneralForm>(d.structure.of_form).routhian.second.put(3, 0, tiny);
           }) == Claims{"second derivatives against differences", "Jacobian of the step against differences"});
     const Derivation spinning = derive(scene_with(top, top_coordinates, "", "points = 5"));
     CHECK(failed_after(spinning, [&](Derivation& d) {
               std::get<GeneralForm>(d.structure.of_form).routhian.gradient[3] += tiny;
-          }) == Claims{"cyclic coordinates follow from momenta"});
+          }) == Claims{"cyclic coordinates follow from their momenta"});
     CHECK(failed_after(spinning, [&](Derivation& d) { d.quadrature.legendre[1] += tiny; }) ==
-          Claims{"cyclic coordinates follow from momenta"});
+          Claims{"cyclic coordinates follow from their momenta"});
     const Derivation coupled = derive(test::coupled_scene(4));
     CHECK(failed_after(coupled, [&](Derivation& d) { d.quadrature.A(0, 1) += tiny; }) ==
-          Claims{"stage equations combine these"});
+          Claims{"the stage equations combine these"});
     CHECK(failed_after(coupled, [&](Derivation& d) { d.system.hessian.put(0, 1, tiny); }) ==
           Claims{"second derivatives against differences"});
 }
@@ -181,16 +181,16 @@ TEST_CASE("a wrong weight, stage matrix or basis fails its checks") {
     Quadrature wrong = quadrature_of({Family::lobatto, 4});
     wrong.b[1] += GiNaC::pow(GiNaC::ex(10), -30);
     auto failed = failures(check_quadrature(wrong));
-    CHECK(std::count(failed.begin(), failed.end(), "its weights sum to 1") == 1);
+    CHECK(std::count(failed.begin(), failed.end(), "the weights sum to 1") == 1);
     CHECK(std::count(failed.begin(), failed.end(), "the quadrature is exact to degree 5") == 1);
     wrong = quadrature_of({Family::lobatto, 4});
     std::swap(wrong.A(0, 1), wrong.A(1, 0));
     failed = failures(check_quadrature(wrong));
-    CHECK(failed == Claims{"forces bend paths as they must", "the stage matrix is symplectic"});
+    CHECK(failed == Claims{"the stage matrix A integrates accelerations", "the stage matrix is symplectic"});
     wrong = quadrature_of({Family::lobatto, 3});
     wrong.K(0, 2) = -wrong.K(0, 2);
     failed = failures(check_quadrature(wrong));
-    CHECK(failed == Claims{"K integrates products of slopes"});
+    CHECK(failed == Claims{"K is the integral of products of basis derivatives"});
 }
 
 TEST_CASE("a wrong equation fails the checks that rederive it") {
@@ -205,15 +205,15 @@ TEST_CASE("a wrong equation fails the checks that rederive it") {
     CHECK(failed_after([](Discretisation& d) { d.interior[1][0] *= 2; }) ==
           Claims{"interior equations are dL_d/dQ = 0"});
     CHECK(failed_after([](Discretisation& d) { d.border[1] = -d.border[1]; }) ==
-          Claims{"border equations are dL_d/dq = 0"});
+          Claims{"equations at the ends are dL_d/dq = 0"});
     CHECK(failed_after([](Discretisation& d) { std::swap(d.left_momentum, d.right_momentum); }) ==
-          Claims{"momenta are slopes of L_d"});
+          Claims{"momenta are derivatives of L_d"});
     CHECK(failed_after([](Discretisation& d) { d.full_jacobian(0, 1) += d.h / 1000; }) ==
           Claims{"dF_L is the derivative of F_L", "dF_L against central differences"});
     CHECK(failed_after([](Discretisation& d) { d.reduced_jacobian = d.reduced_jacobian.transpose(); }) ==
-          Claims{"and so is the reduced Jacobian", "reduced Jacobian against differences"});
+          Claims{"the reduced Jacobian is the derivative", "reduced Jacobian against differences"});
     CHECK(failed_after([](Discretisation& d) { d.arrival_momentum[0] += d.h * d.Q[1][0] / 1000; }) ==
-          Claims{"reduced system combines these"});
+          Claims{"the reduced system combines these"});
 }
 
 TEST_CASE("a wrong program fails the check of what is emitted") {
