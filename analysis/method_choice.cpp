@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "generator/mechanics/clock/automatic_clock.hpp"
 
 namespace lobatto {

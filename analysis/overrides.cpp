@@ -8,7 +8,7 @@
 #include <set>
 
 #include "generator/formula/expression.hpp"
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 
 namespace lobatto {
 

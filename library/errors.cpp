@@ -5,7 +5,7 @@
 #include <string>
 #include <system_error>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto::api {

@@ -5,7 +5,7 @@
 #include "analysis/checked_scene.hpp"
 #include "analysis/stability/json.hpp"
 #include "generator/describe/describe.hpp"
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 #include "library/whole.hpp"
 
 namespace lobatto::api {

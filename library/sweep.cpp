@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "library/opened_sweep.hpp"
 
 namespace lobatto::api {

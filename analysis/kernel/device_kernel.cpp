@@ -10,7 +10,7 @@
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/kernel/support_text.hpp"
 #include "generator/emit/support.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "generator/mechanics/structure/structure.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"

@@ -11,7 +11,7 @@
 
 #include "analysis/overrides.hpp"
 #include "generator/formula/expression.hpp"
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 #include "generator/method/splitting.hpp"
 
 namespace lobatto {

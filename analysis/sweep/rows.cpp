@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

@@ -5,7 +5,7 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/output_path.hpp"
 #include "cli/print/manual.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/files/partial_file.hpp"
 
 namespace lobatto {

@@ -11,8 +11,8 @@
 
 #include "cli/commands/commands.hpp"
 #include "cli/print/embedded.hpp"
-#include "generator/formula/source.hpp"
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/source.hpp"
+#include "generator/formula/text/suggest.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"

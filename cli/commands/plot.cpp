@@ -14,7 +14,7 @@
 #include "cli/print/drawing.hpp"
 #include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {

@@ -15,7 +15,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/stability_text.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "generator/method/splitting_stability.hpp"
 #include "library/whole.hpp"
 
@@ -58,7 +58,7 @@ std::string text_of_splitting(const Method& method) {
     for (const UnstableSteps& steps : unstable_steps(quadrature_of(method))) {
         text += fmt::format("  stable   to {:.10f}\n", steps.from);
         if (std::isfinite(steps.to))
-            text += fmt::format("  unstable to {:.10f}; growth a step: up to about 1 + {:.2g}\n", steps.to,
+            text += fmt::format("  unstable to {:.10f}; growth per step: up to about 1 + {:.2g}\n", steps.to,
                                 std::expm1(steps.rate));
         else
             text += "  unstable beyond, as far as is looked\n";

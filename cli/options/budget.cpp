@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "library/whole.hpp"
 
 namespace lobatto {

@@ -11,7 +11,7 @@
 #include <map>
 #include <system_error>
 
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 #include "runtime/files/cells.hpp"
 
 namespace lobatto {

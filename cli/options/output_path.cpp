@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"
 

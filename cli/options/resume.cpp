@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {

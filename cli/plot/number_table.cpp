@@ -11,8 +11,8 @@
 #include <stdexcept>
 
 #include "cli/table/hdf5_file.hpp"
-#include "generator/formula/source.hpp"
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/source.hpp"
+#include "generator/formula/text/suggest.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/cells.hpp"
 #include "runtime/files/npy.hpp"

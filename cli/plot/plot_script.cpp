@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "cli/print/drawing.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/output.hpp"
 

@@ -53,7 +53,7 @@ std::string intervals_text(const Stability& member) {
                             k < member.limits.size() ? "to " + limit_text(member.limits[k]) : "without end");
         if (!interval.stable)
             text +=
-                fmt::format("; growth a step: {}{}", growth_text(interval.rate),
+                fmt::format("; growth per step: {}{}", growth_text(interval.rate),
                             interval.peak ? " at " + decimal_of_square_root(*interval.peak, 6) : " as h omega grows");
         text += "\n";
     }
@@ -88,7 +88,7 @@ std::string mode_text(const Stability& member, const Mode& mode) {
                            mode.free ? "free: moves on steadily" : "the linear part says nothing here");
     const double x = std::sqrt(std::fabs(mode.z));
     if (mode.squared_frequency < 0)
-        return fmt::format("  omega^2 = {:<12.6g} unstable motion: grows by {:.5g} in a time h, in a step by {}",
+        return fmt::format("  omega^2 = {:<12.6g} unstable motion: grows by {:.5g} in a time h, per step by {}",
                            mode.squared_frequency, std::exp(x), growth_text(mode.rate));
     std::string text = fmt::format("  omega = {:<14.6g} h*omega = {:<12.6g} ", std::sqrt(mode.squared_frequency), x);
     if (mode.at_limit) return text + "AT a limit, to rounding: grows in proportion to the number of steps";
@@ -137,7 +137,7 @@ std::string point_text(const StabilityReport& report, const PointReport& point) 
         text += fmt::format("  no independent oscillations: {}; the motion itself grows by {} in a time h\n",
                             point.obstacle, growth_text(std::fabs(point.exact_rate) > 1e-12 ? point.exact_rate : 0));
     if (point.kernel_rate)
-        text += fmt::format("  measured on the kernel: growth a step {}\n",
+        text += fmt::format("  measured on the kernel: growth per step {}\n",
                             std::fabs(point.kernel_rate->value) > point.kernel_rate->floor
                                 ? growth_text(point.kernel_rate->value)
                                 : fmt::format("1, to within {:.1g}", point.kernel_rate->floor));
@@ -167,14 +167,14 @@ std::string trajectory_text(const StabilityReport& report) {
     }
     if (motion.frequencies_at < motion.states)
         text +=
-            fmt::format("  frequencies are known at {} of {} states looked at\n", motion.frequencies_at, motion.states);
+            fmt::format("  frequencies are known at {} of {} states examined\n", motion.frequencies_at, motion.states);
     if (motion.looked_at == 0) return text;
     text +=
         motion.parting == 0
             ? fmt::format(
-                  "  no eigenvalue of a step is above 1 ({} steps looked at){}\n", motion.looked_at,
+                  "  no eigenvalue of a step is above 1 ({} steps examined){}\n", motion.looked_at,
                   report.derivation.system.autonomous ? "" : "; as forces change with time it may grow all the same")
-            : fmt::format("  an eigenvalue above 1, so that nearby trajectories diverge, in {} of {} steps looked at\n",
+            : fmt::format("  an eigenvalue above 1, so that nearby trajectories diverge, in {} of {} steps examined\n",
                           motion.parting, motion.looked_at);
     if (motion.parting > 0)
         text += fmt::format("  fastest at t = {:.6g}: {} a step; the motion itself {}\n", motion.time,
@@ -195,7 +195,7 @@ std::string energy_text(const StabilityReport& report) {
         if (const auto general = general_modified_energy(report.member.method))
             text += row(fmt::format("H_{}", energy.order), canonical_text(*general)) +
                     "  (m the mass, V_k the k-th derivative of V)\n";
-    return text + fmt::format("  along the motion H varies by {:.2g}, this sum by {:.2g}; rounding is some {:.0e}\n",
+    return text + fmt::format("  along the motion H varies by {:.2g}, this sum by {:.2g}; rounding is about {:.0e}\n",
                               energy.variation, energy.modified_variation,
                               energy.size * std::numeric_limits<double>::epsilon());
 }

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 
 #ifdef LOBATTO_HDF5

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "cli/table/table_reader.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {

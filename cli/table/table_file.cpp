@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "cli/table/hdf5_file.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/run/output.hpp"
 
 namespace lobatto {

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <iterator>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/error.hpp"
 
 namespace lobatto {

@@ -12,7 +12,7 @@
 #include "analysis/tape.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/view/figures.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "library/opened_run.hpp"
 
 namespace lobatto {

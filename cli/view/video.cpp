@@ -14,7 +14,7 @@
 
 #include "cli/options/command_line.hpp"
 #include "cli/print/interruption.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "runtime/build/process.hpp"
 #include "runtime/error.hpp"
 #include "runtime/files/partial_file.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "generator/describe/describe.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "generator/graph/notation.hpp"
 
 namespace lobatto {

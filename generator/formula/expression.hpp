@@ -9,7 +9,7 @@
 
 #include "generator/formula/formula.hpp"
 #include "generator/formula/names.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "generator/formula/operand.hpp"
-#include "generator/formula/source.hpp"
-#include "generator/formula/token.hpp"
+#include "generator/formula/text/source.hpp"
+#include "generator/formula/text/token.hpp"
 
 namespace lobatto {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "generator/formula/parser.hpp"
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 
 namespace lobatto {
 namespace {

@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <utility>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 namespace {

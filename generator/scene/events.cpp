@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "generator/formula/real.hpp"
-#include "generator/formula/token.hpp"
+#include "generator/formula/text/token.hpp"
 #include "generator/scene/system_reader.hpp"
 
 namespace lobatto {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 #include "generator/scene/system_reader.hpp"
 
 namespace lobatto {

@@ -13,7 +13,7 @@
 #include "generator/formula/expression.hpp"
 #include "generator/formula/real.hpp"
 #include "generator/formula/switch.hpp"
-#include "generator/formula/token.hpp"
+#include "generator/formula/text/token.hpp"
 #include "generator/method/splitting.hpp"
 #include "generator/scene/eliminated.hpp"
 #include "generator/scene/file/document.hpp"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "generator/formula/names.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "generator/method/method.hpp"
 
 namespace lobatto {

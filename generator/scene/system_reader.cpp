@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "generator/formula/real.hpp"
-#include "generator/formula/token.hpp"
+#include "generator/formula/text/token.hpp"
 #include "generator/scene/file/document.hpp"
 
 namespace lobatto {

@@ -86,6 +86,6 @@ TEST_CASE("a Lagrangian that jumps has no motion there, and a run says so") {
     const test::Finished small = run(jumping("x'^2/2 - x^4/4 - 0.001*if(x > 0, 1, 0)"));
     CHECK(small.exit_code == 0);
     CHECK(small.err.find(
-              "the Lagrangian jumps, by some 0.001, where if in the Lagrangian (line 1 column 38) goes from one "
+              "the Lagrangian jumps, by about 0.001, where if in the Lagrangian (line 1 column 38) goes from one "
               "piece to the other") != std::string::npos);
 }

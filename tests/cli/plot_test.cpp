@@ -10,7 +10,7 @@
 
 #include "cli/print/drawing.hpp"
 #include "cli/table/hdf5_file.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "tests/support.hpp"
 
 using namespace lobatto;

@@ -137,7 +137,7 @@ TEST_CASE("velocities that couple, time, singular places and no equilibrium are 
         stability({scene_in(folder, "(x'^2 + y'^2)/2 + (x*y' - y*x') - (x^2 + y^2)/2", two)}).out,
         "no independent oscillations: its velocities couple the coordinates; the motion itself grows by 1 in a "
         "time h\n"
-        "  measured on the kernel: growth a step 1, to within 0.0005\n"));
+        "  measured on the kernel: growth per step 1, to within 0.0005\n"));
     CHECK(test::contains(
         stability({scene_in(folder, "q'^2/2 + cos(q)*sin(t)", "q = { position = 1, velocity = 0 }", "time = \"t\"\n")})
             .out,
@@ -150,15 +150,15 @@ TEST_CASE("velocities that couple, time, singular places and no equilibrium are 
                                                       "[forces]\nq = \"-0.2*q'\"")});
     CHECK(test::contains(damped.out,
                          "its forces depend on the velocities; the motion itself grows by 0.99005 in a time h\n"
-                         "  measured on the kernel: growth a step 0.99005\n"));
+                         "  measured on the kernel: growth per step 0.99005\n"));
     // Both signs changed: the same oscillator.
     CHECK(test::contains(stability({scene_in(folder, "q^2/2 - q'^2/2", "q = { position = 1, velocity = 0 }")}).out,
                          "omega = 1 "));
     const test::Finished free = stability({scene_in(folder, "q'^2/2 - 3*q", "q = { position = 1, velocity = 0 }")});
     CHECK(test::contains(free.out, "omega = 0              free: moves on steadily\n"));
     const test::Finished saddle = stability({scene_in(folder, "q'^2/2 + q^2/2", "q = { position = 1, velocity = 0 }")});
-    CHECK(test::contains(saddle.out, "unstable motion: grows by 1.1052 in a time h, in a step by 1.1052\n"));
-    CHECK(test::contains(saddle.out, "measured on the kernel: growth a step 1.1052\n"));
+    CHECK(test::contains(saddle.out, "unstable motion: grows by 1.1052 in a time h, per step by 1.1052\n"));
+    CHECK(test::contains(saddle.out, "measured on the kernel: growth per step 1.1052\n"));
 }
 
 TEST_CASE("what the linear part, the limit or a measurement cannot tell is said") {
@@ -196,7 +196,7 @@ TEST_CASE("what the linear part, the limit or a measurement cannot tell is said"
     // Eigenvalues of steps bound no motion whose forces change with time.
     const test::Finished parametric =
         stability({scene_in(folder, "q'^2/2 - (1 + 0.5*cos(2*t))*q^2/2", q, "time = \"t\"\n")});
-    CHECK(test::contains(parametric.out, "steps looked at); as forces change with time it may grow all the same\n"));
+    CHECK(test::contains(parametric.out, "steps examined); as forces change with time it may grow all the same\n"));
 }
 
 TEST_CASE("frequencies are met along a motion whose velocities couple the coordinates, and their absence is said") {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

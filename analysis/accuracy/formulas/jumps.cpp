@@ -80,11 +80,11 @@ std::vector<std::string> jumps_of(const Scene& scene, const std::vector<double>&
         if (!scene.lagrangian.has(one.side)) continue;
         const auto jump = jumps.of(one);
         if (jump && jump->first > notable * jump->second)
-            sentences.push_back(
-                fmt::format("the Lagrangian jumps, by some {:.2g}, where {} (line {} column {}) goes from one piece to "
-                            "the other. No "
-                            "motion follows that: write both pieces so that they have one value there",
-                            jump->first, one.text, one.at.line, one.at.column));
+            sentences.push_back(fmt::format(
+                "the Lagrangian jumps, by about {:.2g}, where {} (line {} column {}) goes from one piece to "
+                "the other. No "
+                "motion follows that: write both pieces so that they have one value there",
+                jump->first, one.text, one.at.line, one.at.column));
     }
     return sentences;
 }

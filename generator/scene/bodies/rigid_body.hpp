@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "generator/formula/token.hpp"
+#include "generator/formula/text/token.hpp"
 
 namespace lobatto {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "generator/formula/names.hpp"
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

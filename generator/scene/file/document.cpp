@@ -11,7 +11,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "generator/formula/cursor.hpp"
+#include "generator/formula/text/cursor.hpp"
 #include "generator/scene/file/toml_guard.hpp"
 
 namespace lobatto {

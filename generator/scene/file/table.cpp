@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 
 namespace lobatto {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 #include "generator/scene/file/document.hpp"
 #include "generator/scene/file/keys.hpp"
 

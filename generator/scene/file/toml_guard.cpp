@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "generator/formula/cursor.hpp"
+#include "generator/formula/text/cursor.hpp"
 
 namespace lobatto {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The characters of a formula, one after the other.
-#include "generator/formula/token.hpp"
+#include "generator/formula/text/token.hpp"
 
 #include <fmt/format.h>
 

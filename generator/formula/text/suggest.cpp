@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // The nearest of some names, by the letters to change.
-#include "generator/formula/suggest.hpp"
+#include "generator/formula/text/suggest.hpp"
 
 #include <fmt/format.h>
 

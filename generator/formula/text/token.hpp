@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 namespace lobatto {
 

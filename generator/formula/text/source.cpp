@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Files of input and the layout of errors: place, message, line, caret. Nothing of a file reaches a terminal raw.
-#include "generator/formula/source.hpp"
+#include "generator/formula/text/source.hpp"
 
 #include <fmt/format.h>
 
