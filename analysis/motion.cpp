@@ -69,6 +69,18 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
     return {static_cast<std::int64_t>(reaches_end ? nearest : std::floor(ratio)), reaches_end};
 }
 
+Steps steps_of_run(const Scene& scene, const Overrides& overrides) {
+    const Steps steps = steps_of(scene, overrides);
+    const double until = scene.evaluate(scene.run.until, "the end time").to_double();
+    if (steps.count == 0 && until > 0)
+        throw InputError(
+            fmt::format("{}: the step {:.6g} is longer than the run, which ends at {:.6g}, so that not one step would "
+                        "be taken; make the step smaller or the end time later",
+                        overrides.step.empty() ? scene.path : "--step",
+                        scene.evaluate(scene.run.step, "the step").to_double(), until));
+    return steps;
+}
+
 void add_digits(TrajectoryRequest& request, const Scene& scene, const Kernel& kernel) {
     if (kernel->real_kind == LOBATTO_DOUBLE) return;
     NumberStepper stepper(kernel);

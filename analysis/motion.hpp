@@ -16,6 +16,9 @@ struct Steps {
 GiNaC::numeric step_of(const Scene& scene, const Overrides& overrides = {});
 Steps steps_of(const Scene& scene, const Overrides& overrides = {});
 
+// The same. InputError if the run is too short for one step.
+Steps steps_of_run(const Scene& scene, const Overrides& overrides = {});
+
 // Of a scene with a clock; none for others. `count` of steps_of.
 Arrivals arrivals_of(const Scene& scene, std::int64_t count);
 

@@ -114,7 +114,7 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
     const std::chrono::duration<double> derivation_time = std::chrono::steady_clock::now() - start;
     apply(overrides, scene);  // after the derivation: one kernel serves all values
     if (!overrides.set.empty()) check_values(scene);
-    const Steps steps = steps_of(scene, overrides);
+    const Steps steps = steps_of_run(scene, overrides);
     Compiled compiled;
     const Kernel kernel = kernel_of(derived.source, numbers, &compiled);
     const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(in_double, Precision::double_);

@@ -157,7 +157,7 @@ Steps SweepStudy::steps_of_setting(Scene& scene) const {
         step_of(scene, options_.overrides);
         scene.run.until = scene.run.step * GiNaC::numeric(static_cast<long>(*options_.steps));
     }
-    return lobatto::steps_of(scene, options_.overrides);
+    return steps_of_run(scene, options_.overrides);
 }
 
 std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {

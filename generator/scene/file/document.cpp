@@ -138,10 +138,13 @@ Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
     return value;
 }
 
-// toml++ says "Error while parsing X: Y"; the most likely reason of some is a formula without quotes.
+// toml++ says "Error while parsing X: Y", with "cannot redefine existing string 'x'" for a key that stands twice; the
+// most likely reason of some is a formula without quotes.
 std::string explanation(std::string_view description) {
     constexpr std::string_view prefix = "Error while parsing ";
     if (description.starts_with(prefix)) description.remove_prefix(prefix.size());
+    if (const std::size_t twice = description.find("cannot redefine existing "); twice != std::string_view::npos)
+        return fmt::format("{} is given twice; keep one", description.substr(description.find('\'', twice)));
     const bool formula = description.find("could not determine value type") != std::string_view::npos ||
                          description.find("expected digit") != std::string_view::npos;
     const bool point = description.find("expected decimal digit, saw '.'") != std::string_view::npos;

@@ -184,6 +184,11 @@ TEST_CASE("an end that is no multiple of the step is said, not overrun") {
     const test::Finished none = place.run({pendulum, "-o", place.file(), "--until", "0"});
     CHECK(test::contains(none.out, "  steps                   0, h = 0.05, to t = 0\n"));
     CHECK(test::contains(none.out, ", 1 state\n"));
+    const test::Finished too_short = place.run({pendulum, "-o", place.file(), "--step", "1000", "--until", "10"});
+    CHECK(too_short.exit_code == 2);
+    CHECK(test::contains(too_short.err,
+                         "--step: the step 1000 is longer than the run, which ends at 10, so that not "
+                         "one step would be taken; make the step smaller or the end time later"));
 }
 
 TEST_CASE("without -o the trajectory goes to the folder out under the current one") {
