@@ -49,6 +49,7 @@ std::vector<Line> lines_of(const std::string& text) {
     for (std::size_t begin = 0; begin < text.size();) {
         const std::size_t end = std::min(text.find('\n', begin), text.size());
         Line line{text.substr(begin, end - begin), table, "", false};
+        if (line.text.ends_with('\r')) line.text.pop_back();
         begin = end + 1;
         std::smatch match;
         if (!inside && std::regex_match(line.text, match, header)) {
@@ -123,7 +124,7 @@ std::string with_choice(const std::string& text, const Choice& choice, double er
                                     line.key == "error" || (until && line.key == "until"));
         if (!replaced) result += line.text + '\n';
     }
-    return result;
+    return text.find("\r\n") == std::string::npos ? result : std::regex_replace(result, std::regex("\n"), "\r\n");
 }
 
 void write_method(const Choice& choice, const Scene& scene, double error, bool until) {

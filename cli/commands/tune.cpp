@@ -13,6 +13,7 @@
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
+#include "cli/print/sweep_summary.hpp"
 #include "cli/print/tell.hpp"
 #include "library/whole.hpp"
 
@@ -47,9 +48,10 @@ void print(const Choice& choice, const Scene& scene, double error) {
     print_row("stability", stability_text(choice));
     if (std::isfinite(m.energy_error))
         print_row("energy error", fmt::format("{:.2g} of the energy of motion", m.energy_error));
-    print_row("searched", fmt::format("{} members of the family{}, {:.1f} s", choice.members,
-                                      choice.complete ? "" : "; with more time (--budget) there might be a faster one",
-                                      choice.seconds));
+    print_row(
+        "searched",
+        fmt::format("{} in {:.1f} s{}", counted(choice.members, "member of the family", "members of the family"),
+                    choice.seconds, choice.complete ? "" : "; with more time (--budget) there may be a faster one"));
 }
 
 void tune(const TuneOptions& options) {

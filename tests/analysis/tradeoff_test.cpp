@@ -173,6 +173,10 @@ TEST_CASE("a choice written into a scene leaves everything else, and reads back"
     CHECK(test::contains(changed, "until = 120 # s: about 100 swings"));  // its own comment
     CHECK(test::contains(changed, "[output]\nevery = 1     # keep every step\n"));
     CHECK(with_choice(changed, choice, 1e-8, false) == changed);  // once is enough
+    const auto of_windows = [](const std::string& lines) {
+        return std::regex_replace(lines, std::regex("\n"), "\r\n");
+    };
+    CHECK(with_choice(of_windows(text), choice, 1e-8, false) == of_windows(changed));
     // Without [method], with a step from a period, and what looks like a table inside a text.
     const std::string other =
         "title = \"t\"\nlagrangian = \"\"\"\n  x'^2/2\n# [method]\n  - x^2/2\"\"\"\n[coordinates]\nx = { position = 1, "
