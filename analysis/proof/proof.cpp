@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <future>
 
 #include "analysis/accuracy/taken_steps.hpp"
 #include "analysis/exact_start.hpp"
@@ -161,8 +162,8 @@ ProofRow reversal(const std::string& precision, const Return& result, double con
 
 // What the compiled steps leave in the equations that they were derived from, whatever iteration found them.
 void taken_steps(std::vector<ProofRow>& rows, const Derivation& derivation, const Kernel& kernel,
-                 const Kernel& exact_kernel, const Start<double>& start, const Start<__float128>& exact,
-                 const std::function<void(const std::string&, double)>& say) {
+                 const Kernel& exact_kernel, const Kernel& ensemble, const Start<double>& start,
+                 const Start<__float128>& exact) {
     constexpr double bound = 64;  // roundings
     const std::string claim = "steps solve the discrete Euler-Lagrange equations: ",
                       meaning =
@@ -176,9 +177,6 @@ void taken_steps(std::vector<ProofRow>& rows, const Derivation& derivation, cons
         [&] { return trajectory_leaves(derivation, kernel, start.parameters, start.q, start.p, start.step); });
     add(claim, "one trajectory, quadruple", bound, meaning,
         [&] { return trajectory_leaves(derivation, exact_kernel, exact.parameters, exact.q, exact.p, exact.step); });
-    say("compiling an ensemble", 0.5);
-    const Kernel ensemble = ensemble_kernel_of(emit(derivation), Precision::double_, 64);
-    say("checking steps of an ensemble", 0.7);
     if (ensemble->lanes == 0)
         rows.push_back({claim + "ensembles", "no lanes", "as one trajectory", true, ""});
     else
@@ -362,11 +360,20 @@ void energies(std::vector<ProofRow>& rows, const Kernel& kernel, const Kernel& e
         energy(rows, kernel, start);
 }
 
+// What steps that are too long do to a motion tells nothing of the kernel. `turned`: h omega.
+void excuse_long_steps(std::vector<ProofRow>& rows, std::size_t of_steps, double turned) {
+    if (!(turned > longest_turn)) return;
+    for (std::size_t i = of_steps; i < rows.size(); ++i)
+        if (!rows[i].holds)
+            rows[i] = not_decided(rows[i].claim,
+                                  fmt::format("the step is too long: h omega = {:.3g}, more than a period", turned));
+}
+
 }  // namespace
 
 Proof prove(const Scene& written, const MethodChoice& method,
             const std::function<void(const std::string&, double)>& say) {
-    say("deriving and compiling", 0);
+    say("deriving", 0);
     Scene chosen = written;
     method.apply(chosen);
     const Scene scene = scene_to_prove(chosen);
@@ -377,20 +384,25 @@ Proof prove(const Scene& written, const MethodChoice& method,
     if (!step.is_positive())
         throw InputError(fmt::format("{}: the step must be positive, but is {:.6g}", scene.path, step.to_double()));
     const Derivation with_walls = derive(scene), derivation = without_walls(with_walls);
-    EmitOptions emit_options;
-    const Kernel kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
-    emit_options.precision = Precision::quadruple;
-    say("compiling in quadruple precision", 0.2);
-    const Kernel exact_kernel = kernel_of(emit(derivation, emit_options), emit_options.precision);
+    // Compiled beside one another, and beside the checks that need no kernel.
+    const KernelSource in_double = emit(derivation, {Precision::double_, {}}),
+                       in_quadruple = emit(derivation, {Precision::quadruple, {}});
+    const auto beside = [](auto compile) { return std::async(std::launch::async, compile); };
+    std::future<Kernel> exact_kernel_comes = beside([&] { return kernel_of(in_quadruple, Precision::quadruple); }),
+                        kernel_comes = beside([&] { return kernel_of(in_double, Precision::double_); });
 
     Proof proof{scene.title, scene.method.name(), {}, {}};
     std::vector<ProofRow>& rows = proof.rows;
-    say("checking quadrature, equations and programs", 0.4);
+    say("checking quadrature, equations and programs, and compiling", 0.1);
     for (const Check& check : check_quadrature(derivation.quadrature)) rows.push_back(row_of(check));
     near_the_start(rows, "equations", [&] { return check_equations(derivation); });
     near_the_start(rows, "programs",
                    [&] { return check_programs(with_walls, optimised_programs(with_walls).programs); });
 
+    say("compiling", 0.4);
+    const Kernel kernel = kernel_comes.get();
+    std::future<Kernel> ensemble_comes = beside([&] { return ensemble_kernel_of(in_double, Precision::double_, 64); });
+    const Kernel exact_kernel = exact_kernel_comes.get(), ensemble = ensemble_comes.get();
     const auto start = start_with_step<double>(exact_start, step, kernel);
     const auto exact = start_with_step<__float128>(exact_start, step, exact_kernel);
     const QuadrupleStart quadruple_start{exact.parameters, exact.q, exact.p};
@@ -398,8 +410,8 @@ Proof prove(const Scene& written, const MethodChoice& method,
     if (chosen.clock)
         rows.push_back({"steps, from here on", "of the clock " + chosen.clock->text, "equal in its time", true, ""});
     if (scene.is_cut()) rows.push_back({"steps, from here on", "without walls", "between impacts", true, ""});
-    say("checking steps", 0.45);
-    taken_steps(rows, derivation, kernel, exact_kernel, start, exact, say);
+    say("checking steps", 0.7);
+    taken_steps(rows, derivation, kernel, exact_kernel, ensemble, start, exact);
     say("checking symplecticity and reversal", 0.85);
     const auto states = states_along(kernel, start);
     const bool forced = derivation.system.has_forces();
@@ -434,12 +446,7 @@ Proof prove(const Scene& written, const MethodChoice& method,
             rows.push_back(row);
     }
 
-    // What steps that are too long do to a motion tells nothing of the kernel.
-    const double turned = start.step * fastest_oscillation(exact_kernel, quadruple_start, 8 * start.step);
-    for (std::size_t i = of_steps; i < rows.size() && turned > longest_turn; ++i)
-        if (!rows[i].holds)
-            rows[i] = not_decided(rows[i].claim,
-                                  fmt::format("the step is too long: h omega = {:.3g}, more than a period", turned));
+    excuse_long_steps(rows, of_steps, start.step * fastest_oscillation(exact_kernel, quadruple_start, 8 * start.step));
     return proof;
 }
 
