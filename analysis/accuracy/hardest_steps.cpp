@@ -65,6 +65,7 @@ bool jumps_over(LoadedStepper<double>& stepper, const std::vector<double>& from,
     };
     const std::vector<double> first = rates(0), last = rates(1);
     if (first.empty() || last.empty()) return false;
+    const double gone = distance(to, from, scale);
     std::vector<std::vector<double>> inside;
     for (int i = 1; i < looks; ++i) {
         inside.push_back(rates(static_cast<double>(i) / looks));
@@ -76,12 +77,14 @@ bool jumps_over(LoadedStepper<double>& stepper, const std::vector<double>& from,
         const auto most =
             std::max_element(inside.begin(), inside.end(), [k](const auto& x, const auto& y) { return x[k] < y[k]; });
         if (!((*most)[k] > 2 * ordinary)) continue;
+        // A number that hardly moves in this step may be many times as fast on a way that no motion takes.
+        const double least = std::max(spike * ordinary, grossly * gone * scale[k] / std::fabs(step));
         double low = static_cast<double>(most - inside.begin()) / looks, high = low + 2.0 / looks;
         for (int section = 0; section < closer; ++section) {
             const double left = high - golden * (high - low), right = low + golden * (high - low);
             const std::vector<double> at_left = rates(left), at_right = rates(right);
             if (at_left.empty() || at_right.empty()) return true;
-            if (std::max(at_left[k], at_right[k]) > spike * ordinary) return true;
+            if (std::max(at_left[k], at_right[k]) > least) return true;
             (at_left[k] > at_right[k] ? high : low) = at_left[k] > at_right[k] ? right : left;
         }
     }

@@ -132,3 +132,12 @@ TEST_CASE("what rounding alone moves raises no alarm: a circular orbit's radius,
         CHECK_FALSE(said_of(scene, {}).warns);  // and exit code 0
     }
 }
+
+// Five links in a line, at rest: only the first one has an acceleration, and the others hardly move in a step.
+TEST_CASE("a chain that begins at rest raises no alarm: the straight way through its first step is none of its own") {
+    const std::string chain =
+        "lagrangian = \"sum(k = 1 .. 5, (x[k]'^2 + y[k]'^2)/2 - 9.81*y[k])\"\n[definitions]\n"
+        "\"x[k]\" = \"sum(i = 1 .. k, sin(a[i]))\"\n\"y[k]\" = \"-sum(i = 1 .. k, cos(a[i]))\"\n"
+        "[coordinates]\na = { count = 5, position = 1, velocity = 0 }\n[run]\nstep = 0.01\nuntil = 1\n";
+    CHECK_FALSE(said_of(chain, {}).warns);
+}

@@ -209,7 +209,8 @@ struct Interrupted {
 
 }  // namespace
 
-TEST_CASE("a run killed at random moments and resumed has the bytes of one that was never stopped") {
+TEST_CASE("a run killed at random moments and resumed has the bytes of one that was never stopped" *
+          doctest::test_suite("slow")) {
     check_kills(10, 1);
 }
 
