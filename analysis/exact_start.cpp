@@ -6,6 +6,7 @@
 #include "generator/mechanics/start.hpp"
 #include "runtime/error.hpp"
 #include "runtime/kernel/base/double_double.hpp"
+#include "runtime/run/other_velocity.hpp"
 
 namespace lobatto {
 
@@ -53,7 +54,12 @@ StartIn<real> start_in(const ExactStart& start, const Kernel& kernel, real step)
         throw ComputationError(status == LOBATTO_SINGULAR_MASS
                                    ? "the mass matrix has no inverse for the scene's parameters"
                                    : "the kernel's coefficients are not finite for the scene's parameters and step");
-    if (start.from_velocity) result.p = stepper.momentum(real(0), result.q, result.p);
+    if (start.from_velocity) {
+        const std::vector<real> velocity = std::exchange(result.p, {});
+        result.p = stepper.momentum(real(0), result.q, velocity);
+        const std::string why = why_velocity_is_lost(stepper, real(0), result.q, velocity, result.p);
+        if (!why.empty()) throw ComputationError(why);
+    }
     return result;
 }
 

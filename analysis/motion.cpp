@@ -8,6 +8,7 @@
 
 #include "analysis/exact_start.hpp"
 #include "runtime/error.hpp"
+#include "runtime/run/other_velocity.hpp"
 #include "runtime/run/parts.hpp"
 
 namespace lobatto {
@@ -116,7 +117,12 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     TrajectoryResult none;
     none.status = stepper.prepare(request.parameters, request.step);
     if (none.status == LOBATTO_OK) {
-        if (start.from_velocity) request.p = stepper.momentum(request.time, request.q, request.p);
+        if (start.from_velocity) {
+            const std::vector<double> velocity = std::exchange(request.p, {});
+            request.p = stepper.momentum(request.time, request.q, velocity);
+            const std::string why = why_velocity_is_lost(stepper, request.time, request.q, velocity, request.p);
+            if (!why.empty()) throw ComputationError(fmt::format("{}: {}", scene.path, why));
+        }
         none.status = stepper.start(request.time, request.q, request.p);
     }
     none.q = request.q;

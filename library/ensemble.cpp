@@ -7,6 +7,7 @@
 
 #include "library/opened_sweep.hpp"
 #include "runtime/run/ensemble/side_by_side.hpp"
+#include "runtime/run/other_velocity.hpp"
 
 namespace lobatto::api {
 
@@ -106,10 +107,13 @@ struct Ensemble::Parts {
     void begin(std::size_t index, LoadedStepper<double>& stepper, EnsembleStart& start) const {
         study->starts().start(static_cast<std::int64_t>(index), start);
         if (!request().from_velocities) return;
-        if (stepper.prepare(start.parameters, step[0]) == LOBATTO_OK)
-            start.rate = stepper.momentum(request().time, start.q, start.rate);
-        else
-            std::fill(start.rate.begin(), start.rate.end(), std::nan(""));
+        std::vector<double> p(start.rate.size(), std::nan(""));
+        if (stepper.prepare(start.parameters, step[0]) == LOBATTO_OK) {
+            p = stepper.momentum(request().time, start.q, start.rate);
+            if (!other_velocity(stepper, request().time, start.q, start.rate, p).empty())
+                std::fill(p.begin(), p.end(), std::nan(""));
+        }
+        start.rate = p;
     }
 
     void restart(Lanes& side_by_side) {

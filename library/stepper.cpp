@@ -10,6 +10,7 @@
 #include "analysis/kernel/derived_kernel.hpp"
 #include "generator/mechanics/start.hpp"
 #include "library/parts.hpp"
+#include "runtime/run/other_velocity.hpp"
 
 namespace lobatto::api {
 
@@ -324,7 +325,13 @@ void Stepper::start(double t, const double* q, const double* p) {
 }
 void Stepper::start_from_velocity(double t, const double* q, const double* v) {
     const std::size_t n = parts_->n();
-    guarded([&] { parts_->begin_at(t, {q, q + n}, parts_->stepper.momentum(t, {q, q + n}, {v, v + n})); });
+    guarded([&] {
+        const std::vector<double> position{q, q + n}, velocity{v, v + n},
+            momentum = parts_->stepper.momentum(t, position, velocity);
+        const std::string why = why_velocity_is_lost(parts_->stepper, t, position, velocity, momentum);
+        if (!why.empty()) throw ComputationError(why);
+        parts_->begin_at(t, position, momentum);
+    });
 }
 
 bool Stepper::advance(std::int64_t steps) {

@@ -101,6 +101,7 @@ constexpr const char* compiled_quickly[] = {
     "/generator/method/splitting_test.cpp",
     "/library/inputs_test.cpp",
     "/library/library_test.cpp",
+    "/library/other_velocity_test.cpp",
     "/library/switches_test.cpp",
     "/runtime/kernel/clocked_lanes_test.cpp",
     "/runtime/kernel/fixed_point_test.cpp",

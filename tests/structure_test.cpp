@@ -114,7 +114,7 @@ const std::vector<Room> rooms = {
     {"runtime/kernel/export", {"runtime/kernel"}},
     {"runtime/files", {"runtime"}},
     {"runtime/build", {"runtime", "runtime/files", "runtime/kernel", "runtime/kernel/base"}},
-    {"runtime/run", {"runtime", "runtime/build", "runtime/files", "runtime/kernel"}},
+    {"runtime/run", {"runtime", "runtime/build", "runtime/files", "runtime/kernel", "runtime/kernel/base"}},
     {"runtime/run/ensemble", {"runtime", "runtime/build", "runtime/kernel", "runtime/run"}},
     {"runtime/measure", {"runtime", "runtime/build", "runtime/kernel/base", "runtime/run"}},
     {"analysis/kernel", {"generator/", "runtime/"}},

@@ -28,6 +28,7 @@ constexpr double double_rounding = 1e-13, noise_of_turning = 1e-7;  // relative:
 
 // A force known to vanish to 1e-45 of its terms may be that of a multiple root, 1e-22 or more away.
 constexpr double position_rounding = 1e-20;
+constexpr double multiple_rounding = 1e-12;  // where several equilibria meet: the iteration ends beside them
 
 // Each entry divided by the units of its row and column.
 template <class Real>
@@ -290,16 +291,23 @@ bool Linearisation::rests(const Position& q) {
 }
 
 std::vector<Eigen::Index> Linearisation::angles(const Position& q) {
-    std::vector<Eigen::Index> result;
-    const std::vector<Sized> here = force(q);
-    for (std::size_t k = 0; k < q.size(); ++k) {
-        Position turned = q;
+    const auto is_angle = [&](const Position& from, std::size_t k) {
+        Position turned = from;
         turned[k] = turned[k] + 2 * cln::pi(cln::float_format(number_digits));
-        const std::vector<Sized> there = force(turned);
-        if (std::equal(here.begin(), here.end(), there.begin(),
-                       [](const Sized& a, const Sized& b) { return a.equals(b); }))
-            result.push_back(static_cast<Eigen::Index>(k));
-    }
+        try {
+            const std::vector<Sized> here = force(from), there = force(turned);
+            return std::equal(here.begin(), here.end(), there.begin(),
+                              [](const Sized& a, const Sized& b) { return a.equals(b); });
+        } catch (const DomainError&) {
+            return false;
+        }
+    };
+    // All forces may vanish along a line of equilibria, but not beside it.
+    Position beside = q;
+    for (std::size_t k = 0; k < q.size(); ++k) beside[k] = beside[k] + exactly(0.1 / (1.0 + static_cast<double>(k)));
+    std::vector<Eigen::Index> result;
+    for (std::size_t k = 0; k < q.size(); ++k)
+        if (is_angle(q, k) && is_angle(beside, k)) result.push_back(static_cast<Eigen::Index>(k));
     return result;
 }
 
@@ -313,7 +321,8 @@ VectorXd Linearisation::newton_step(const Position& q, const VectorXd& f) {
 }
 
 // A double step along forces and stiffness of 60 digits is refined to as many.
-std::optional<Linearisation::Position> Linearisation::equilibrium_from(const VectorXd& start) {
+std::optional<Linearisation::Position> Linearisation::equilibrium_from(const VectorXd& start, bool& is_multiple) {
+    is_multiple = false;
     const VectorXd most = start.cwiseAbs().cwiseMax(1) / 2,  // of a step
         extent = start.unaryExpr([](double x) { return x == 0 ? 1 : std::fabs(x); });
     const auto plain_force = [&](const Position& q) {
@@ -342,6 +351,7 @@ std::optional<Linearisation::Position> Linearisation::equilibrium_from(const Vec
             if (limit <= 1 && ratio > 0.4 && ratio < 0.95 && std::fabs(ratio - last_ratio) < 0.01) {
                 step /= 1 - ratio;
                 last.setZero();
+                is_multiple = true;
             }
             last_ratio = ratio;
             // Half as far as long as the force grows much: towards a pole, or over a top.
@@ -364,10 +374,11 @@ std::vector<Equilibrium> Linearisation::equilibria(const std::vector<VectorXd>& 
     std::vector<Equilibrium> found;
     std::vector<VectorXd> spectra;
     const auto look_from = [&](const VectorXd& start) {
-        const auto position = equilibrium_from(start);
+        bool is_multiple = false;
+        const auto position = equilibrium_from(start, is_multiple);
         if (!position) return;
         Equilibrium equilibrium{plain(*position), at_rest(*position)};
-        equilibrium.system.rounding = position_rounding;
+        equilibrium.system.rounding = is_multiple ? multiple_rounding : position_rounding;
         const auto spectrum = spectrum_of(equilibrium.system);
         if (!spectrum) return;
         const bool known = std::any_of(spectra.begin(), spectra.end(), [&](const VectorXd& other) {

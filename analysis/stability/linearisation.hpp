@@ -68,7 +68,8 @@ private:
     bool rests(const Position& q);
     std::vector<Eigen::Index> angles(const Position& q);  // coordinates of which a whole turn changes no force
     Eigen::VectorXd newton_step(const Position& q, const Eigen::VectorXd& force);
-    std::optional<Position> equilibrium_from(const Eigen::VectorXd& start);
+    // `is_multiple`: several equilibria meet there, so that its last digits are not known.
+    std::optional<Position> equilibrium_from(const Eigen::VectorXd& start, bool& is_multiple);
 
     const System& system_;
     Formulas formulas_;

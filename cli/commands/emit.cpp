@@ -106,9 +106,10 @@ void write_plain(const PlainSource& source, const EmitCommand& options) {
     fmt::print(std::cout,
                "Wrote {0}, {1} lines\n\nUse it:\n"
                "  #include \"{2}.hpp\"  // g++ -std=c++17 -O2 -I {3} program.cpp\n"
-               "  {2}::Parameters parameters;\n"
-               "  {2}::State x = {2}::start(parameters);\n"
-               "  {2}::step(parameters, h, x);  // state: x.t, x.q, x.p; false: the step was not solved\n",
+               "  namespace motion = lobatto::plain::{2};\n"
+               "  motion::Parameters parameters;\n"
+               "  motion::State x = motion::start(parameters);\n"
+               "  motion::step(parameters, h, x);  // state: x.t, x.q, x.p; false: the step was not solved\n",
                path.string(), std::count(source.header.begin(), source.header.end(), '\n'), source.name,
                shell_word(options.folder));
 }

@@ -9,6 +9,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
+#include "cli/print/sweep_summary.hpp"
 #include "cli/print/tell.hpp"
 #include "cli/tradeoff/page.hpp"
 #include "cli/tradeoff/pictures.hpp"
@@ -61,7 +62,8 @@ void tradeoff(const TradeoffOptions& options) {
             "{}: nothing could be measured within {:.3g} s; give more time with --budget", scene.path, seconds));
     if (!options.json)
         fmt::print(
-            "{}: {} measurements{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path, experiment.store().all().size(),
+            "{}: {}{} to t = {:.6g} in {:.1f} s\n{}\n\n{}", scene.path,
+            counted(std::ssize(experiment.store().all()), "measurement", "measurements"),
             experiment.store().found() > 0 ? fmt::format(" ({} of an earlier run)", experiment.store().found()) : "",
             experiment.until(), experiment.elapsed(), reference_text(experiment), front_table(experiment));
     write(folder + "/tradeoff.csv", csv_of(experiment));

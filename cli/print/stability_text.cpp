@@ -92,7 +92,7 @@ std::string mode_text(const Stability& member, const Mode& mode) {
                            mode.squared_frequency, std::exp(x), growth_text(mode.rate));
     std::string text = fmt::format("  omega = {:<14.6g} h*omega = {:<12.6g} ", std::sqrt(mode.squared_frequency), x);
     if (mode.at_limit) return text + "AT a limit, to rounding: grows in proportion to the number of steps";
-    if (mode.rate > 0) return text + fmt::format("UNSTABLE: grows by {} a step", growth_text(mode.rate));
+    if (mode.rate > 0) return text + fmt::format("UNSTABLE: grows by {} per step", growth_text(mode.rate));
     text += "stable";
     if (member.limits.empty()) return text;
     std::size_t k = 0;
@@ -177,7 +177,7 @@ std::string trajectory_text(const StabilityReport& report) {
             : fmt::format("  an eigenvalue above 1, so that nearby trajectories diverge, in {} of {} steps examined\n",
                           motion.parting, motion.looked_at);
     if (motion.parting > 0)
-        text += fmt::format("  fastest at t = {:.6g}: {} a step; the motion itself {}\n", motion.time,
+        text += fmt::format("  fastest at t = {:.6g}: {} per step; the motion itself {}\n", motion.time,
                             growth_text(motion.rate), growth_text(motion.exact_rate));
     if (motion.excess > 1e-6)
         text += fmt::format("  the step exceeds the motion most at t = {:.6g}, by a factor {}\n", motion.excess_time,

@@ -425,6 +425,6 @@ TEST_CASE("what has no clock says so") {
         INFO(command);
         const test::Finished finished = test::run({LOBATTO_PROGRAM, command, folder / "scene.toml"});
         CHECK(finished.exit_code == 2);
-        CHECK(finished.err.find("lobatto " + command + " looks at steps that are equal in time") != std::string::npos);
+        CHECK(finished.err.find("lobatto " + command + " takes steps that are equal in time") != std::string::npos);
     }
 }

@@ -77,7 +77,7 @@ TEST_CASE("a linear scene in a gap of stability is called unstable, at the rate 
     CHECK(report_of({scene_path("harmonic_oscillator"), "--step", "4/omega"})["points"][0]["modes"][0]["stable"] ==
           true);
     const test::Finished text = stability({scene_path("harmonic_oscillator"), "--step", "3.1375/omega"});
-    CHECK(test::contains(text.out, "UNSTABLE: grows by 1.0253 a step"));
+    CHECK(test::contains(text.out, "UNSTABLE: grows by 1.0253 per step"));
 }
 
 TEST_CASE("several coordinates are judged by their eigenfrequencies, and the kernel agrees") {
@@ -271,4 +271,20 @@ TEST_CASE("mistakes on the command line are refused before anything is computed"
     CHECK(test::contains(refusal({oscillator, "--splitting", "11"}), "lobatto stability --splitting 11"));
     CHECK(refusal({"--splitting", "11", "--json"}) ==
           "--json is of Lobatto and Gauss, whose limits are exact; leave it out\n");
+}
+
+// V = x^2/2 + 2 y^2 - x y z: all of the z axis, of which z = 2 and z = -2 are where it becomes unstable.
+TEST_CASE("where equilibria form a line, that in which several meet is told once, and no coordinate is turned") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "line.toml",
+                     "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 - x^2/2 - 2*y^2 + x*y*z\"\n[coordinates]\n"
+                     "x = { position = 0.1, velocity = 0 }\ny = { position = 0.1, velocity = 0 }\n"
+                     "z = { position = 0.2, velocity = 0.1 }\n[run]\nstep = 0.3\nuntil = 20\n");
+    const test::Finished done = stability({folder / "line.toml"});
+    CHECK(done.exit_code == 0);
+    const std::string end = "About the equilibrium x = 0, y = 0, z = 2,";
+    CHECK(done.out.find(end) != std::string::npos);
+    CHECK(done.out.find(end) == done.out.rfind(end));
+    CHECK(!test::contains(done.out, "z = 3.14"));
+    CHECK(!test::contains(done.out, "z = -1.14"));
 }

@@ -142,7 +142,7 @@ Scene in_clock_time(const Scene& scene) {
 void refuse_clock(const Scene& scene, const std::string& what) {
     if (scene.clock)
         fail_at_clock(scene, what +
-                                 " looks at steps that are equal in time, and knows no clock; remove it, or use run, "
+                                 " takes steps that are equal in time, and knows no clock; remove it, or use run, "
                                  "sweep, emit, verify, tune or tradeoff");
 }
 

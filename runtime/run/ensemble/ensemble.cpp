@@ -20,6 +20,7 @@
 #include "runtime/run/ensemble/ended.hpp"
 #include "runtime/run/ensemble/refilled.hpp"
 #include "runtime/run/ensemble/side_by_side.hpp"
+#include "runtime/run/other_velocity.hpp"
 #include "runtime/run/parts.hpp"
 #include "runtime/run/timing.hpp"
 
@@ -117,13 +118,16 @@ private:
         return parts;
     }
     void turn_velocities_into_momenta() {
+        loses_velocity_ = false;
         if (single_.prepare(whole(start_.whole_parameters, start_.parameters), step_) != LOBATTO_OK) {
             std::fill(start_.rate.begin(), start_.rate.end(), no_number);
             start_.whole_rate.clear();
             return;
         }
-        const std::vector<double> p = single_.momentum(
-            as_parts({request_.time}, parts_), whole(start_.whole_q, start_.q), whole(start_.whole_rate, start_.rate));
+        const std::vector<double> time = as_parts({request_.time}, parts_), &q = whole(start_.whole_q, start_.q),
+                                  &velocity = whole(start_.whole_rate, start_.rate),
+                                  p = single_.momentum(time, q, velocity);
+        loses_velocity_ = !other_velocity(single_, time, q, velocity, p).empty();
         start_.rate = rounded(p, parts_);
         if (parts_ > 1) start_.whole_rate = p;
     }
@@ -136,12 +140,13 @@ private:
                 if (request_.from_velocities) turn_velocities_into_momenta();
             }
             place(lane);
+            if (lane < ended.size() && loses_velocity_) ended[lane].status = LOBATTO_SINGULAR_MASS;
         }
         lanes_->prepare(parameters_, step_, status_.data());
         lanes_->start(request_.time, q_, p_, status_.data());
         lanes_->energy(q_, p_, energy_);
         for (std::size_t lane = 0; lane < ended.size(); ++lane) {
-            ended[lane].status = static_cast<lobatto_status>(status_[lane]);
+            if (ended[lane].status == LOBATTO_OK) ended[lane].status = static_cast<lobatto_status>(status_[lane]);
             if (ended[lane].status != LOBATTO_OK) energy_[lane * parts_] = no_number;
             keep(lane, ended[lane]);
         }
@@ -236,6 +241,7 @@ private:
     std::unique_ptr<Trajectories> lanes_;
     EnsembleStart start_;
     std::vector<double> parameters_, q_, p_, energy_;
+    bool loses_velocity_ = false;  // of the start: other_velocity
     std::vector<std::int32_t> status_;
     std::vector<std::int64_t> steps_done_, iterations_;
     std::vector<bool> reduces_;  // where a trajectory has begun

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/run/other_velocity.hpp"
 #include "runtime/run/timing.hpp"
 
 namespace lobatto {
@@ -76,10 +77,13 @@ bool RefilledLanes::fill(std::size_t lane, std::int64_t number, Ended& ended) {
     lobatto_status status = to.stepper.prepare(start_.parameters, request_.step);
     std::vector<double> p = start_.rate;
     if (request_.from_velocities) {
-        if (status == LOBATTO_OK)
+        if (status == LOBATTO_OK) {
             p = to.stepper.momentum(request_.time, start_.q, start_.rate);
-        else
+            if (!other_velocity(to.stepper, request_.time, start_.q, start_.rate, p).empty())
+                status = LOBATTO_SINGULAR_MASS;
+        } else {
             p.assign(n_, no_number);
+        }
     }
     if (status == LOBATTO_OK)
         status = static_cast<lobatto_status>(kernel_->refilled_fill(memory_.get(), static_cast<std::int32_t>(lane),

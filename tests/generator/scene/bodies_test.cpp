@@ -82,7 +82,7 @@ TEST_CASE("a body brings coordinates, their start and its kinetic energy") {
     CHECK(number(scene.initial_rate[6], {}) == 2);      // q' = q w / 2
     start[scene.parameters[0].symbol] = 3;
     CHECK(number(scene.lagrangian, start) == 2 * 25 / 2. + 2.5 * 16 / 2 - 3 * 3);
-    CHECK(scene.lagrangian_text == "T(top) + -g*top.z(0, 0, 2)");
+    CHECK(scene.lagrangian_text == "T(top) - g*top.z(0, 0, 2)");
 }
 
 TEST_CASE("a lever that vanishes whatever the parameters is left out, one that only the scene makes 0 is not") {
