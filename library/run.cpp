@@ -45,7 +45,7 @@ void finish(Trajectory& trajectory, const OpenedRun& run, const TrajectoryResult
     trajectory.reaches_end = run.prepared().steps.reaches_end;
     trajectory.warnings = verdict.warnings;
     if (!verdict.error) return;
-    trajectory.error = verdict.error->at_end;
+    if (verdict.error->is_known_at_end()) trajectory.error = verdict.error->at_end;
     trajectory.largest_error = verdict.error->worst();
     trajectory.doubling = verdict.error->doubling;
 }

@@ -46,11 +46,19 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) 
     std::vector<std::string> texts;
     if (error.worst() > large_error)
         texts.push_back(
-            fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points", error.worst()));
+            error.worst() > 1
+                ? "the error is as large as the motion at the end, if it grows on; take a smaller step, or more points"
+                : fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points",
+                              error.worst()));
     else if (wanted > 0 && error.at_end > missed * wanted)
         texts.push_back(
             fmt::format("the scene asks for an error of {:.2g}, and it is {:.2g}; `lobatto tune` chooses a step",
                         wanted, error.at_end));
+    if (!error.is_known_at_end())
+        texts.push_back(fmt::format(
+            "the error was measured to t = {:.4g} alone, because the companion took longer than the run; of the rest "
+            "nothing is known. An earlier end is measured, or the same run with a larger step",
+            error.until));
     return texts;
 }
 

@@ -108,7 +108,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     for (double& value : scale)
         if (!(value > 0)) value = 1;
     const auto look_at = [&](double time, const std::vector<double>& q, const std::vector<double>& p) {
-        const double radians = std::fabs(request.step) * largest_frequency(stepper, time, q, p, scale);
+        const double radians = std::fabs(request.step) * largest_frequency_near(stepper, time, q, p, scale);
         if (radians > judgement.radians) judgement.radians = radians;
     };
     int looks = 0;

@@ -63,6 +63,9 @@ public:
             for (std::size_t i = 0; i < there.size(); ++i)
                 rounding[group(i)] = cln::max(rounding[group(i)], cln::abs(there[i] - left[i]));
         }
+        const Numbers in_forces = rounding_in_forces();
+        for (std::size_t i = 0; i < motion && i < left.size(); ++i)
+            rounding[group(i)] = cln::max(rounding[group(i)], in_forces[i % n_]);
         cln::cl_R worst = 0;
         for (std::size_t i = 0; i < left.size(); ++i)
             if (!cln::zerop(left[i]) && !cln::zerop(rounding[group(i)]))
@@ -71,6 +74,20 @@ public:
     }
 
 private:
+    // What rounding inside the formulas of the forces leaves in the equations of each coordinate: their terms may be
+    // far larger than the force, as near an equilibrium.
+    Numbers rounding_in_forces() {
+        Numbers largest(n_, cln::cl_R(0));
+        if (is_straight_) return largest;
+        for (std::size_t i = 0; i < nodes_.size(); ++i) {
+            set_node(i, path_, system_.q, system_.v);
+            const std::vector<Sized> forces = formulas_.evaluate_sized(force_);
+            for (std::size_t k = 0; k < n_; ++k)
+                largest[k] = cln::max(largest[k], cln::abs(h_) * weights_[i] * forces[k].size * step_.epsilon);
+        }
+        return largest;
+    }
+
     // Constraints pull on all coordinates at once, so that each is rounded beside the others, in the metric of the
     // mass: M_kk x_k^2 beside the sum of M_jj d_j^2, p_k^2 / M_kk beside the sum of p_j^2 / M_jj; d: how far it goes in
     // a step.

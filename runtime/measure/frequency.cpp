@@ -10,6 +10,7 @@ namespace {
 
 constexpr int iterations = 40;
 constexpr double part = 1e-5;  // of the scale: a difference
+constexpr double near = 1e-6;  // of the scale, and of the place, whose rounding is less
 
 template <class real>
 struct Equations {
@@ -78,6 +79,14 @@ double largest_frequency(const LoadedStepper<real>& stepper, real time, const st
         x = AAx;
     }
     return growth;
+}
+
+double largest_frequency_near(const LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
+                              const std::vector<double>& p, const std::vector<double>& scale) {
+    std::vector<double> closer;
+    for (std::size_t i = 0; i < scale.size(); ++i)
+        closer.push_back(near * std::fmax(scale[i], std::fabs(i < q.size() ? q[i] : p[i - q.size()])));
+    return std::fmin(largest_frequency(stepper, time, q, p, scale), largest_frequency(stepper, time, q, p, closer));
 }
 
 template double largest_frequency(const LoadedStepper<double>&, double, const std::vector<double>&,

@@ -18,4 +18,9 @@ template <class real>
 double largest_frequency(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
                          const std::vector<real>& p, const std::vector<double>& scale);
 
+// The same, looked at more closely, too: of what moves far together, as the parts of a thing in flight, differences
+// that are small beside the way are large beside the thing.
+double largest_frequency_near(const LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
+                              const std::vector<double>& p, const std::vector<double>& scale);
+
 }  // namespace lobatto

@@ -109,7 +109,12 @@ double area_defect(const Kernel& kernel, const QuadrupleStart& start, Quadruple 
     PointOnManifold z{start.q, start.p};
     Quadruple worst = 0;
     for (int state = 0; state < states; ++state) {
-        const Quadruple of_q = std::max(largest_of(z.q), Quadruple(1e-9)), of_p = std::max(largest_of(z.p), of_q);
+        // Small beside what the step moves, not beside the place, which may be far from 0; above the place's rounding.
+        const PointOnManifold next = manifold.flow(z, 1);
+        Quadruple moved = 0;
+        for (std::size_t k = 0; k < z.q.size(); ++k) moved = std::max(moved, magnitude(next.q[k] - z.q[k]));
+        const Quadruple place = std::max(largest_of(z.q), Quadruple(1e-9)),
+                        of_q = std::max(moved, Quadruple(1e-6) * place), of_p = std::max(largest_of(z.p), of_q);
         for (int pair = 0; pair < pairs; ++pair) {
             PointOnManifold direction[2], image[2];
             for (int side = 0; side < 2; ++side) {

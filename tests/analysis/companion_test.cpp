@@ -449,3 +449,74 @@ TEST_CASE("a run that is not measured says nothing of its error") {
     CHECK(place.run({"--unmeasured"}).out.find("measured error") == std::string::npos);
     CHECK(place.run().out.find("measured error") != std::string::npos);
 }
+
+TEST_CASE("a small motion far from 0 is measured by its own amplitude, in numbers of every kind") {
+    // 2,000 roundings of the place: the error of the step is a third of the amplitude, or all of it.
+    const Place place(
+        "lagrangian = \"x'^2/2 - (x - 4000)^2/2\"\n[coordinates]\n"
+        "x = { position = \"4000 + 1e-9\", velocity = 0 }\n[method]\npoints = 2\n"
+        "[run]\nstep = 0.3\nuntil = 90\n");
+    for (const std::vector<std::string>& options :
+         {std::vector<std::string>{}, {"--numbers", "quadruple"}, {"--companion", "double-double"}}) {
+        const test::Finished done = place.run(options);
+        INFO(done.out << done.err);
+        CHECK(absolute_error(done.out) == doctest::Approx(3.4e-10).epsilon(0.1));
+        CHECK(test::contains(done.err, "warning: the error is 0.3"));
+    }
+    CHECK(place.run({"--step", "0.9"}).exit_code == 3);
+}
+
+TEST_CASE("a coordinate in a far larger unit is lost where it is lost in any other") {
+    // y in units of 1/U: h omega = 2 is far too long a step for it, from the beginning.
+    const Place place(
+        "lagrangian = \"x'^2/2 - x^2/2 - x^4/4 + U^2*(y'^2/2 - 200*y^2) - U^4*y^4/4\"\n[coordinates]\n"
+        "x = { position = 1, velocity = 0 }\ny = { position = \"1/U\", velocity = 0 }\n"
+        "[parameters]\nU = 1\n[method]\npoints = 3\n[run]\nstep = 0.1\nuntil = 100\n");
+    for (const char* unit : {"U=1", "U=1e11", "U=1e-11"}) {
+        const test::Finished done = place.run({"--set", unit});
+        INFO(done.out << done.err);
+        CHECK(done.exit_code == 3);
+        CHECK(test::contains(done.out, "as large as the motion itself from t = "));
+    }
+}
+
+TEST_CASE("a barrier in the way of the last of many coordinates is met") {
+    const Place place(
+        "lagrangian = \"sum(i = 1 .. 17, x[i]'^2/2) - sum(i = 1 .. 15, (x[i+1] - x[i])^4/4 + x[i]^2/2) - "
+        "5*exp(-((x[17] - 3.00133)/1e-4)^2) - 0.001*x[17]^2*x[1]^2\"\n[coordinates]\n"
+        "x = { count = 17, position = \"0.3*sin(i)\", velocity = \"i/17\" }\n"
+        "[method]\npoints = 4\n[run]\nstep = 0.05\nuntil = 8\n");
+    const test::Finished done = place.run();
+    INFO(done.out << done.err);
+    CHECK(done.exit_code == 3);  // it is thrown back, and the run goes through
+    CHECK(test::contains(done.out, "as large as the motion itself from t = 3."));
+}
+
+TEST_SUITE("slow") {
+    TEST_CASE("a long run of which the start and the end alone are kept is measured at its end") {
+        const Place place(
+            "lagrangian = \"(a'^2 + b'^2 + c'^2)/2 - (a - b)^4/4 - (b - c)^4/4 - a^2 - c^4\"\n"
+            "[coordinates]\na = { position = 1, velocity = 0 }\nb = { position = 0.3, velocity = 0 }\n"
+            "c = { position = -0.4, velocity = 0.3 }\n[method]\npoints = 3\n"
+            "[run]\nstep = 0.001\nuntil = 20000\n[output]\nevery = 10000000000\n");
+        const test::Finished done = place.run();
+        INFO(done.out << done.err);
+        CHECK(done.exit_code == 3);
+        CHECK(test::contains(done.out, "as large as the motion itself from t = 2e+04 on"));
+    }
+
+    TEST_CASE("where little of a run was compared, nothing is said of its end") {
+        // A pulse makes the companion slow, and the motion is chaotic: its error doubles every 9 units of time.
+        const Place place(
+            "lagrangian = \"(a'^2 + b'^2 + c'^2)/2 - (a - b)^4/4 - (b - c)^4/4 - a^2 - c^4 + "
+            "0.001*b*exp(-((t - 9000)/1e-5)^2)\"\ntime = \"t\"\n[coordinates]\n"
+            "a = { position = 1, velocity = 0 }\nb = { position = 0.3, velocity = 0 }\n"
+            "c = { position = -0.4, velocity = 0.3 }\n[method]\npoints = 4\n"
+            "[run]\nstep = 0.001\nuntil = 10000\n[output]\nevery = 1000\n");
+        const test::Finished done = place.run();
+        INFO(done.out << done.err);
+        const bool is_lost = done.exit_code == 3 && test::contains(done.out, "as large as the motion itself");
+        CHECK((is_lost || test::contains(done.err, "of the rest nothing is known")));
+        CHECK_FALSE(test::contains(done.out, "perhaps"));
+    }
+}

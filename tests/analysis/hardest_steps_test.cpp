@@ -141,3 +141,16 @@ TEST_CASE("a chain that begins at rest raises no alarm: the straight way through
         "[coordinates]\na = { count = 5, position = 1, velocity = 0 }\n[run]\nstep = 0.01\nuntil = 1\n";
     CHECK_FALSE(said_of(chain, {}).warns);
 }
+
+TEST_CASE("how fast a thing flies does not make its oscillation faster") {
+    for (const char* velocity : {"0", "1e6"}) {
+        const Said said =
+            said_of(fmt::format("lagrangian = \"(x'^2 + y'^2)/2 - 5*(y - x - 1)^2 - (y - x - 1)^4\"\n[coordinates]\n"
+                                "x = {{ position = 0, velocity = {0} }}\ny = {{ position = 1.3, velocity = {0} }}\n"
+                                "[method]\npoints = 6\n[run]\nstep = 0.2\nuntil = 20\n",
+                                velocity),
+                    {});
+        CAPTURE(velocity);
+        CHECK_FALSE(said.warns);
+    }
+}

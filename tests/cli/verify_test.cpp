@@ -80,6 +80,25 @@ TEST_CASE("coordinates that a constraint holds at 0 are not accused") {
     CHECK(result.exit_code == 0);
 }
 
+TEST_CASE("where a mechanism stands accuses nothing, nor how large the terms of its forces are") {
+    const TemporaryFolder folder;
+    write_text(
+        folder / "far.toml",
+        "lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\nx = { position = \"1e6 + 0.6\", velocity = 0 }\n"
+        "y = { position = -0.8, velocity = 0 }\n[constraints]\nc = \"(x - 1e6)^2 + y^2 = 1\"\n"
+        "[run]\nstep = 0.01\nuntil = 1\nassemble = true\n");
+    // A circular orbit, and what moves about it: two terms of a force that is far smaller than they are.
+    write_text(folder / "near.toml",
+               "lagrangian = \"x'^2/2 + GM/(R + x) - GM*R/(2*(R + x)^2)\"\n[parameters]\nR = 1.5e11\nGM = 1.33e20\n"
+               "[coordinates]\nx = { position = 1e6, velocity = 0 }\n[method]\npoints = 6\n"
+               "[run]\nstep = 1e5\nuntil = 1e7\n");
+    for (const char* scene : {"far.toml", "near.toml"}) {
+        const Finished result = verify({folder / scene});
+        INFO(result.out << result.err);
+        CHECK(result.exit_code == 0);
+    }
+}
+
 TEST_CASE("right kernels are not accused where coordinates that constraints join begin at 0" *
           doctest::test_suite("slowest")) {
     const TemporaryFolder folder;

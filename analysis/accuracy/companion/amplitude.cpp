@@ -10,7 +10,8 @@ namespace lobatto {
 
 namespace {
 
-constexpr double at_rest = 0x1p-40;  // of the place: what rounding moves it by
+constexpr double few_roundings =
+    128;  // of the place, by which what rests moves: those of the forces there add to its own
 // Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
 // squares it each time; a motion that small beside others is none.
 constexpr double held_at_zero = 0x1p-100;
@@ -40,7 +41,7 @@ void widen_to(std::vector<double>& least, std::vector<double>& most, const doubl
     }
 }
 
-std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most) {
+std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most, double rounding) {
     const std::size_t n = least.size() / 2;
     const auto place = [&](std::size_t i) { return std::fmax(std::fabs(least[i]), std::fabs(most[i])); };
     double farthest[2] = {0, 0};  // of positions, of momenta
@@ -48,7 +49,7 @@ std::vector<bool> moving(const std::vector<double>& least, const std::vector<dou
     std::vector<bool> moves(2 * n);
     for (std::size_t i = 0; i < 2 * n; ++i) {
         const double half = (most[i] - least[i]) / 2;
-        moves[i] = half > at_rest * place(i) && half > held_at_zero * farthest[i / n];
+        moves[i] = half > rounding * place(i) && half > held_at_zero * farthest[i / n];
     }
     return moves;
 }
@@ -64,8 +65,12 @@ std::vector<double> noise_levels(const std::vector<double>& sizes) {
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
     const std::vector<double> levels = noise_levels(amplitudes);
+    const std::size_t n = amplitudes.size() / 2;
+    std::vector<double> actions;
+    for (std::size_t k = 0; k < n; ++k) actions.push_back(amplitudes[k] * amplitudes[n + k]);
+    const double least_action = noise * *std::max_element(actions.begin(), actions.end());
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
-        if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i])) continue;
+        if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i] && actions[i % n] <= least_action)) continue;
         int agree = 0, disagree = 0;
         for (std::size_t j = 0; j < std::min(comparisons, first_compared); ++j) {
             const auto [run, companion] = pair(j, i);
@@ -77,11 +82,12 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
 }
 
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
-                        double steps, double epsilon,
+                        double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
     const std::size_t n = amplitudes.size() / 2;
     for (std::size_t i = 0; i < 2 * n; ++i) {
         if (!(amplitudes[i] > 0 && amplitudes[i] < epsilon * steps * place[i])) continue;
+        if (first.amplitudes[i] > epsilon * (first.steps + few_roundings) * place[i]) continue;
         for (std::size_t j = 0; j < comparisons && amplitudes[i] > 0; ++j) {
             const auto [run, companion] = pair(j, i);
             if (std::fabs(run - companion) > out_of_step * amplitudes[i]) amplitudes[i] = 0;
@@ -96,12 +102,19 @@ std::vector<double> sizes_of(const std::vector<double>& least, const std::vector
     return sizes;
 }
 
+std::vector<double> half_of(const std::vector<double>& least, const std::vector<double>& most) {
+    std::vector<double> half;
+    for (std::size_t i = 0; i < least.size(); ++i) half.push_back((most[i] - least[i]) / 2);
+    return half;
+}
+
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
-                                  const std::vector<int>& groups) {
+                                  const std::vector<int>& groups, double epsilon) {
     const std::size_t n = groups.size();
     std::vector<double> own(2 * n), shared(2 * n, 0.0);
-    const std::vector<bool> moves = moving(least, most);
-    for (std::size_t i = 0; i < 2 * n; ++i) own[i] = moves[i] ? (most[i] - least[i]) / 2 : 0;
+    const std::vector<bool> moves = moving(least, most, few_roundings * epsilon);
+    const std::vector<double> half = half_of(least, most);
+    for (std::size_t i = 0; i < 2 * n; ++i) own[i] = moves[i] ? half[i] : 0;
     for (std::size_t k = 0; k < n; ++k)
         if (own[k] == 0) own[n + k] = 0;  // what rests has the momentum that rounding gives it
     std::map<std::pair<bool, int>, double> largest;

@@ -27,29 +27,40 @@ std::vector<int> amplitude_groups(const Scene& scene);
 // Takes a row of `count` numbers into a range.
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
 
-// Of q then p: which move by more than rounding does.
-std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most);
+// Of q then p: which move by more than rounding does, which is this part of their place.
+std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most, double rounding = 0x1p-40);
 
 // For each number `noise` times the largest size of its kind, positions or momenta. A number that moves by less may be
 // moved by rounding alone: forces may cancel, and constraints may hold a momentum at 0.
 std::vector<double> noise_levels(const std::vector<double>& sizes);
 
 // An amplitude below its noise level becomes 0 if the run and its companion do not agree on this number in most of the
-// first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion.
+// first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion. Coordinates of another
+// unit may be small as well, but their action, amplitude of q times that of p, is not.
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
+// How far each number moved until the first comparison, half its range, and in how many steps.
+struct FirstMoves {
+    std::vector<double> amplitudes;
+    double steps;
+};
+
 // An amplitude becomes 0 if the run and its companion differ by more than half of it, and it is no larger than one
-// rounding of the place a step: what rests moves by that. `place`: the largest size of each number.
+// rounding of the place a step, from the beginning: what rests moves by that. `place`: the largest size of each number.
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
-                        double steps, double epsilon,
+                        double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
 // The largest size of numbers in a range.
 std::vector<double> sizes_of(const std::vector<double>& least, const std::vector<double>& most);
 
-// Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding.
+// Half of each range.
+std::vector<double> half_of(const std::vector<double>& least, const std::vector<double>& most);
+
+// Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding, which is
+// some epsilon of the place.
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
-                                  const std::vector<int>& groups);
+                                  const std::vector<int>& groups, double epsilon);
 
 }  // namespace lobatto

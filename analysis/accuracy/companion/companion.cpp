@@ -23,7 +23,8 @@ constexpr double graded = 8;            // steps are at most this part of the di
 constexpr double finest = 0x1p-30;      // steps are never shorter than this part of those of the run
 constexpr double same_time = 0x1p-48;   // relative: times that differ by no more differ by rounding
 constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
-constexpr std::int64_t most_looked = 500000;  // steps of the companion, for what is narrow in them
+// Terms that are looked at along steps of the companion, for what is narrow in them; a step counts as some, at least.
+constexpr std::int64_t most_looked = 4000000, looked_a_step = 8;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -216,7 +217,7 @@ void Companion::take_one(Place& place, double from, const std::vector<double>& s
     place.set_step(step, request_.whole_parameters);
     place.advance(1, request_.tolerance);
     if (narrow_.empty() || place.status != LOBATTO_OK || looked_ >= most_looked) return;
-    ++looked_;
+    looked_ += std::max(looked_a_step, static_cast<std::int64_t>(narrow_.count()));
     NarrowTerms::State begin{from, rounded(before.q, parts_), {}},
         end{from + step.front(), rounded(place.q, parts_), {}};
     if (place.stepper.velocity(before.time, before.q, before.p, begin.v) != LOBATTO_OK ||
@@ -362,6 +363,11 @@ bool Companion::has_caught_up() const {
     return companion_.size() >= run_.size();
 }
 
+bool Companion::has_compared() const {
+    const std::lock_guard lock(mutex_);
+    return !companion_.empty();
+}
+
 std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
     if (has_end) {
@@ -370,13 +376,15 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
         const auto now = std::chrono::steady_clock::now();
         const double longest = is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                : begins_now                            ? result.seconds / 2
-                                                                       : 0;
-        while (!finished_ && !has_caught_up() && seconds_since(now) < longest)
+                                                                       : 0,
+                     to_first = begins_now ? 2 * result.seconds : result.seconds;  // where few states are kept
+        while (!finished_ && !has_caught_up() &&
+               seconds_since(now) < (has_compared() ? longest : std::fmax(longest, to_first)))
             std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();
-    if (!has_end || run_.empty()) return std::nullopt;
+    if (!has_end || run_.empty() || (companion_.empty() && !stopped_)) return std::nullopt;
     return compare(result);
 }
 

@@ -91,6 +91,7 @@ private:
     void take_finely(Place& place, double from, const std::vector<double>& step);
     void take_one(Place& place, double from, const std::vector<double>& step);
     bool has_caught_up() const;
+    bool has_compared() const;
     bool can_halve(double from, double step) const;
     bool is_near_pulse(double from, double step) const;
     std::optional<double> knot_within(double from, double step) const;
@@ -109,7 +110,7 @@ private:
     std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
     NarrowTerms narrow_;         // likewise, where the motion meets them
     std::vector<double> knots_;  // of measured values in time, at which its steps end
-    std::int64_t looked_ = 0;    // steps of the companion at which that was looked at
+    std::int64_t looked_ = 0;    // at terms, along steps of the companion
     bool is_driven_ = false;     // explicit time
     std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;

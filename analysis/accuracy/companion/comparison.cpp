@@ -22,6 +22,7 @@ constexpr std::size_t windows = 8;  // in time, between the first error and the 
 // not count.
 constexpr double exponential = 14, certain = 25;
 constexpr double largest_jump = 0.45;  // of all doublings, from one window to the next
+constexpr double most_beyond = 8;      // times what was compared: exponential growth might not be seen in it yet
 
 using ErrorCourse = std::vector<std::pair<double, double>>;  // time, how far the motions are apart
 
@@ -69,7 +70,7 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     for (std::size_t j = 0; j < comparisons; ++j)
         for (const std::vector<double>& row : {companion_ranges_[j].least, companion_ranges_[j].most})
             if (!row.empty()) widen_to(all.least, all.most, row.data(), row.size());
-    std::vector<double> shared = amplitudes_of(all.least, all.most, groups_);
+    std::vector<double> shared = amplitudes_of(all.least, all.most, groups_, run_epsilon_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
     NumberStepper stepper(kernel_);
     std::vector<double> T;
@@ -87,8 +88,11 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
         return std::pair(run_[j].row[i * parts_], companion_[j].row[i * parts_]);
     };
     leave_out_noise(shared, comparisons, pair);
+    if (comparisons == 0) return shared;
+    const Range& until_first = companion_ranges_.front();
     leave_out_rounding(shared, comparisons, sizes_of(all.least, all.most), static_cast<double>(request_.steps),
-                       run_epsilon_, pair);
+                       run_epsilon_,
+                       {half_of(until_first.least, until_first.most), static_cast<double>(segment(0).steps)}, pair);
     return shared;
 }
 
@@ -155,7 +159,10 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     error.at_end = error.end;
     if (!error.complete && !course.empty()) {
         const double whole = std::fabs(result.time - request_.time), part = course.back().first;
-        error.at_end *= error.doubling ? std::exp2((whole - part) / *error.doubling) : whole * whole / (part * part);
+        if (error.doubling)
+            error.at_end *= std::exp2((whole - part) / *error.doubling);
+        else
+            error.at_end = whole > most_beyond * part ? std::nan("") : error.at_end * whole * whole / (part * part);
     }
     return error;
 }

@@ -231,15 +231,20 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const auto companion_at = [&](std::int64_t j) {
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
     };
-    std::vector<double> amplitude = amplitudes_of(least, most, groups_);
+    std::vector<double> amplitude = amplitudes_of(least, most, groups_, kernel_->epsilon);
     const auto pair = [&](std::size_t j, std::size_t i) {
         const auto at = static_cast<std::int64_t>(j);
         return std::pair(run_at(at)[i * parts_], companion_at(at)[i * parts_]);
     };
     leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), pair);
-    leave_out_rounding(amplitude, static_cast<std::size_t>(comparisons), sizes_of(least, most),
-                       static_cast<double>(request_.steps), kernel_->epsilon, pair);
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
+    if (comparisons > 0) {
+        const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
+        leave_out_rounding(
+            amplitude, static_cast<std::size_t>(comparisons), sizes_of(least, most),
+            static_cast<double>(request_.steps), kernel_->epsilon,
+            {half_of({first, middle}, {middle, middle + std::ssize(amplitude)}), static_cast<double>(every)}, pair);
+    }
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
                              : static_cast<double>(steps_taken(every)) / static_cast<double>(every),

@@ -20,8 +20,9 @@ std::string text_of(const MeasuredError& error, const Scene& scene) {
     if (error.end > 0)
         text +=
             fmt::format(" ({:.1e}{} in {})", error.absolute, worst.unit.empty() ? "" : " " + worst.unit, worst.written);
-    if (!error.complete)
-        text += fmt::format(", not measured beyond; perhaps {:.0e} at the end", std::fmin(error.at_end, 1));
+    if (!error.complete) text += ", not measured beyond";
+    if (!error.complete && error.is_known_at_end())
+        text += fmt::format("; perhaps {:.0e} at the end", std::fmin(error.at_end, 1));
     return text + chaos;
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 using GiNaC::ex;
 
-constexpr std::size_t coordinate_limit = 16, most_terms = 32;
+constexpr std::size_t most_terms = 128;
 constexpr int most_parts = 20000;  // of a formula that are looked at
 constexpr int places = 8;          // at the way
 constexpr int sections = 40;       // shorter ones
@@ -31,19 +31,18 @@ constexpr double sharp = 0.02;         // of what the table covers
 }  // namespace
 
 NarrowTerms::NarrowTerms(const SystemOutline& system) {
-    if (system.q.size() > coordinate_limit) return;
-    std::vector<GiNaC::symbol> moving{system.t};
-    for (const auto* list : {&system.q, &system.v}) moving.insert(moving.end(), list->begin(), list->end());
-    const auto moves = [&](const ex& part) {
-        return std::any_of(moving.begin(), moving.end(), [&](const auto& symbol) { return part.has(symbol); });
-    };
-    std::vector<GiNaC::symbol> variables = moving;
+    std::vector<GiNaC::symbol> variables{system.t};
+    for (const auto* list : {&system.q, &system.v}) variables.insert(variables.end(), list->begin(), list->end());
     variables.insert(variables.end(), system.parameters.begin(), system.parameters.end());
     const Tape::Variables numbered(variables);
     GiNaC::exset known;
     const auto add = [&](Kind kind, const ex& u) {
-        if (terms_.size() == most_terms || !moves(u) || !known.insert(u).second) return;
-        if (const auto tape = Tape::of(u, numbered)) terms_.push_back({kind, *tape});
+        if (terms_.size() == most_terms || !known.insert(u).second) return;
+        std::vector<std::size_t> coordinates;
+        for (std::size_t k = 0; k < system.q.size(); ++k)
+            if (u.has(system.q[k]) || u.has(system.v[k])) coordinates.push_back(k);
+        if (coordinates.empty() && !u.has(system.t)) return;
+        if (const auto tape = Tape::of(u, numbered)) terms_.push_back({kind, *tape, coordinates});
     };
     static const std::map<std::string, Kind> kinds{{"exp", Kind::peak},  {"tanh", Kind::step}, {"sinh", Kind::step},
                                                    {"cosh", Kind::step}, {"atan", Kind::tail}, {"log", Kind::pole}};
@@ -125,7 +124,7 @@ std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to)
         const auto u = [&](double s) {
             variables[0] = from.time + s * duration;
             const double r = 1 - s;
-            for (std::size_t k = 0; k < n; ++k) {
+            for (const std::size_t k : term.coordinates) {
                 const double a = duration * from.v[k], b = duration * to.v[k], way = to.q[k] - from.q[k];
                 variables[1 + k] = from.q[k] + s * s * (3 - 2 * s) * way + s * r * (r * a - s * b);
                 variables[1 + n + k] = (6 * s * r * way + r * (1 - 3 * s) * a + s * (3 * s - 2) * b) / duration;
@@ -140,7 +139,6 @@ std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to)
 }
 
 bool NarrowTerms::may_be_met(const State& at, double step, double reach) const {
-    const std::size_t n = at.q.size();
     std::vector<double> variables{at.time};
     variables.insert(variables.end(), at.q.begin(), at.q.end());
     variables.insert(variables.end(), at.v.begin(), at.v.end());
@@ -148,7 +146,7 @@ bool NarrowTerms::may_be_met(const State& at, double step, double reach) const {
     return std::any_of(terms_.begin(), terms_.end(), [&](const Term& term) {
         const auto u = [&](double steps) {
             variables[0] = at.time + steps * step;
-            for (std::size_t k = 0; k < n; ++k) variables[1 + k] = at.q[k] + steps * step * at.v[k];
+            for (const std::size_t k : term.coordinates) variables[1 + k] = at.q[k] + steps * step * at.v[k];
             return term.tape(variables);
         };
         const double before = u(-1), here = u(0), after = u(1);

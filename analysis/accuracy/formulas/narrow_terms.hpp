@@ -18,6 +18,7 @@ public:
     explicit NarrowTerms(const SystemOutline& system);
 
     bool empty() const { return terms_.empty(); }
+    std::size_t count() const { return terms_.size(); }
     void set_parameters(const std::vector<double>& parameters) { parameters_ = parameters; }
 
     struct State {
@@ -35,6 +36,7 @@ private:
     struct Term {
         Kind kind;
         Tape tape;
+        std::vector<std::size_t> coordinates;  // that it holds, or their velocities
     };
     struct Found {
         double place, width;  // of the way

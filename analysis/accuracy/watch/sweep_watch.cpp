@@ -71,8 +71,8 @@ void SweepWatch::observe(const EnsembleTrajectory& trajectory) {
         const double size = std::max(std::fabs(i < n ? start_.q[i] : p_[i - n]), std::fabs(row[1 + i]));
         scale.push_back(size > 0 && std::isfinite(size) ? size : 1);
     }
-    for (const double omega : {largest_frequency(stepper_, request_.time, start_.q, p_, scale),
-                               largest_frequency(stepper_, row[0], q, p, scale)})
+    for (const double omega : {largest_frequency_near(stepper_, request_.time, start_.q, p_, scale),
+                               largest_frequency_near(stepper_, row[0], q, p, scale)})
         if (const double radians = std::fabs(request_.step) * omega; radians > radians_) {
             radians_ = radians;
             trajectory_ = trajectory.index;

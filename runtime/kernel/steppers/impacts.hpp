@@ -394,10 +394,12 @@ public:
         stepper.parameters = parameters;
         return stepper.prepare(parameters, h);
     }
-    // Status::off_constraints behind a wall.
+    // Status::off_constraints behind a wall; Status::unsupported where walls or switches are and h < 0.
     Status start(real time, const real* q, const real* p) {
         delete looks;
         looks = nullptr;
+        if constexpr (WatchedStepper<K>::walls > 0)
+            if (stepper.step_size < real(0)) return started = Status::unsupported;
         if constexpr (WatchedStepper<K>::walls > 0)
             started = Sides<K>::start(stepper, time, q, p);
         else

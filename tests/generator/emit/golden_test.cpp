@@ -116,6 +116,10 @@ TEST_CASE("an emitted kernel with walls, switches and events takes the steps of 
                                      "    double momentum;\n"
                                      "    stepper.momentum(&momentum);\n"
                                      "    std::printf(\"%.17g %.17g %ld\\n\", stepper.q()[0], momentum, met);\n"
+                                     // Backwards it would fall through walls.
+                                     "    if (stepper.prepare({{}}, -0.01) != lobatto::Status::ok) return 5;\n"
+                                     "    if (stepper.start(0, q, p) != lobatto::Status::unsupported) return 6;\n"
+                                     "    if (stepper.step() != lobatto::Status::unsupported) return 7;\n"
                                      "}}\n",
                                      tried.scene, tried.scene, tried.start, tried.h, tried.steps));
         const test::Finished compiled =
