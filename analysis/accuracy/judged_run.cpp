@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "analysis/accuracy/formulas/jumps.hpp"
 #include "analysis/accuracy/formulas/stopped_at_formula.hpp"
@@ -132,6 +133,17 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
             finer, steps,           derivation_time.count()};
 }
 
+namespace {
+
+// What a companion in the run's own numbers says, or a finer one, which sees all rounding; 0: nothing.
+double known_error(const PreparedRun& run, const std::optional<MeasuredError>& error) {
+    if (run.finer || run.scene.method.numbers != Precision::double_ || !run.scene.constraints.empty())
+        return std::numeric_limits<double>::infinity();
+    return error && error->is_known_at_end() ? error->worst() : 0;
+}
+
+}  // namespace
+
 RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                       RunObservers& observers, bool accepts_lost) {
     const Scene& scene = run.scene;
@@ -149,7 +161,8 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
             verdict.warnings.push_back(warning);
     if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
         for (const std::string& warning :
-             StepJudge::warnings(observers.judge.judge(run.outline, run.plain, request, result)))
+             StepJudge::warnings(observers.judge.judge(run.outline, run.plain, request, result),
+                                 known_error(run, verdict.error)))
             verdict.warnings.push_back(warning);
     for (const std::string& jump : jumps_of(scene, request.parameters)) verdict.warnings.push_back(jump);
     verdict.failure = failure_of(run, request, result, observers, departure);

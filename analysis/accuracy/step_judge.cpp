@@ -9,6 +9,7 @@
 #include <map>
 
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/force_rounding.hpp"
 #include "analysis/stability/limit.hpp"
 #include "runtime/measure/frequency.hpp"
 
@@ -19,6 +20,9 @@ namespace {
 constexpr std::size_t most_judged_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
+constexpr std::size_t force_looks = 6;       // at states
+// Rounding of forces beside their change that is worth a warning, and beside the measured error.
+constexpr double loud_rounding = 1e-6, seen_by_companions = 10;
 
 // Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
 std::uint64_t scrambled(std::int64_t number) {
@@ -141,11 +145,25 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,
                                                               request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};
+    std::vector<std::vector<double>> rows;
+    for (const auto& [place, state] : some_)
+        if (rows.size() < force_looks) rows.push_back(state.row);
+    std::vector<bool> swings(n);  // by more than the roundings of all steps
+    for (std::size_t k = 0; k < n; ++k)
+        swings[k] = moves[k] && most_[k] - least_[k] > kernel->epsilon * static_cast<double>(result.steps_done) *
+                                                           std::fmax(std::fabs(most_[k]), std::fabs(least_[k]));
+    judgement.rounding = force_rounding(outline, stepper, request.parameters, rows, swings);
     return judgement;
 }
 
-std::vector<std::string> StepJudge::warnings(const Judgement& judgement) {
+std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double error) {
     std::vector<std::string> texts;
+    if (judgement.rounding > loud_rounding && judgement.rounding > seen_by_companions * error)
+        texts.push_back(fmt::format(
+            "rounding inside the formulas of the forces is {:.1g} of their change along the motion, because terms "
+            "nearly cancel. The error may be as large, and no second run in double shows it. Write them without "
+            "differences of nearly equal terms, or take --companion double-double, or numbers = \"double-double\"",
+            judgement.rounding));
     if (judgement.radians > judgement.limit)
         texts.push_back(fmt::format(
             "the step is beyond the linear stability limit: h omega = {:.3g} is more than {:.4g}, omega the largest "

@@ -34,11 +34,12 @@ public:
             double time;        // of its start
         };
         std::optional<Unresolved> unresolved;  // the first such step that was found
+        double rounding = 0;  // inside the formulas of forces, as a part of their change: force_rounding.hpp
     };
     Judgement judge(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;
-    // One warning a string.
-    static std::vector<std::string> warnings(const Judgement& judgement);
+    // One warning a string. `error`: the measured one, or 0.
+    static std::vector<std::string> warnings(const Judgement& judgement, double error);
 
 private:
     std::vector<int> groups_;           // coordinates that share an amplitude have the same number

@@ -480,6 +480,22 @@ TEST_CASE("a coordinate in a far larger unit is lost where it is lost in any oth
     }
 }
 
+TEST_CASE("rounding inside the formulas, which run and companion share, is told") {
+    // About a circular orbit: R + x has five digits of x. The motion is A cos(omega t).
+    const Place place(
+        "lagrangian = \"x'^2/2 + GM/(R + x) - GM*R/(2*(R + x)^2)\"\n[parameters]\nR = 1.5e11\n"
+        "GM = 1.33e20\nA = 1e-3\n[coordinates]\nx = { position = \"A\", velocity = 0 }\n"
+        "[method]\npoints = 6\n[run]\nstep = 1e5\nuntil = 1e7\n");
+    const std::string says = "rounding inside the formulas of the forces is 0.0";
+    const test::Finished lost = place.run();
+    INFO(lost.out << lost.err);
+    CHECK(absolute_error(lost.out) < 1e-6);  // the true one is 6e-6
+    CHECK(test::contains(lost.err, says));
+    for (const std::vector<std::string>& options :
+         {std::vector<std::string>{"--set", "A=1e6"}, {"--companion", "double-double"}, {"--numbers", "double-double"}})
+        CHECK_FALSE(test::contains(place.run(options).err, "rounding inside"));
+}
+
 TEST_CASE("a barrier in the way of the last of many coordinates is met") {
     const Place place(
         "lagrangian = \"sum(i = 1 .. 17, x[i]'^2/2) - sum(i = 1 .. 15, (x[i+1] - x[i])^4/4 + x[i]^2/2) - "
