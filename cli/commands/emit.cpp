@@ -56,21 +56,20 @@ void print_report(const std::vector<PassReport>& report) {
 void print_use(const KernelSource& source, const EmitCommand& options, const Scene& scene) {
     const Precision numbers = scene.method.numbers;
     const bool quadruple = numbers == Precision::quadruple, hybrid = has_hybrid_stepper(scene);
-    const char* const exact = numbers == Precision::double_double ? " -ffp-contract=off" : "";
     const std::string tolerance = tolerance_setting(scene, source.form);
     const std::string include = options.standalone ? "" : options.no_support ? " -I runtime/kernel" : "";
     fmt::print(
         std::cout,
         "\nUse it:\n"
-        "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2{5}{2} -I {3} program.cpp{4}\n"
-        "  lobatto::{6}<lobatto::kernels::{0}> stepper;\n"
-        "{9}  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .{7}, "
-        ".momentum(p){8}\n",
+        "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2 -march=native -ffp-contract=off{2} -I {3} program.cpp{4}\n"
+        "  lobatto::{5}<lobatto::kernels::{0}> stepper;\n"
+        "{8}  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .{6}, "
+        ".momentum(p){7}\n",
         source.name, quadruple ? "gnu++" : "c++", include, shell_word(options.folder),
         quadruple                  ? " -lquadmath"
         : has_many_digits(numbers) ? " -lmpfr"
                                    : "",
-        exact, hybrid ? "HybridStepper" : "Stepper", hybrid ? "q()" : "q", hybrid ? "; .events()" : "",
+        hybrid ? "HybridStepper" : "Stepper", hybrid ? "q()" : "q", hybrid ? "; .events()" : "",
         tolerance.empty() ? "" : fmt::format("  stepper.{};\n", tolerance));
 }
 

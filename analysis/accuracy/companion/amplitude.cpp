@@ -10,8 +10,8 @@ namespace lobatto {
 
 namespace {
 
-constexpr double few_roundings =
-    128;  // of the place, by which what rests moves: those of the forces there add to its own
+// Of the place, by which what rests moves: the roundings of the forces there add to its own.
+constexpr double few_roundings = 128;
 // Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
 // squares it each time; a motion that small beside others is none.
 constexpr double held_at_zero = 0x1p-100;
