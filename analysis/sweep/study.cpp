@@ -60,7 +60,7 @@ void check_numbers(const Scene& scene) {
                                  "; remove the clock, or give --numbers double");
     if (!scene.outputs.kept.empty())
         throw InputError(
-            fmt::format("{}: what sweeps keep of a trajectory is computed in double{}; leave out --keep, or "
+            fmt::format("{}: what sweeps keep of a trajectory is computed in double{}; leave out --keep and `keep`, or "
                         "give --numbers double",
                         scene.path, numbers));
 }

@@ -47,7 +47,7 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
                 "the iteration for the positions inside the step did not converge: its last increment was {:.2g} "
                 "of the displacement "
                 "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
-                "of the potential",
+                "of the potential, or to a place where a mass vanishes",
                 result.increment_failed);
             advice = smaller + more + ", or start elsewhere";
             break;
@@ -61,8 +61,8 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             }
             why =
                 "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
-                "potential or away to infinity, or the "
-                "step is too long for the method to be stable";
+                "potential, to a place where a mass vanishes, or away to infinity, or the step is too long for the "
+                "method to be stable";
             advice = smaller + more + ", an earlier end, or start elsewhere";
             break;
         case LOBATTO_SINGULAR_JACOBIAN:
