@@ -78,15 +78,12 @@ double force_rounding(const Outline& outline, const LoadedStepper<double>& stepp
                 std::fmax(errors[k], std::fabs(cln::double_approx(forces.back()[k] - float_of(GiNaC::numeric(Lq[k])))));
     }
     double worst = 0;
-    for (std::size_t k = 0; k < n && !forces.empty(); ++k) {
+    for (std::size_t k = 0; k < n; ++k) {
         if (!moves[k]) continue;
-        cln::cl_R least = forces.front()[k], most = least;
-        for (const std::vector<cln::cl_R>& force : forces) {
-            least = cln::min(least, force[k]);
-            most = cln::max(most, force[k]);
-        }
-        const double change = cln::double_approx(most - least) / 2;
-        if (change > 0) worst = std::fmax(worst, errors[k] / change);
+        double largest = 0;
+        for (const std::vector<cln::cl_R>& force : forces)
+            largest = std::fmax(largest, std::fabs(cln::double_approx(force[k])));
+        if (largest > 0) worst = std::fmax(worst, errors[k] / largest);
     }
     return worst;
 }

@@ -11,8 +11,8 @@
 namespace lobatto {
 
 // The largest error of a force that the kernel computes at these states (rows t, q, p), against 60 digits, as a part of
-// how far that force changes from one of them to another. Of the coordinates that move; 0 where there are more than
-// most_looked_at, and where no force changes. `stepper` is prepared with `parameters`.
+// the largest size of that force there. Of the coordinates that move; 0 where there are more than most_looked_at.
+// `stepper` is prepared with `parameters`.
 inline constexpr std::size_t most_looked_at = 16;
 double force_rounding(const Outline& outline, const LoadedStepper<double>& stepper,
                       const std::vector<double>& parameters, const std::vector<std::vector<double>>& rows,

@@ -47,7 +47,7 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) 
     std::vector<std::string> texts;
     if (error.worst() > large_error)
         texts.push_back(
-            error.worst() > 1
+            !error.complete && error.at_end > 1
                 ? "the error is as large as the motion at the end, if it grows on; take a smaller step, or more points"
                 : fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points",
                               error.worst()));
@@ -57,8 +57,8 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) 
                         wanted, error.at_end));
     if (!error.is_known_at_end())
         texts.push_back(fmt::format(
-            "the error was measured to t = {:.4g} alone, because the companion took longer than the run; of the rest "
-            "nothing is known. An earlier end is measured, or the same run with a larger step",
+            "the error was measured only to t = {:.4g}, because the companion took longer than the run; of the rest "
+            "nothing is known. Choose an earlier end, or a larger step",
             error.until));
     return texts;
 }
@@ -153,6 +153,11 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
         verdict.warnings.emplace_back(
             "the error is not measured, because an earlier part of the run had no companion, "
             "or one in other numbers");
+    else if (observers.companion && !verdict.error && result.status == LOBATTO_OK && !result.interrupted &&
+             result.steps_done > 0 && result.stop < 0)
+        verdict.warnings.emplace_back(
+            "the error is not measured, because the companion took too long to the first comparison; keep states on "
+            "the way (--every)");
     std::string departure = departure_of(run, request, result, observers);
     if (departure.empty() && !accepts_lost && !scene.run.beyond_horizon)
         departure = loss_of(scene, request, verdict.error);
@@ -160,9 +165,8 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
         for (const std::string& warning : warnings_of(*verdict.error, scene.run.error))
             verdict.warnings.push_back(warning);
     if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
-        for (const std::string& warning :
-             StepJudge::warnings(observers.judge.judge(run.outline, run.plain, request, result),
-                                 known_error(run, verdict.error)))
+        for (const std::string& warning : StepJudge::warnings(
+                 observers.judge.judge(run.outline, run.plain, request, result), known_error(run, verdict.error)))
             verdict.warnings.push_back(warning);
     for (const std::string& jump : jumps_of(scene, request.parameters)) verdict.warnings.push_back(jump);
     verdict.failure = failure_of(run, request, result, observers, departure);

@@ -21,7 +21,7 @@ constexpr std::size_t most_judged_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
 constexpr std::size_t force_looks = 6;       // at states
-// Rounding of forces beside their change that is worth a warning, and beside the measured error.
+// Rounding of forces beside their size that is worth a warning, and beside the measured error.
 constexpr double loud_rounding = 1e-6, seen_by_companions = 10;
 
 // Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
@@ -150,9 +150,11 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
         if (rows.size() < force_looks) rows.push_back(state.row);
     std::vector<bool> swings(n);  // by more than the roundings of all steps
     for (std::size_t k = 0; k < n; ++k)
-        swings[k] = moves[k] && most_[k] - least_[k] > kernel->epsilon * static_cast<double>(result.steps_done) *
-                                                           std::fmax(std::fabs(most_[k]), std::fabs(least_[k]));
-    judgement.rounding = force_rounding(outline, stepper, request.parameters, rows, swings);
+        swings[k] = moves[k] && scale[k] >= levels[k] &&
+                    most_[k] - least_[k] > kernel->epsilon * static_cast<double>(result.steps_done) *
+                                               std::fmax(std::fabs(most_[k]), std::fabs(least_[k]));
+    if (outline.scene.constraints.empty())
+        judgement.rounding = force_rounding(outline, stepper, request.parameters, rows, swings);
     return judgement;
 }
 
@@ -160,8 +162,9 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
     std::vector<std::string> texts;
     if (judgement.rounding > loud_rounding && judgement.rounding > seen_by_companions * error)
         texts.push_back(fmt::format(
-            "rounding inside the formulas of the forces is {:.1g} of their change along the motion, because terms "
-            "nearly cancel. The error may be as large, and no second run in double shows it. Write them without "
+            "rounding inside the formulas of the forces is {:.1g} of the forces, because terms nearly cancel. The "
+            "error "
+            "may be as large, and no second run in double shows it. Write them without "
             "differences of nearly equal terms, or take --companion double-double, or numbers = \"double-double\"",
             judgement.rounding));
     if (judgement.radians > judgement.limit)

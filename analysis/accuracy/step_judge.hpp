@@ -34,7 +34,7 @@ public:
             double time;        // of its start
         };
         std::optional<Unresolved> unresolved;  // the first such step that was found
-        double rounding = 0;  // inside the formulas of forces, as a part of their change: force_rounding.hpp
+        double rounding = 0;                   // inside the formulas of forces, as a part of them: force_rounding.hpp
     };
     Judgement judge(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
                     const TrajectoryResult& result) const;

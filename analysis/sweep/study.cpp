@@ -113,6 +113,8 @@ void SweepStudy::count_steps() {
         first_end = number == 0 ? end : std::fmin(first_end, end);
         last_end = number == 0 ? end : std::fmax(last_end, end);
     }
+    if (!options_.steps && *std::max_element(steps_.begin(), steps_.end()) == 0)
+        steps_of_run(starts_->with_settings(scene_, 0), options_.overrides);
     constexpr double rounding = 1e-9;
     if (!scene_.clock && !options_.steps && scene_.run.stops.empty() && last_end - first_end > rounding * last_end)
         warnings_.push_back(
@@ -157,7 +159,7 @@ Steps SweepStudy::steps_of_setting(Scene& scene) const {
         step_of(scene, options_.overrides);
         scene.run.until = scene.run.step * GiNaC::numeric(static_cast<long>(*options_.steps));
     }
-    return steps_of_run(scene, options_.overrides);
+    return lobatto::steps_of(scene, options_.overrides);
 }
 
 std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {

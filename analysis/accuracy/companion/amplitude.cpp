@@ -12,6 +12,7 @@ namespace {
 
 // Of the place, by which what rests moves: the roundings of the forces there add to its own.
 constexpr double few_roundings = 128;
+constexpr double displaced = 0.01;  // of its amplitude, at the start: what moves, not what rounding moves
 // Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
 // squares it each time; a motion that small beside others is none.
 constexpr double held_at_zero = 0x1p-100;
@@ -62,15 +63,21 @@ std::vector<double> noise_levels(const std::vector<double>& sizes) {
     return levels;
 }
 
-void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
+void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& start,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
     const std::vector<double> levels = noise_levels(amplitudes);
     const std::size_t n = amplitudes.size() / 2;
     std::vector<double> actions;
     for (std::size_t k = 0; k < n; ++k) actions.push_back(amplitudes[k] * amplitudes[n + k]);
     const double least_action = noise * *std::max_element(actions.begin(), actions.end());
+    const auto is_displaced = [&](std::size_t i) {
+        return start[i] != 0 && std::fabs(start[i]) >= displaced * amplitudes[i];
+    };
+    const auto is_of_another_unit = [&](std::size_t k) {
+        return actions[k] > least_action && (is_displaced(k) || is_displaced(n + k));
+    };
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
-        if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i] && actions[i % n] <= least_action)) continue;
+        if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i] && !is_of_another_unit(i % n))) continue;
         int agree = 0, disagree = 0;
         for (std::size_t j = 0; j < std::min(comparisons, first_compared); ++j) {
             const auto [run, companion] = pair(j, i);

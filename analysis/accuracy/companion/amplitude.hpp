@@ -35,9 +35,10 @@ std::vector<bool> moving(const std::vector<double>& least, const std::vector<dou
 std::vector<double> noise_levels(const std::vector<double>& sizes);
 
 // An amplitude below its noise level becomes 0 if the run and its companion do not agree on this number in most of the
-// first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion. Coordinates of another
-// unit may be small as well, but their action, amplitude of q times that of p, is not.
-void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons,
+// first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion. `start`: q, p.
+// Coordinates of another unit may be small as well. But these do not begin at 0, where forces that cancel leave a
+// coordinate at rest, and their action, amplitude of q times that of p, is not small.
+void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& start,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
 // How far each number moved until the first comparison, half its range, and in how many steps.

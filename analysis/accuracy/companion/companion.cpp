@@ -377,7 +377,7 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
         const double longest = is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                : begins_now                            ? result.seconds / 2
                                                                        : 0,
-                     to_first = begins_now ? 2 * result.seconds : result.seconds;  // where few states are kept
+                     to_first = 4 * result.seconds;  // where few states are kept
         while (!finished_ && !has_caught_up() &&
                seconds_since(now) < (has_compared() ? longest : std::fmax(longest, to_first)))
             std::this_thread::sleep_for(std::chrono::microseconds(200));

@@ -87,7 +87,9 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     const auto pair = [&](std::size_t j, std::size_t i) {
         return std::pair(run_[j].row[i * parts_], companion_[j].row[i * parts_]);
     };
-    leave_out_noise(shared, comparisons, pair);
+    std::vector<double> start = rounded(request_.whole_q, parts_), momenta = rounded(request_.whole_p, parts_);
+    start.insert(start.end(), momenta.begin(), momenta.end());
+    leave_out_noise(shared, comparisons, start, pair);
     if (comparisons == 0) return shared;
     const Range& until_first = companion_ranges_.front();
     leave_out_rounding(shared, comparisons, sizes_of(all.least, all.most), static_cast<double>(request_.steps),

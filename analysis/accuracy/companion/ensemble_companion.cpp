@@ -236,7 +236,7 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
         const auto at = static_cast<std::int64_t>(j);
         return std::pair(run_at(at)[i * parts_], companion_at(at)[i * parts_]);
     };
-    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), pair);
+    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), {kept.rows + 1, kept.rows + kept.columns}, pair);
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
     if (comparisons > 0) {
         const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);

@@ -143,8 +143,10 @@ Value convert(const Source& source, Cursor& cursor, const toml::node& node) {
 std::string explanation(std::string_view description) {
     constexpr std::string_view prefix = "Error while parsing ";
     if (description.starts_with(prefix)) description.remove_prefix(prefix.size());
-    if (const std::size_t twice = description.find("cannot redefine existing "); twice != std::string_view::npos)
-        return fmt::format("{} is given twice; keep one", description.substr(description.find('\'', twice)));
+    const std::size_t twice = description.find("cannot redefine existing "), quote = description.find('\'', twice),
+                      end = description.find('\'', quote + 1);
+    if (twice != std::string_view::npos && quote != std::string_view::npos && end != std::string_view::npos)
+        return fmt::format("{} is given twice; keep one", description.substr(quote, end + 1 - quote));
     const bool formula = description.find("could not determine value type") != std::string_view::npos ||
                          description.find("expected digit") != std::string_view::npos;
     const bool point = description.find("expected decimal digit, saw '.'") != std::string_view::npos;

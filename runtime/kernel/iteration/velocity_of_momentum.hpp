@@ -120,18 +120,24 @@ private:
     // v^2); lengths: sum |increment residual|.
     static Status solve(const State& at, Arrays& a) {
         if (!evaluate(at, a.x, a)) return Status::not_finite;
+        bool may_be_last = true;
         for (int iteration = 0; iteration < 100; ++iteration) {
             if (iteration > 0 && is_near(at, a, real(2) * Limits<real>::epsilon)) return Status::ok;
             if (iteration > few && is_rounding(at, a)) return Status::ok;
             set_matrix(a);
             if (!a.matrix.factor()) return Status::singular_mass;
             const real length = solve_for(a, a.increment);
-            const bool next_is_rounding = iteration > 0 && is_near(at, a, Limits<real>::root_epsilon);
+            const bool next_is_rounding = may_be_last && iteration > 0 && is_near(at, a, Limits<real>::root_epsilon);
             for (real part = real(1);; part *= real(0.5)) {
                 if (part < Limits<real>::epsilon)
                     return evaluate(at, a.x, a) && is_rounding(at, a) ? Status::ok : Status::not_converged;
                 for (int i = 0; i < unknowns; ++i) a.trial[i] = a.x[i] + part * a.increment[i];
                 if (next_is_rounding || (evaluate(at, a.trial, a) && solve_for(a, a.next) <= length)) break;
+            }
+            if (next_is_rounding) {  // near the speed of light it may not be
+                may_be_last = evaluate(at, a.trial, a) && is_near(at, a, real(64) * Limits<real>::epsilon);
+                if (!may_be_last && !evaluate(at, a.x, a)) return Status::not_finite;
+                if (!may_be_last) continue;
             }
             for (int i = 0; i < unknowns; ++i) a.x[i] = a.trial[i];
             if (next_is_rounding) return Status::ok;

@@ -192,7 +192,7 @@ TEST_CASE("sweeps in other numbers go on where they were stopped, and refuse wha
     CHECK(kept.exit_code == 2);
     CHECK(test::contains(kept.err,
                          "what sweeps keep of a trajectory is computed in double, but numbers are \"float\"; leave "
-                         "out --keep, or give --numbers double"));
+                         "out --keep and `keep`, or give --numbers double"));
 }
 
 TEST_CASE("in float twelve points lead where they lead in double, for linear systems and with constraints") {

@@ -214,6 +214,8 @@ TEST_CASE("mistakes of TOML come with their place") {
     check_error(6, "k = 2*pi", {6, 6},
                 "not valid TOML: decimal integer: expected digit, saw '*'; a formula must stand in quotes");
     check_error(6, "m = 2", {6, 5}, "'m' is given twice; keep one");
+    check_error(6, "m.a = 2", {6, 1},
+                "not valid TOML: key-value pair: cannot redefine existing integer as dotted key-value pair");
     check_error(6, "ω = 2", {6, 1}, "not valid TOML: 'ω' cannot stand outside quotes and comments");
     check_error(6, "k = nan", {6, 5}, "inf and nan are not numbers a scene can use; write a finite number");
     check_error(6, "k = 1979-05-27  # a date", {6, 5}, "a date or time: no value of a scene is one");
