@@ -24,16 +24,19 @@ constexpr int most_dense = 100;
 constexpr std::size_t most_plotted = 6, most_events = 2000;
 const char* const kind_names[] = {"point", "line", "spring", "circle"};
 
-// The states of a run; long ones keep every second when there are too many, again and again.
+// The states of a run; long ones keep every second when there are too many, again and again. States between two steps
+// are less accurate than those at steps, so they are given the energy of the step before.
 class ShownStates {
 public:
-    ShownStates(std::size_t columns, std::size_t most) : columns_(columns), most_(std::max<std::size_t>(most, 16)) {}
+    ShownStates(std::size_t columns, std::size_t most, int dense)
+        : columns_(columns), most_(std::max<std::size_t>(most, 16)), rows_a_step_(1 + dense) {}
 
     void add(const Records& records) {
         for (std::int64_t i = 0; i < records.count; ++i, ++seen_) {
             const double* const row = records.rows + i * records.columns;
             last_.assign(row, row + columns_);
-            last_.push_back(records.energy != nullptr ? records.energy[i] : std::nan(""));
+            if (seen_ % rows_a_step_ == 0) energy_ = records.energy != nullptr ? records.energy[i] : std::nan("");
+            last_.push_back(energy_);
             if (seen_ % every_ != 0) continue;
             rows_.insert(rows_.end(), last_.begin(), last_.end());
             if (count() >= 2 * most_) halve();
@@ -59,7 +62,8 @@ private:
     }
 
     std::size_t columns_, most_;
-    std::int64_t seen_ = 0, every_ = 1;
+    std::int64_t rows_a_step_, seen_ = 0, every_ = 1;
+    double energy_ = 0;  // of the last step
     std::vector<double> rows_, last_;
 };
 
@@ -238,7 +242,7 @@ Viewed viewed_motion(const api::Scene& written, const api::Settings& settings, b
     api::OpenedRun run(api::scene_of(kept), values);
     add_energy(viewed, scene, channels,
                run.prepared().outline.conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
-    ShownStates states(1 + 2 * run.request().q.size(), most_frames);
+    ShownStates states(1 + 2 * run.request().q.size(), most_frames, scene.outputs.dense);
     api::OpenedRun::Listeners listeners;
     listeners.states = [&](const Records& records) { states.add(records); };
     listeners.events = [&](const EventRecords& events) {

@@ -72,6 +72,17 @@ TEST_CASE("the page of a scene carries its motion, and asks nothing of the net")
     CHECK(data["rate"].get<double>() > 0);
 }
 
+TEST_CASE("the energy error on the page is that of the steps, not of the states drawn between them") {
+    const test::TemporaryFolder folder;
+    const std::string scene = folder / "x.toml";
+    test::write_text(scene,
+                     "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 2, velocity = 0 }\n"
+                     "[method]\npoints = 8\n[run]\nstep = 0.2\nuntil = 20\n");
+    const nlohmann::json energy = data_of(page_of_scene(scene))["runs"][0]["channels"].back();
+    CHECK(energy["most"].get<double>() < 1e-11);  // 1e-7 between steps
+    CHECK(energy["least"].get<double>() > -1e-11);
+}
+
 TEST_CASE("a second call replaces the page of the first, and nothing that Lobatto did not write") {
     const test::TemporaryFolder folder;
     const std::string page = folder / "page.html";
