@@ -79,7 +79,7 @@ TEST_CASE("the energy error on the page is that of the steps, not of the states 
                      "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 2, velocity = 0 }\n"
                      "[method]\npoints = 8\n[run]\nstep = 0.2\nuntil = 20\n");
     const nlohmann::json energy = data_of(page_of_scene(scene))["runs"][0]["channels"].back();
-    CHECK(energy["most"].get<double>() < 1e-11);  // 1e-7 between steps
+    CHECK(energy["most"].get<double>() < 1e-11);  // 1e-10 between steps
     CHECK(energy["least"].get<double>() > -1e-11);
 }
 
