@@ -210,7 +210,7 @@ struct Interrupted {
 }  // namespace
 
 TEST_CASE("a run killed at random moments and resumed has the bytes of one that was never stopped" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     check_kills(10, 1);
 }
 

@@ -236,7 +236,7 @@ TEST_CASE("a part that has lost or doubled a row is not merged") {
 }
 
 TEST_CASE("a sweep that is killed again and again and resumed has the bytes of one that was never stopped" *
-          doctest::test_suite("slow")) {
+          doctest::test_suite("slowest")) {
     const test::SweepFolder place;
     std::mt19937 random(1);
     for (const std::string& ending : endings()) {
