@@ -54,12 +54,7 @@ StartIn<real> start_in(const ExactStart& start, const Kernel& kernel, real step)
         throw ComputationError(status == LOBATTO_SINGULAR_MASS
                                    ? "the mass matrix has no inverse for the scene's parameters"
                                    : "the kernel's coefficients are not finite for the scene's parameters and step");
-    if (start.from_velocity) {
-        const std::vector<real> velocity = std::exchange(result.p, {});
-        result.p = stepper.momentum(real(0), result.q, velocity);
-        const std::string why = why_velocity_is_lost(stepper, real(0), result.q, velocity, result.p);
-        if (!why.empty()) throw ComputationError(why);
-    }
+    if (start.from_velocity) result.p = momentum_of_start(stepper, real(0), result.q, result.p);
     return result;
 }
 

@@ -117,12 +117,8 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
     TrajectoryResult none;
     none.status = stepper.prepare(request.parameters, request.step);
     if (none.status == LOBATTO_OK) {
-        if (start.from_velocity) {
-            const std::vector<double> velocity = std::exchange(request.p, {});
-            request.p = stepper.momentum(request.time, request.q, velocity);
-            const std::string why = why_velocity_is_lost(stepper, request.time, request.q, velocity, request.p);
-            if (!why.empty()) throw ComputationError(fmt::format("{}: {}", scene.path, why));
-        }
+        if (start.from_velocity)
+            request.p = momentum_of_start(stepper, request.time, request.q, request.p, scene.path + ": ");
         none.status = stepper.start(request.time, request.q, request.p);
     }
     none.q = request.q;

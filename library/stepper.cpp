@@ -326,11 +326,8 @@ void Stepper::start(double t, const double* q, const double* p) {
 void Stepper::start_from_velocity(double t, const double* q, const double* v) {
     const std::size_t n = parts_->n();
     guarded([&] {
-        const std::vector<double> position{q, q + n}, velocity{v, v + n},
-            momentum = parts_->stepper.momentum(t, position, velocity);
-        const std::string why = why_velocity_is_lost(parts_->stepper, t, position, velocity, momentum);
-        if (!why.empty()) throw ComputationError(why);
-        parts_->begin_at(t, position, momentum);
+        const std::vector<double> position{q, q + n};
+        parts_->begin_at(t, position, momentum_of_start(parts_->stepper, t, position, {v, v + n}));
     });
 }
 

@@ -162,10 +162,9 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
     std::vector<std::string> texts;
     if (judgement.rounding > loud_rounding && judgement.rounding > seen_by_companions * error)
         texts.push_back(fmt::format(
-            "rounding inside the formulas of the forces is {:.1g} of the forces, because terms nearly cancel. The "
-            "error "
-            "may be as large, and no second run in double shows it. Write them without "
-            "differences of nearly equal terms, or take --companion double-double, or numbers = \"double-double\"",
+            "the forces lose digits, because terms in their formulas nearly cancel: their rounding is {:.1g} of their "
+            "size. The error may be as large, and no second run in double shows it. Write the formulas without "
+            "differences of nearly equal terms, or take --companion double-double or numbers = \"double-double\"",
             judgement.rounding));
     if (judgement.radians > judgement.limit)
         texts.push_back(fmt::format(

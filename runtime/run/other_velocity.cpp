@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/error.hpp"
 #include "runtime/kernel/base/double_double.hpp"
 #include "runtime/run/parts.hpp"
 #include "runtime/run/trajectory.hpp"
@@ -61,23 +62,24 @@ std::vector<double> other_velocity(const LoadedStepper<real>& stepper, real time
 }
 
 template <class real>
-std::string why_velocity_is_lost(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
-                                 const std::vector<real>& velocity, const std::vector<real>& p) {
+std::vector<real> momentum_of_start(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
+                                    const std::vector<real>& velocity, const std::string& place) {
+    const std::vector<real> p = stepper.momentum(time, q, velocity);
     const std::vector<double> other = other_velocity(stepper, time, q, velocity, p);
-    if (other.empty()) return {};
-    return fmt::format(
-        "the momentum of the start belongs to several velocities: its steps would begin with {} instead of "
-        "{}, for kernels keep positions and momenta. L is followed only where no velocity shares its "
-        "momentum, as where the mass matrix d2L/dq'dq' is positive for all velocities. Try another start, "
-        "or a Lagrangian without these terms",
-        list_text(other), list_text(in_double(velocity)));
+    if (!other.empty())
+        throw ComputationError(
+            fmt::format("{}the momentum of the start belongs to several velocities. Kernels keep positions and "
+                        "momenta, so its steps would begin with {} instead of {}. Try another start, or a Lagrangian "
+                        "whose mass matrix d2L/dq'dq' is positive for all velocities",
+                        place, list_text(other), list_text(in_double(velocity))));
+    return p;
 }
 
-#define LOBATTO_FOR(real)                                                                                   \
-    template std::vector<double> other_velocity(const LoadedStepper<real>&, real, const std::vector<real>&, \
-                                                const std::vector<real>&, const std::vector<real>&);        \
-    template std::string why_velocity_is_lost(const LoadedStepper<real>&, real, const std::vector<real>&,   \
-                                              const std::vector<real>&, const std::vector<real>&);
+#define LOBATTO_FOR(real)                                                                                    \
+    template std::vector<double> other_velocity(const LoadedStepper<real>&, real, const std::vector<real>&,  \
+                                                const std::vector<real>&, const std::vector<real>&);         \
+    template std::vector<real> momentum_of_start(const LoadedStepper<real>&, real, const std::vector<real>&, \
+                                                 const std::vector<real>&, const std::string&);
 LOBATTO_FOR(float)
 LOBATTO_FOR(double)
 LOBATTO_FOR(long double)

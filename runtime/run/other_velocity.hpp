@@ -20,9 +20,10 @@ std::vector<double> other_velocity(const NumberStepper& stepper, const NumberSte
                                    const NumberStepper::Parts& q, const NumberStepper::Parts& velocity,
                                    const NumberStepper::Parts& p);
 
-// What is wrong there and what to try; nothing where it is this velocity.
+// The momentum of a start. ComputationError, with the reason and what to try, if steps would leave it with another
+// velocity; it begins with `place`, such as "scene.toml: ".
 template <class real>
-std::string why_velocity_is_lost(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
-                                 const std::vector<real>& velocity, const std::vector<real>& p);
+std::vector<real> momentum_of_start(const LoadedStepper<real>& stepper, real time, const std::vector<real>& q,
+                                    const std::vector<real>& velocity, const std::string& place = "");
 
 }  // namespace lobatto

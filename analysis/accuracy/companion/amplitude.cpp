@@ -67,14 +67,14 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, c
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
     const std::vector<double> levels = noise_levels(amplitudes);
     const std::size_t n = amplitudes.size() / 2;
-    std::vector<double> actions;
-    for (std::size_t k = 0; k < n; ++k) actions.push_back(amplitudes[k] * amplitudes[n + k]);
-    const double least_action = noise * *std::max_element(actions.begin(), actions.end());
+    std::vector<double> products;  // do not depend on units
+    for (std::size_t k = 0; k < n; ++k) products.push_back(amplitudes[k] * amplitudes[n + k]);
+    const double smallest = noise * *std::max_element(products.begin(), products.end());
     const auto is_displaced = [&](std::size_t i) {
         return start[i] != 0 && std::fabs(start[i]) >= displaced * amplitudes[i];
     };
     const auto is_of_another_unit = [&](std::size_t k) {
-        return actions[k] > least_action && (is_displaced(k) || is_displaced(n + k));
+        return products[k] > smallest && (is_displaced(k) || is_displaced(n + k));
     };
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
         if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i] && !is_of_another_unit(i % n))) continue;
