@@ -354,8 +354,6 @@ void run(const RunOptions& options) {
             print_row("measured error", text_of(*verdict.error, scene));
         else if (!options.unmeasured && result.stop >= 0)
             print_row("measured error", "none: it stopped before the first comparison; give an earlier end (--until)");
-        else if (observers.companion && verdict.failure.empty() && !result.interrupted && result.steps_done > 0)
-            print_row("measured error", "none: the first comparison took too long; keep states on the way (--every)");
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));

@@ -9,7 +9,7 @@
 #include "cli/options/overrides.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
-#include "cli/print/sweep_summary.hpp"
+#include "cli/print/summary.hpp"
 #include "cli/print/tell.hpp"
 #include "cli/tradeoff/page.hpp"
 #include "cli/tradeoff/pictures.hpp"

@@ -13,7 +13,6 @@
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
-#include "cli/print/sweep_summary.hpp"
 #include "cli/print/tell.hpp"
 #include "library/whole.hpp"
 

@@ -178,8 +178,9 @@ void view(const ViewCommand& options) {
         fmt::print("{}", json_of_drawn("view", path, drawn));
     } else if (!options.quiet) {
         for (const Viewed& one : all)
-            print_row("motion", fmt::format("{}: {}; {} frames, {} figures", one.motion.label, one.motion.note,
-                                            one.motion.times.size(), one.motion.figures.size()));
+            print_row("motion", fmt::format("{}: {}; {}, {}", one.motion.label, one.motion.note,
+                                            counted(std::ssize(one.motion.times), "frame", "frames"),
+                                            counted(std::ssize(one.motion.figures), "figure", "figures")));
         print_row("page", fmt::format("{}, {} kB: open it in a browser", path, (page.size() + 999) / 1000));
         if (!options.video.empty()) print_row("video", options.video);
     }

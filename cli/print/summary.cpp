@@ -10,6 +10,10 @@ void print_row(const std::string& label, const std::string& value) {
     fmt::print("  {:<23} {}\n", label, value);
 }
 
+std::string counted(std::int64_t count, const std::string& one, const std::string& many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
 std::string duration(double seconds) {
     if (seconds < 1e-6) return fmt::format("{:.3g} ns", seconds * 1e9);
     if (seconds < 1e-3) return fmt::format("{:.3g} us", seconds * 1e6);

@@ -72,10 +72,6 @@ void print_state(const Scene& scene, const SweepTally& tally) {
 
 }  // namespace
 
-std::string counted(std::int64_t count, const std::string& one, const std::string& many) {
-    return fmt::format("{} {}", count, count == 1 ? one : many);
-}
-
 void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTimes& times, std::int64_t asked) {
     const Scene& scene = study.scene();
     const SweepStarts& starts = study.starts();

@@ -11,8 +11,6 @@
 
 namespace lobatto {
 
-std::string counted(std::int64_t count, const std::string& one, const std::string& many);
-
 // `asked`: trajectories that were to be computed.
 void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTimes& times, std::int64_t asked);
 
