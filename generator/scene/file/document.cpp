@@ -148,7 +148,8 @@ std::string explanation(std::string_view description) {
     if (twice != std::string_view::npos && quote != std::string_view::npos && end != std::string_view::npos)
         return fmt::format("{} is given twice; keep one", description.substr(quote, end + 1 - quote));
     const bool formula = description.find("could not determine value type") != std::string_view::npos ||
-                         description.find("expected digit") != std::string_view::npos;
+                         description.find("expected digit") != std::string_view::npos ||
+                         description.starts_with("boolean");  // a word with f or t
     const bool point = description.find("expected decimal digit, saw '.'") != std::string_view::npos;
     return fmt::format("not valid TOML: {}{}", description,
                        point     ? "; a number begins with a digit: write 0.5, not .5"

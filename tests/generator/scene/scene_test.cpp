@@ -213,6 +213,8 @@ TEST_CASE("mistakes of TOML come with their place") {
                 "not valid TOML: value: could not determine value type; a formula must stand in quotes");
     check_error(6, "k = 2*pi", {6, 6},
                 "not valid TOML: decimal integer: expected digit, saw '*'; a formula must stand in quotes");
+    check_error(6, "k = forty", {6, 6},
+                "not valid TOML: boolean: expected 'false', saw 'fo'; a formula must stand in quotes");
     check_error(6, "m = 2", {6, 5}, "'m' is given twice; keep one");
     check_error(6, "m.a = 2", {6, 1},
                 "not valid TOML: key-value pair: cannot redefine existing integer as dotted key-value pair");
