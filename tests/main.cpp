@@ -72,6 +72,7 @@ private:
 // or reordered (runtime/build/compiler.cpp), so they have the same bits; machines_test checks that. All other tests
 // have the flags of users. A compiler that $CXX names stays as it is.
 constexpr const char* compiled_quickly[] = {
+    "/analysis/amplitude_test.cpp",
     "/analysis/bodies_test.cpp",
     "/analysis/clock_test.cpp",
     "/analysis/companion_test.cpp",

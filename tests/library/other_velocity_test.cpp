@@ -5,6 +5,7 @@
 
 #include <lobatto/lobatto.hpp>
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -84,5 +85,15 @@ TEST_CASE("velocities that their momenta determine are kept, however badly") {
                 "u = { position = 1e10, velocity = 1 }\nw = { position = 0, velocity = 1 }"}}) {
         CAPTURE(lagrangian);
         CHECK_NOTHROW(lob::Stepper(lob::compile(scene_of(lagrangian, coordinates, 1e-4))));
+    }
+}
+
+// From the momentum the kernel finds a velocity within 1e-8 of 1; H is its sqrt(1 + p^2).
+TEST_CASE("near the speed of light the velocity of a momentum is found to its last digits") {
+    for (const double p : {100.0, 7071.0678, 22360.679}) {
+        const lob::Scene scene =
+            scene_of("-sqrt(1 - x'^2) - x^2/2", fmt::format("x = {{ position = 0, momentum = {} }}", p), 1e-9);
+        lob::Stepper stepper(lob::compile(scene));
+        CHECK(stepper.energy() == doctest::Approx(std::sqrt(1 + p * p)).epsilon(1e-6));
     }
 }
