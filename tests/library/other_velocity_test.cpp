@@ -75,7 +75,7 @@ TEST_CASE("velocities that their momenta determine are kept, however badly") {
     };
     const std::string fast = start_at(0, "0.999999"), faster = start_at(0, "0.9999999999"), slow = start_at(0, "1e-6"),
                       at_rest = start_at(0.5, "0");
-    for (const auto& [lagrangian, coordinates] :
+    for (const Start& start :
          {Start{"-sqrt(1 - x'^2) - x^2/2", fast.c_str()}, Start{"-sqrt(1 - x'^2) - x^2/2", faster.c_str()},
           Start{"x'^4/4 - x^2/2", slow.c_str()}, Start{"exp(x'^2) + 3e8*x*x' - x^2/2", at_rest.c_str()},
           Start{"-sqrt(1 - x'^2 - y'^2) + 5*x*y' - y^2",
@@ -83,8 +83,8 @@ TEST_CASE("velocities that their momenta determine are kept, however badly") {
           Start{"1e-31*(r'^2 + r^2*f'^2)/2 + 1e20*(u'^2 + u^2*w'^2)/2",
                 "r = { position = 1e-10, velocity = 0 }\nf = { position = 0, velocity = 1e-16 }\n"
                 "u = { position = 1e10, velocity = 1 }\nw = { position = 0, velocity = 1 }"}}) {
-        CAPTURE(lagrangian);
-        CHECK_NOTHROW(lob::Stepper(lob::compile(scene_of(lagrangian, coordinates, 1e-4))));
+        CAPTURE(start.lagrangian);
+        CHECK_NOTHROW(lob::Stepper(lob::compile(scene_of(start.lagrangian, start.coordinates, 1e-4))));
     }
 }
 
