@@ -73,6 +73,7 @@ struct Ensemble::Parts {
           status(starts.count) {
         LoadedStepper<double> stepper(kernel());
         EnsembleStart start;
+        std::vector<int> refused(starts.count);
         const auto width = static_cast<std::size_t>(std::max(kernel()->lanes, 1));
         for (std::size_t first = 0; first < starts.count; first += width) {
             Lanes& side_by_side = lanes.emplace_back();
@@ -86,7 +87,7 @@ struct Ensemble::Parts {
             side_by_side.steps_done.resize(width);
             side_by_side.iterations.resize(width);
             for (std::size_t lane = 0; lane < width; ++lane) {
-                if (lane < side_by_side.count) begin(first + lane, stepper, start);
+                if (lane < side_by_side.count) refused[first + lane] = begin(first + lane, stepper, start);
                 const auto put = [](const std::vector<double>& from, std::vector<double>& to) {
                     to.insert(to.end(), from.begin(), from.end());
                 };
@@ -96,6 +97,8 @@ struct Ensemble::Parts {
             }
             restart(side_by_side);
         }
+        for (std::size_t index = 0; index < refused.size(); ++index)
+            if (refused[index] != LOBATTO_OK) status[index] = refused[index];
     }
 
     const lobatto::Kernel& kernel() const { return *study->first_setting().kernel; }
@@ -103,17 +106,21 @@ struct Ensemble::Parts {
     std::size_t n() const { return study->scene().coordinates.size(); }
     double time() const { return request().time + static_cast<double>(steps) * step[0]; }
 
-    // A start with its momenta; those that have none are not numbers.
-    void begin(std::size_t index, LoadedStepper<double>& stepper, EnsembleStart& start) const {
+    // A start with its momenta, which are not numbers if it is refused.
+    lobatto_status begin(std::size_t index, LoadedStepper<double>& stepper, EnsembleStart& start) const {
         study->starts().start(static_cast<std::int64_t>(index), start);
-        if (!request().from_velocities) return;
+        if (!request().from_velocities) return LOBATTO_OK;
         std::vector<double> p(start.rate.size(), std::nan(""));
-        if (stepper.prepare(start.parameters, step[0]) == LOBATTO_OK) {
-            p = stepper.momentum(request().time, start.q, start.rate);
-            if (!other_velocity(stepper, request().time, start.q, start.rate, p).empty())
-                std::fill(p.begin(), p.end(), std::nan(""));
+        lobatto_status result = stepper.prepare(start.parameters, step[0]);
+        if (result == LOBATTO_OK) {
+            const std::vector<double> momentum = stepper.momentum(request().time, start.q, start.rate);
+            if (other_velocity(stepper, request().time, start.q, start.rate, momentum).empty())
+                p = momentum;
+            else
+                result = LOBATTO_SINGULAR_MASS;
         }
         start.rate = p;
+        return result;
     }
 
     void restart(Lanes& side_by_side) {

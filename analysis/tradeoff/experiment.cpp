@@ -103,19 +103,25 @@ Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentReque
         reference_ = compute_reference(exact, start_, wish);
         measurer_.emplace(reference_, start_, exact, conserves_, request_.interrupted);
     };
+    // Rounding may be what makes steps in long double short, or has grown: with more digits, if there is the time.
     const Precision first = reference.precision;
     try {
         compute(first);
-    } catch (const TooSlow&) {
-        if (first == Precision::extended) throw;
-        compute(Precision::extended);
-        reference_.is_late = true;
-    }
-    // What rounding has grown to: with more digits, if there is the time.
-    if (first == Precision::extended && reference_.disagreement.back() > request_.wanted && !reference_.is_late) {
-        reference_.is_late = left() < quadruple_compilation * kernels_.compile_seconds(reference);
+    } catch (const TooSlow& late) {
         try {
-            if (!reference_.is_late) compute(Precision::quadruple);
+            compute(first == Precision::extended ? Precision::quadruple : Precision::extended);
+        } catch (const TooSlow&) {
+            if (first == Precision::extended) throw late;  // what it reaches is the most
+            throw;
+        }
+        reference_.is_late = reference_.is_late || first == Precision::quadruple;
+    }
+    if (first == Precision::extended && reference_.precision == first &&
+        reference_.disagreement.back() > request_.wanted) {
+        const bool has_time = left() >= quadruple_compilation * kernels_.compile_seconds(reference);
+        reference_.is_late = reference_.is_late || !has_time;
+        try {
+            if (has_time) compute(Precision::quadruple);
         } catch (const TooSlow&) {
             reference_.is_late = true;
         }

@@ -66,6 +66,10 @@ TEST_CASE("in sweeps and ensembles such a start ends alone") {
         starts.count = 5;
         const lob::Scene scene = scene_of("x'^2/2 - x'^4/24 - x^2/2", start_at(0, "0.5"));
         CHECK(lob::sweep(scene, starts, options).status == std::vector<int>{0, 0, 4, 4, 0});
+        if (options.numbers != "double") continue;
+        lob::Ensemble ensemble(scene, starts);
+        ensemble.advance(1);
+        CHECK(ensemble.status() == std::vector<int>{0, 0, 4, 4, 0});
     }
 }
 
