@@ -221,21 +221,43 @@ std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& requ
            rows_of_step;
 }
 
-// With a clock a motion that fails went on from the state of its chain that was recorded last, not from the last
-// arrival.
+// Of a motion with a clock, the state of its chain that was recorded last: one that fails went on from there, not from
+// the last arrival.
 class LastOfChain {
 public:
-    void look(TrajectoryResult& result, const NumberStepper::Parts& records, std::int64_t count) {
-        const std::ptrdiff_t n = std::ssize(result.q), columns = 1 + 2 * n;
-        if (count > 0) row_.assign(records.begin() + (count - 1) * columns, records.begin() + count * columns);
+    void look(const TrajectoryResult& result, const NumberStepper::Parts& records, std::int64_t count,
+              std::size_t parts) {
+        if (count == 0) return;
+        const auto width = static_cast<std::ptrdiff_t>((1 + 2 * result.q.size()) * parts);
+        const auto end = records.begin() + count * width;
+        row_ = rounded({end - width, end}, parts);
+    }
+    void go_back(TrajectoryResult& result) const {
         if (result.status == LOBATTO_OK || row_.empty()) return;
+        const std::ptrdiff_t n = std::ssize(result.q);
         result.time = row_[0];
         result.q.assign(row_.begin() + 1, row_.begin() + 1 + n);
         result.p.assign(row_.begin() + 1 + n, row_.end());
     }
 
+    // A clock that comes to 0 in a finite time lets its steps pass ever less of it. At every doubling of the steps:
+    // whether the rest of the way would take more than `hopeless` times as many as the last half of them.
+    bool stands_still(const TrajectoryResult& result, const TrajectoryRequest& request) {
+        if (!request.arrivals.keeps_chain || row_.empty() || result.chain_steps < next_look_) return false;
+        const double end = request.time + static_cast<double>(request.steps) * request.arrivals.interval,
+                     passed = std::fabs(row_[0] - time_looked_), left = std::fabs(end - row_[0]);
+        const bool is_later = next_look_ > first_look;
+        time_looked_ = row_[0];
+        next_look_ = 2 * result.chain_steps;
+        return is_later && left > hopeless * passed;
+    }
+
 private:
+    static constexpr std::int64_t first_look = std::int64_t(1) << 18;
+    static constexpr double hopeless = 1e5;
     std::vector<double> row_;  // t, q, p
+    std::int64_t next_look_ = first_look;
+    double time_looked_ = 0;
 };
 
 }  // namespace
@@ -304,7 +326,12 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         result.time = time[0];
         result.q = rounded(q, parts);
         result.p = rounded(p, parts);
-        if (kernel->clocked != 0) last_of_chain.look(result, records, call.records_written);
+        if (kernel->clocked != 0) {
+            last_of_chain.look(result, records, call.records_written, parts);
+            if (result.status == LOBATTO_OK && last_of_chain.stands_still(result, request))
+                result.status = LOBATTO_TIME_STANDS_STILL;
+            last_of_chain.go_back(result);
+        }
         result.events += call.events_written;
         if (call.events_written > 0) {
             const std::vector<double> found = rounded(events, parts);

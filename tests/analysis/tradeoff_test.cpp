@@ -260,7 +260,9 @@ TEST_CASE(
 
 TEST_CASE("what was measured for its error alone is measured again when everything is asked for") {
     const Scene scene = read_scene(pendulum);
-    Experiment experiment(scene, scene, {});
+    ExperimentRequest wish;
+    wish.seconds = 36000;
+    Experiment experiment(scene, scene, wish);
     const Candidate candidate{{Family::lobatto, 4}, 2400, 0};
     const Measurement error_only = experiment.measure(candidate, false), all = experiment.measure(candidate);
     CHECK(std::isnan(error_only.energy_error));

@@ -23,10 +23,13 @@ std::string element_name(const std::string& array, std::size_t k) {
 }
 
 void Declarations::declare(const std::string& name, Position at, const std::string& what) {
-    if (!is_identifier(name) || name.find("__") != std::string::npos)
-        fail(at, fmt::format("'{}' cannot be the name of {}: names are letters, digits and single underscores, and "
-                             "begin with a letter",
-                             name.substr(0, 40), with_article(what)));
+    if (!is_identifier(name) || name.find("__") != std::string::npos) {
+        const bool is_ascii = name.find('?') == std::string::npos;  // others become question marks
+        fail(at, fmt::format("{} cannot be the name of {}: names are letters, digits and single underscores, and begin "
+                             "with a letter{}",
+                             is_ascii ? fmt::format("'{}'", name.substr(0, 40)) : "this", with_article(what),
+                             is_ascii ? "" : "; of Greek letters write the names, such as theta"));
+    }
     if (name.size() > longest_name)
         fail(at, fmt::format("a name of {} letters; at most {}", name.size(), longest_name));
     if (is_function_name(name))

@@ -284,6 +284,9 @@ TEST_CASE("names that are taken are refused") {
     check_error(5, "_m = 3", {5, 1},
                 "'_m' cannot be the name of a parameter: names are letters, digits and single underscores, and begin "
                 "with a letter");
+    check_error(5, "\"μ\" = 3", {5, 1},
+                "this cannot be the name of a parameter: names are letters, digits and single underscores, and begin "
+                "with a letter; of Greek letters write the names, such as theta");
 }
 
 TEST_CASE("a coordinate cannot have the name of another's momentum, in either order") {
