@@ -225,25 +225,29 @@ std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& requ
 // the last arrival.
 class LastOfChain {
 public:
-    void look(const TrajectoryResult& result, const NumberStepper::Parts& records, std::int64_t count,
-              std::size_t parts) {
-        if (count == 0) return;
-        const auto width = static_cast<std::ptrdiff_t>((1 + 2 * result.q.size()) * parts);
+    explicit LastOfChain(std::size_t parts) : parts_(parts) {}
+
+    void look(const TrajectoryRequest& request, const NumberStepper::Parts& records, std::int64_t count,
+              TrajectoryResult& result) {
+        const std::ptrdiff_t n = std::ssize(result.q), width = (1 + 2 * n) * static_cast<std::ptrdiff_t>(parts_);
         const auto end = records.begin() + count * width;
-        row_ = rounded({end - width, end}, parts);
-    }
-    void go_back(TrajectoryResult& result) const {
-        if (result.status == LOBATTO_OK || row_.empty()) return;
-        const std::ptrdiff_t n = std::ssize(result.q);
+        if (count > 0) row_ = rounded({end - width, end}, parts_);
+        if (row_.empty()) return;
+        if (result.status == LOBATTO_OK && stands_still(result, request)) result.status = LOBATTO_TIME_STANDS_STILL;
+        if (result.status == LOBATTO_OK) return;
         result.time = row_[0];
         result.q.assign(row_.begin() + 1, row_.begin() + 1 + n);
         result.p.assign(row_.begin() + 1 + n, row_.end());
     }
 
+private:
+    static constexpr std::int64_t first_look = std::int64_t(1) << 18;
+    static constexpr double hopeless = 1e5;
+
     // A clock that comes to 0 in a finite time lets its steps pass ever less of it. At every doubling of the steps:
     // whether the rest of the way would take more than `hopeless` times as many as the last half of them.
     bool stands_still(const TrajectoryResult& result, const TrajectoryRequest& request) {
-        if (!request.arrivals.keeps_chain || row_.empty() || result.chain_steps < next_look_) return false;
+        if (!request.arrivals.keeps_chain || result.chain_steps < next_look_) return false;
         const double end = request.time + static_cast<double>(request.steps) * request.arrivals.interval,
                      passed = std::fabs(row_[0] - time_looked_), left = std::fabs(end - row_[0]);
         const bool is_later = next_look_ > first_look;
@@ -252,9 +256,7 @@ public:
         return is_later && left > hopeless * passed;
     }
 
-private:
-    static constexpr std::int64_t first_look = std::int64_t(1) << 18;
-    static constexpr double hopeless = 1e5;
+    std::size_t parts_;
     std::vector<double> row_;  // t, q, p
     std::int64_t next_look_ = first_look;
     double time_looked_ = 0;
@@ -305,7 +307,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     NumberStepper::Parts records, events, time;
     const std::int64_t event_rows =
         request.events && kernel->events > 0 ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
-    LastOfChain last_of_chain;
+    LastOfChain last_of_chain(parts);
     Pace pace;
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
@@ -326,12 +328,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         result.time = time[0];
         result.q = rounded(q, parts);
         result.p = rounded(p, parts);
-        if (kernel->clocked != 0) {
-            last_of_chain.look(result, records, call.records_written, parts);
-            if (result.status == LOBATTO_OK && last_of_chain.stands_still(result, request))
-                result.status = LOBATTO_TIME_STANDS_STILL;
-            last_of_chain.go_back(result);
-        }
+        if (kernel->clocked != 0) last_of_chain.look(request, records, call.records_written, result);
         result.events += call.events_written;
         if (call.events_written > 0) {
             const std::vector<double> found = rounded(events, parts);
